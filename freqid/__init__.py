@@ -1,0 +1,32 @@
+"""freqid: physical parameters from chirp experiments, whatever the input did between samples."""
+
+from freqid.estimate import Estimate
+from freqid.estimators import etfe
+from freqid.excitation import chirp, sine
+from freqid.fit import fit
+from freqid.frequency_response import FrequencyResponse
+from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
+from freqid.models import GreyBox, Parameter
+from freqid.plants import first_order, two_mass
+from freqid.record import Record
+from freqid.simulation import simulate
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "BandLimited",
+    "Estimate",
+    "FirstOrderHold",
+    "FrequencyResponse",
+    "GreyBox",
+    "Parameter",
+    "Record",
+    "ZeroOrderHold",
+    "chirp",
+    "etfe",
+    "first_order",
+    "fit",
+    "simulate",
+    "sine",
+    "two_mass",
+]

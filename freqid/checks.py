@@ -1,0 +1,93 @@
+"""Argument checks that every public function shares: each error names the argument and the cure."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Sequence
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+Array = npt.NDArray[Any]
+
+
+def positive(name: str, value: Any, unit: str = "") -> float:
+    """Return ``value`` as a float; ValueError unless it is finite and above zero."""
+    number = finite(name, value)
+    if number <= 0:
+        raise ValueError(f"{name}={value!r} must be a positive number{f' ({unit})' if unit else ''}")
+    return number
+
+
+def finite(name: str, value: Any) -> float:
+    """Return ``value`` as a float; ValueError unless it is a finite real number."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
+        raise ValueError(f"{name}={value!r} must be a finite real number")
+    return float(value)
+
+
+def whole(name: str, value: Any, least: int = 1) -> int:
+    """Return ``value`` as an int; ValueError unless it is a whole number of at least ``least``."""
+    if isinstance(value, bool) or not isinstance(value, Real) or value != value:
+        raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
+    if not isinstance(value, Integral) and not float(value).is_integer():
+        raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
+    if value < least:
+        raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
+    return int(value)
+
+
+def samples(name: str, values: Any) -> FloatArray:
+    """Return a read-only copy of signal samples, (N,) or (N, channels), checked to be finite."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be an array of real numbers, (N,) or (N, channels)") from None
+    if array.ndim not in (1, 2) or array.size == 0:
+        raise ValueError(
+            f"{name} has shape {array.shape}; expected (N,) or (N, channels) with at least one sample"
+        )
+    bad = ~np.isfinite(array)
+    if bad.any():
+        first = int(np.argwhere(bad)[0, 0])
+        raise ValueError(
+            f"{name} has {int(bad.sum())} NaN or infinite samples, the first in row {first}; "
+            "cut the record there with slice() or repair the samples first"
+        )
+    array.flags.writeable = False
+    return array
+
+
+def band(value: Any, nyquist: float, name: str = "band") -> tuple[float, float]:
+    """Return (low, high) in Hz; ValueError unless 0 <= low < high <= ``nyquist`` (Hz)."""
+    try:
+        low, high = (float(v) for v in value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}={value!r} must be two frequencies in Hz, (low, high)") from None
+    # a band that ends at the Nyquist limit is computed as 1/(2 dt) and may be off by rounding
+    if not (0 <= low < high <= nyquist * (1 + 1e-9)):
+        raise ValueError(
+            f"{name}=({low:g}, {high:g}) Hz must satisfy 0 <= low < high <= {nyquist:g} Hz, "
+            "the Nyquist limit of this record"
+        )
+    return low, high
+
+
+def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
+    """Return ``value`` if it is one of ``allowed``, else raise a ValueError with the nearest name."""
+    if isinstance(value, str) and value in allowed:
+        return value
+    raise ValueError(unknown(name, value, allowed))
+
+
+def unknown(name: str, value: Any, allowed: Iterable[str]) -> str:
+    """Sentence for a name that is not among ``allowed``, with the nearest one as a hint."""
+    names = [str(a) for a in allowed]
+    near = difflib.get_close_matches(str(value), names, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"{name}={value!r} is not one of {', '.join(map(repr, names))}{hint}"

@@ -1,0 +1,302 @@
+"""Physically parameterised plants: Parameter and GreyBox."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import Array, finite, unknown
+from freqid.frequency_response import FrequencyResponse
+from freqid.holds import Hold
+from freqid.responses import Linearisation, StateSpace, frequency_response
+
+Matrices = Callable[..., Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A physical parameter: its name, nominal value, unit and what is known of its range.
+
+    ``lower`` and ``upper`` bound the search of a fit. ``physical`` (low, high) only flags: an
+    estimate outside it is reported in ``est.warnings``, never prevented. Raises ValueError for a
+    value that is not finite or lies outside its bounds, and for bounds that cross.
+
+    >>> Parameter("k", 1.5e5, unit="N m/rad", lower=0).name
+    'k'
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    lower: float = -math.inf
+    upper: float = math.inf
+    fixed: bool = False
+    physical: tuple[float, float] = (0, math.inf)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ValueError(f"name={self.name!r} must be a non-empty string")
+        object.__setattr__(self, "value", finite(f"parameter {self.name}", self.value))
+        if not self.lower < self.upper:
+            raise ValueError(
+                f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"
+            )
+        if not self.lower <= self.value <= self.upper:
+            raise ValueError(
+                f"parameter {self.name}={self.value:g} lies outside its bounds "
+                f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
+            )
+
+
+@dataclass(frozen=True)
+class GreyBox:
+    """A continuous-time plant whose matrices are functions of physical parameters.
+
+    Args:
+        matrices: ``matrices(**values)`` returns A (n, n), B (n, inputs), C (outputs, n),
+            D (outputs, inputs); a D of None or 0 is all zeros.
+        parameters: the Parameter objects, in the order in which results list them.
+        outputs, inputs: names of the channels.
+        name: shown in reports.
+        vectorized: True says that ``matrices`` also takes arrays of values, (batch,), and then
+            returns matrices with that leading axis. It only saves time.
+
+    Raises ValueError when the matrices do not have agreeing shapes or are not finite, or when two
+    parameters share a name.
+
+    >>> lag = GreyBox(lambda tau: ([[-1 / tau]], [[1 / tau]], [[1.0]], None),
+    ...               parameters=[Parameter("tau", 0.01, unit="s")])
+    >>> lag.with_values(tau=0.02).values
+    {'tau': 0.02}
+    """
+
+    matrices: Matrices
+    parameters: Sequence[Parameter]
+    outputs: Sequence[str] | None = None
+    inputs: Sequence[str] | None = None
+    name: str = "grey box"
+    vectorized: bool = False
+
+    def __post_init__(self) -> None:
+        parameters = tuple(self.parameters)
+        object.__setattr__(self, "parameters", parameters)
+        for p in parameters:
+            if not isinstance(p, Parameter):
+                raise ValueError(f"parameters holds {p!r}; expected Parameter objects")
+        names = [p.name for p in parameters]
+        if len(set(names)) < len(names):
+            raise ValueError(f"parameters={names} has a name twice; names must differ")
+        at = self.state_space()
+        object.__setattr__(self, "outputs", _channels("outputs", self.outputs, at.C.shape[0], "y"))
+        object.__setattr__(self, "inputs", _channels("inputs", self.inputs, at.B.shape[1], "u"))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Value of every parameter by name."""
+        return {p.name: p.value for p in self.parameters}
+
+    @property
+    def free_parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that a fit moves."""
+        return tuple(p for p in self.parameters if not p.fixed)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return self.state_space().B.shape[1]
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return self.state_space().C.shape[0]
+
+    def __getitem__(self, name: str) -> float:
+        return self.parameter(name).value
+
+    def parameter(self, name: str) -> Parameter:
+        """The Parameter called ``name``; ValueError if there is none."""
+        for p in self.parameters:
+            if p.name == name:
+                return p
+        raise ValueError(unknown("parameter", name, self.values))
+
+    def with_values(self, **values: float) -> GreyBox:
+        """The same plant at other parameter values. Raises ValueError for an unknown name.
+
+        >>> from freqid import two_mass
+        >>> two_mass().with_values(k=2e5)["k"]
+        200000.0
+        """
+        return self._changed({name: {"value": value} for name, value in values.items()})
+
+    def fix(self, *names: str) -> GreyBox:
+        """The same plant with these parameters held at their values in a fit."""
+        return self._changed({name: {"fixed": True} for name in names})
+
+    def free(self, *names: str) -> GreyBox:
+        """The same plant with these parameters estimated in a fit."""
+        return self._changed({name: {"fixed": False} for name in names})
+
+    def with_bounds(self, **bounds: tuple[float, float]) -> GreyBox:
+        """The same plant with other search bounds, ``with_bounds(k=(1e4, 1e6))``."""
+        return self._changed({n: {"lower": lo, "upper": hi} for n, (lo, hi) in bounds.items()})
+
+    def _changed(self, changes: Mapping[str, Mapping[str, Any]]) -> GreyBox:
+        for name in changes:
+            self.parameter(name)
+        new = tuple(dataclasses.replace(p, **changes.get(p.name, {})) for p in self.parameters)
+        return dataclasses.replace(self, parameters=new)
+
+    def state_space(self, **values: float) -> StateSpace:
+        """A, B, C, D at the parameter values, or at ``values`` where given.
+
+        >>> from freqid import first_order
+        >>> first_order(b=3, a=2).state_space().A
+        array([[-2.]])
+        """
+        return _shaped(self.matrices(**{**self.values, **values}), self.values | values)
+
+    def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
+        """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
+
+        Returns a FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega
+        that is not finite or a hold that is not one.
+
+        >>> import freqid as fq
+        >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
+        np.float64(0.7071)
+        """
+        return frequency_response(self.state_space(), omega, hold, self.inputs, self.outputs)
+
+    def to_control(self) -> Any:
+        """The plant as a continuous ``control.StateSpace``."""
+        import control
+
+        return control.ss(
+            *self.state_space(), inputs=list(self.inputs or ()), outputs=list(self.outputs or ())
+        )
+
+    def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
+        """Matrices at ``values`` and their derivatives by the parameters ``names``.
+
+        A complex step (Squire and Trapp, SIAM Review 40, 1998) gives the derivative to rounding;
+        where the user's function does not carry complex numbers through, central differences.
+        """
+        if self.vectorized:
+            return self._complex_batch(values, names)
+        at = _shaped(self.matrices(**values), values)
+        derivative = self._differentiate(values, names, self._takes_complex)
+        return Linearisation(at, derivative)
+
+    def _complex_batch(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
+        count = len(names)
+        batch: dict[str, Any] = {name: np.full(count + 1, v, complex) for name, v in values.items()}
+        for i, name in enumerate(names):
+            batch[name][i + 1] += _COMPLEX_STEP * 1j
+        stacked = self.matrices(**batch)
+        return Linearisation(
+            StateSpace(*(M[0].real for M in stacked)),
+            StateSpace(*(M[1:].imag / _COMPLEX_STEP for M in stacked)),
+        )
+
+    def _differentiate(
+        self, values: Mapping[str, float], names: Sequence[str], by_complex_step: bool
+    ) -> StateSpace:
+        columns = []
+        for name in names:
+            v = values[name]
+            if by_complex_step:
+                moved = _dense(self.matrices(**{**values, name: v + _COMPLEX_STEP * 1j}), complex)
+                columns.append([M.imag / _COMPLEX_STEP for M in moved])
+            else:
+                # the step that balances rounding against the third derivative
+                step = np.finfo(float).eps ** (1 / 3) * max(abs(v), 1e-8)
+                up, down = (
+                    _dense(self.matrices(**{**values, name: v + s}), float) for s in (step, -step)
+                )
+                columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])
+        shapes = [M.shape for M in self.state_space()]
+        return StateSpace(
+            *(
+                np.array([c[i] for c in columns]).reshape(len(names), *shape)
+                for i, shape in enumerate(shapes)
+            )
+        )
+
+    @cached_property
+    def _takes_complex(self) -> bool:
+        """Whether a complex step goes through ``matrices`` and agrees with central differences."""
+        values, names = self.values, [p.name for p in self.free_parameters]
+        try:
+            exact = self._differentiate(values, names, by_complex_step=True)
+        except (TypeError, ValueError, AttributeError, ArithmeticError, np.exceptions.ComplexWarning):
+            return False
+        rough = self._differentiate(values, names, by_complex_step=False)
+        return all(
+            bool(np.all(np.abs(a - b) <= 1e-4 * np.abs(b).max(axis=(1, 2), keepdims=True, initial=0)))
+            for a, b in zip(exact, rough, strict=True)
+        )
+
+    def __repr__(self) -> str:
+        inside = ", ".join(f"{p.name}={p.value:g}{' fixed' * p.fixed}" for p in self.parameters)
+        return f"<GreyBox {self.name}: {inside}>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(p.name)}</td><td>{p.value:g}</td><td>{escape(p.unit)}</td>"
+            f"<td>{'fixed' if p.fixed else 'free'}</td></tr>"
+            for p in self.parameters
+        )
+        return (
+            f"<table><caption>{escape(self.name)}</caption>"
+            f"<tr><th>parameter</th><th>value</th><th>unit</th><th></th></tr>{rows}</table>"
+        )
+
+
+# small enough that its square vanishes beside any matrix entry
+_COMPLEX_STEP = 1e-100
+
+
+def _channels(name: str, given: Sequence[str] | None, count: int, letter: str) -> tuple[str, ...]:
+    if given is None:
+        return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if len(names) != count:
+        raise ValueError(f"{name}={list(names)} names {len(names)} channels; the matrices have {count}")
+    return names
+
+
+def _dense(matrices: Sequence[Any], dtype: type) -> list[Array]:
+    A, B, C, D = matrices
+    A, B, C = (np.asarray(M, dtype=dtype) for M in (A, B, C))
+    if D is None or np.ndim(D) == 0:
+        D = np.full((C.shape[0], B.shape[1]), 0 if D is None else D, dtype)
+    return [A, B, C, np.asarray(D, dtype=dtype)]
+
+
+def _shaped(matrices: Sequence[Any], values: Mapping[str, float]) -> StateSpace:
+    """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
+    if len(matrices) != 4:
+        raise ValueError(f"matrices returned {len(matrices)} items; expected A, B, C, D")
+    shapes = [np.shape(M) for M in matrices]
+    text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
+    expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"
+    if any(len(shape) != 2 for shape in shapes[:3]):
+        raise ValueError(f"{text}; {expected}")
+    out = StateSpace(*_dense(matrices, float))
+    n, m, p = out.A.shape[0], out.B.shape[1], out.C.shape[0]
+    wanted = ((n, n), (n, m), (p, n), (p, m))
+    if any(M.shape != shape for M, shape in zip(out, wanted, strict=True)):
+        raise ValueError(f"{text}; {expected}")
+    if not all(np.isfinite(M).all() for M in out):
+        at = ", ".join(f"{k}={v:g}" for k, v in values.items())
+        raise ValueError(f"matrices are not finite at {at}; change the values or the function")
+    return out
+

@@ -1,0 +1,191 @@
+"""The weighted least squares: initial states eliminated, the rest left to scipy.
+
+V(x) = min over the initial states of |r(x) + T(x) δ|². The residual handed to the optimiser is
+P r with P the projector off the columns of T, and its Jacobian P (dr + dT δ): Kaufman's
+approximation (BIT 15, 1975), whose gradient is exact. Both are then turned by one orthogonal
+matrix to a triangle of as many rows as there are parameters, so that the optimiser's own work
+does not grow with the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.optimize
+
+from freqid.checks import FloatArray
+from freqid.experiments import Experiment, Realisation
+
+
+class Structure(Protocol):
+    """What the optimiser needs of a model: its unknowns, scaled to be of order one."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """The plant and its derivatives by x at a trial point; may raise."""
+        ...
+
+    def describe(self, x: FloatArray) -> str:
+        """The trial point in the user's words, for errors."""
+        ...
+
+
+@dataclass(frozen=True)
+class Point:
+    """Cost at a trial point, with the triangle (P+1, P+1) of Jacobian and residual."""
+
+    triangle: FloatArray
+    initial: list[FloatArray | None]
+    parts: list[float]
+
+    @property
+    def cost(self) -> float:
+        """V: the sum of squares."""
+        return float(sum(self.parts))
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Turned Jacobian, (P+1, P)."""
+        return self.triangle[:, :-1]
+
+    @property
+    def residual(self) -> FloatArray:
+        """Turned residual, (P+1,)."""
+        return self.triangle[:, -1]
+
+
+class Objective:
+    """The cost of a structure on experiments, remembering the last points it computed."""
+
+    def __init__(self, structure: Structure, experiments: Sequence[Experiment]) -> None:
+        self.structure, self.experiments = structure, experiments
+        self.n_evaluations = 0
+        self.failure: Exception | None = None
+        self._points: dict[bytes, Point | None] = {}
+
+    def point(self, x: FloatArray) -> Point | None:
+        """Everything at x; None where the model cannot be computed there."""
+        key = x.tobytes()
+        if key not in self._points:
+            if len(self._points) > 3:
+                self._points.pop(next(iter(self._points)))
+            self.n_evaluations += 1
+            with np.errstate(all="ignore"):
+                self._points[key] = self._compute(x)
+        return self._points[key]
+
+    def _compute(self, x: FloatArray) -> Point | None:
+        try:
+            realisation = self.structure.realise(x)
+        except Exception as error:  # the user's function may raise anything at a trial point
+            self.failure = error
+            return None
+        blocks, initial, parts = [], [], []
+        try:
+            for experiment in self.experiments:
+                evaluation = experiment.at(realisation)
+                r, T, delta = evaluation.residual, evaluation.transient, None
+                if T is not None:
+                    Q, delta = _eliminate(T, r)
+                    r = r - Q @ (Q.T @ r)
+                J = evaluation.jacobian(delta)
+                if T is not None:
+                    J = J - Q @ (Q.T @ J)
+                blocks.append(np.column_stack([J, r]))
+                initial.append(delta)
+                parts.append(float(r @ r))
+        except (np.linalg.LinAlgError, ValueError) as error:
+            self.failure = error
+            return None
+        stacked = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        if not np.isfinite(stacked).all():
+            self.failure = ArithmeticError("the response is not finite")
+            return None
+        return Point(np.linalg.qr(stacked, mode="r"), initial, parts)
+
+
+def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal basis of the columns of T, and the δ that makes |r + T δ| least."""
+    size = np.linalg.norm(T, axis=0)
+    used = size > 1e-200
+    delta = np.zeros(T.shape[1])
+    if not used.any() or not np.isfinite(size).all():
+        return np.zeros((len(r), 0)), delta
+    Q, R = np.linalg.qr(T[:, used] / size[used])
+    diagonal = np.abs(np.diag(R))
+    if diagonal.min() > 1e-11 * diagonal.max():
+        delta[used] = -np.linalg.solve(R, Q.T @ r) / size[used]
+        return Q, delta
+    # modes that the output hardly shows: keep the directions that it does
+    U, s, Vt = np.linalg.svd(T[:, used] / size[used], full_matrices=False)
+    strong = s > 1e-11 * s[0]
+    U, s, Vt = U[:, strong], s[strong], Vt[strong]
+    delta[used] = -(Vt.T @ ((U.T @ r) / s)) / size[used]
+    return U, delta
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the optimiser stopped and why."""
+
+    x: FloatArray
+    point: Point
+    converged: bool
+    message: str
+
+
+# a trial point that cannot be computed costs this: any step to it is rejected and shortened
+_WALL = 1e100
+
+
+def minimise(objective: Objective, start: FloatArray, tolerance: float = 1e-14) -> Solution:
+    """Least squares from one start: Levenberg-Marquardt, or trust-region reflective with bounds.
+
+    Raises ValueError when the model cannot be computed at the start.
+    """
+    first = objective.point(start)
+    if first is None:
+        raise ValueError(
+            f"the model cannot be computed at {objective.structure.describe(start)}: "
+            f"{objective.failure}; give another start"
+        )
+    size = len(start) + 1
+
+    def residual(x: FloatArray) -> FloatArray:
+        point = objective.point(x)
+        return np.full(size, _WALL) if point is None else _padded(point.residual, size)
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        point = objective.point(x)
+        return np.zeros((size, size - 1)) if point is None else _padded(point.jacobian, size)
+
+    lower, upper = objective.structure.lower, objective.structure.upper
+    bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
+    result = scipy.optimize.least_squares(
+        residual,
+        start,
+        jac=jacobian,
+        bounds=(lower, upper) if bounded else (-np.inf, np.inf),
+        method="trf" if bounded else "lm",
+        x_scale="jac",
+        ftol=max(tolerance, 1e-15),
+        xtol=1e-12,
+        gtol=1e-15,
+        max_nfev=200 * size if bounded else 400 * size,
+    )
+    point = objective.point(result.x)
+    if point is None:
+        return Solution(start, first, False, "no step from the start could be computed")
+    return Solution(result.x, point, result.status > 0, result.message)
+
+
+def _padded(rows: FloatArray, size: int) -> FloatArray:
+    """Rows of a triangle that has fewer than ``size``, where the data are fewer than unknowns."""
+    if len(rows) == size:
+        return rows
+    return np.concatenate([rows, np.zeros((size - len(rows), *rows.shape[1:]))])

@@ -1,0 +1,320 @@
+"""The kernel: responses of a sampled plant, their exact derivatives, and the transient basis.
+
+With the resolvent R(z) = (zI − Φ)⁻¹ and the state x = R (Γ u + Γ⁺ z u + z δ) at a DFT line,
+
+    y  = C x + D u
+    dy = C R (dΦ x + dΓ u + dΓ⁺ z u) + dC x + dD u.
+
+Both are invariant under a change of state coordinates that is held still while differentiating,
+so the plant is first moved to coordinates in which R is cheap: its eigenvectors, where R is
+diagonal, or, where those are badly conditioned (a double integrator has none), a unitary Schur
+basis, where R is triangular and always well conditioned.
+
+Axes: (…, states, channels, lines). Leading axes are a batch of plants; only eigenvectors have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg
+
+from freqid.checks import Array, ComplexArray, FloatArray
+from freqid.frequency_response import FrequencyResponse
+from freqid.holds import BandLimited, Hold, PeriodicHold, ZeroOrderHold
+
+# beyond this the eigenbasis loses more digits than the fit can spare
+WORST_CONDITION = 1e5
+
+
+class StateSpace(NamedTuple):
+    """A (n, n), B (n, m), C (p, n), D (p, m) of x' = A x + B u, y = C x + D u."""
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+
+
+class Linearisation(NamedTuple):
+    """The matrices at one point and their derivatives, with the parameters as leading axis."""
+
+    at: StateSpace
+    derivative: StateSpace
+
+
+@dataclass(frozen=True)
+class SampledPlant:
+    """A plant seen through a hold, in coordinates in which its resolvent is cheap.
+
+    ``phi`` holds the eigenvalues, (…, n), or an upper triangular matrix, (n, n) with
+    ``triangular``. Derivatives have the parameters as the axis before their matrix.
+    """
+
+    phi: ComplexArray
+    gamma: ComplexArray
+    gamma_next: ComplexArray | None
+    C: ComplexArray
+    D: Array
+    dphi: ComplexArray
+    dgamma: ComplexArray
+    dgamma_next: ComplexArray | None
+    dC: ComplexArray
+    dD: Array
+    triangular: bool
+
+    def solve(self, z: ComplexArray, right: ComplexArray) -> ComplexArray:
+        """R(z) times ``right``, (…, n, channels, lines); z (lines,)."""
+        if not self.triangular:
+            return right / (z - self.phi[..., :, None])[..., :, None, :]
+        x = np.empty_like(right)
+        for i in reversed(range(len(self.phi))):
+            rest = right[i] + np.tensordot(self.phi[i, i + 1 :], x[i + 1 :], 1)
+            x[i] = rest / (z - self.phi[i, i])
+        return x
+
+    def output_rows(self, z: ComplexArray) -> ComplexArray:
+        """C R(z), (…, outputs, n, lines)."""
+        if not self.triangular:
+            return self.C[..., :, :, None] / (z - self.phi[..., :, None])[..., None, :, :]
+        w = np.empty((*self.C.shape, len(z)), complex)
+        for i in range(len(self.phi)):
+            rest = self.C[:, i, None] + np.einsum("pjl,j->pl", w[:, :i], self.phi[:i, i])
+            w[:, i] = rest / (z - self.phi[i, i])
+        return w
+
+    def drive(self, z: ComplexArray, U: ComplexArray) -> ComplexArray:
+        """Γ U + Γ⁺ z U, (…, n, channels, lines), for inputs U (m, channels, lines)."""
+        right = _times(self.gamma, U)
+        return right if self.gamma_next is None else right + _times(self.gamma_next, z * U)
+
+    def output(self, x: ComplexArray, U: ComplexArray | None = None) -> ComplexArray:
+        """C x + D U, (…, outputs, channels, lines)."""
+        y = _times(self.C, x)
+        return y + _times(self.D, U) if U is not None and self.D.any() else y
+
+    def sensitivity(
+        self,
+        z: ComplexArray,
+        w: ComplexArray,
+        x: ComplexArray,
+        U: ComplexArray | None,
+        aliases: int = 1,
+    ) -> ComplexArray:
+        """dy for each parameter, (…, P, outputs, channels, lines / aliases).
+
+        ``w`` is ``output_rows(z)`` and ``x`` the state. Runs of ``aliases`` lines are summed: the
+        products of w with x and U do not depend on the parameter, so they are summed before the
+        parameters enter in one matrix product.
+        """
+        n, p = w.shape[-2], w.shape[-3]
+        lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
+        P = self.dphi.shape[-3]
+        moving_C, moving_D = self.dC.any(), U is not None and self.dD.any()
+        rows = []
+        for o in range(p):
+            wo = w[..., o, :, None, :]
+            factors = [(wo[..., None, :] * x[..., None, :, :, :]).reshape(*lead, n * n, E, lines)]
+            weights = [self.dphi.reshape(*lead, P, n * n)]
+            if U is not None:
+                m = len(U)
+                wu = (wo[..., None, :] * U).reshape(*lead, n * m, E, lines)
+                factors.append(wu)
+                weights.append(self.dgamma.reshape(*lead, P, n * m))
+                if self.dgamma_next is not None:
+                    factors.append(z * wu)
+                    weights.append(self.dgamma_next.reshape(*lead, P, n * m))
+            if moving_C:
+                factors.append(x)
+                weights.append(self.dC[..., o, :])
+            if moving_D:
+                factors.append(np.broadcast_to(U, (*lead, *np.shape(U))))
+                weights.append(self.dD[..., o, :])
+            F = np.concatenate(factors, axis=-3)
+            F = _sum_runs(F, aliases)
+            flat = F.reshape(*lead, F.shape[-3], -1)
+            rows.append((np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, -1))
+        return np.stack(rows, axis=-3)
+
+
+def _times(M: Array, x: ComplexArray) -> ComplexArray:
+    """M (…, a, b) times x (…, b, channels, lines)."""
+    flat = x.reshape(*x.shape[:-2], -1)
+    return (M @ flat).reshape(*(M @ flat[..., :1]).shape[:-1], *x.shape[-2:])
+
+
+def _sum_runs(F: ComplexArray, aliases: int) -> ComplexArray:
+    return F if aliases == 1 else F.reshape(*F.shape[:-1], -1, aliases).sum(axis=-1)
+
+
+class EigenBasis:
+    """A plant and its derivatives in the basis of its eigenvectors; batches welcome."""
+
+    def __init__(
+        self, at: StateSpace, derivative: StateSpace, eigen: tuple[Array, Array, Array]
+    ) -> None:
+        self.eigenvalues, V, self.to_basis = eigen
+        Vi = self.to_basis
+        self.B, self.C, self.D = Vi @ at.B, at.C @ V, at.D
+        Vp, Vip = V[..., None, :, :], Vi[..., None, :, :]
+        self.dA = Vip @ derivative.A @ Vp
+        self.dB, self.dC, self.dD = Vip @ derivative.B, derivative.C @ Vp, derivative.D
+
+    def through(self, hold: Hold) -> SampledPlant:
+        """The plant as ``hold`` samples it."""
+        if not isinstance(hold, PeriodicHold):
+            phi, gamma, dphi, dgamma = self.eigenvalues, self.B, self.dA, self.dB
+            return SampledPlant(
+                phi, gamma, None, self.C, self.D, dphi, dgamma, None, self.dC, self.dD, False
+            )
+        f = hold.modal(self.eigenvalues)
+        gamma, dgamma = self._input(f.gamma, f.dgamma)
+        following = dfollowing = None
+        if hold.name != "zoh":
+            following, dfollowing = self._input(f.gamma_next, f.dgamma_next)
+        dphi = f.dphi[..., None, :, :] * self.dA
+        return SampledPlant(
+            f.phi,
+            gamma,
+            following,
+            self.C,
+            self.D,
+            dphi,
+            dgamma,
+            dfollowing,
+            self.dC,
+            self.dD,
+            False,
+        )
+
+    def _input(self, f: ComplexArray, df: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """f(A) B in the basis, and its derivative by Fréchet's product rule."""
+        change = (df[..., None, :, :] * self.dA) @ self.B[..., None, :, :]
+        return f[..., None] * self.B, change + f[..., None, :, None] * self.dB
+
+
+class SchurBasis:
+    """The same for any plant: unitary Schur coordinates and block exponentials."""
+
+    def __init__(self, at: StateSpace, derivative: StateSpace) -> None:
+        # states in units of their own size: without this rad beside rad/s costs six digits
+        _, (scale, _) = scipy.linalg.matrix_balance(at.A, permute=False, separate=True)
+        self.at = _rescaled(at, scale)
+        self.derivative = _rescaled(derivative, scale)
+        # Φ and A commute, so one unitary basis makes every Φ of this plant triangular
+        _, self.basis = scipy.linalg.schur(self.at.A, output="complex")
+        self.to_basis = self.basis.conj().T / scale
+
+    def through(self, hold: Hold) -> SampledPlant:
+        """The plant as ``hold`` samples it."""
+        at, d, Q = self.at, self.derivative, self.basis
+        Qh = Q.conj().T
+        following = dfollowing = None
+        if isinstance(hold, PeriodicHold):
+            value, change = hold.sampled_derivatives(at.A, at.B, d.A, d.B)
+            phi, gamma, dphi, dgamma = value.phi, value.gamma, change.phi, change.gamma
+            if hold.name != "zoh":
+                following, dfollowing = Qh @ value.gamma_next, Qh @ change.gamma_next
+        else:
+            phi, gamma, dphi, dgamma = at.A, at.B, d.A, d.B
+        return SampledPlant(
+            np.triu(Qh @ phi @ Q),
+            Qh @ gamma,
+            following,
+            at.C @ Q,
+            at.D,
+            Qh @ dphi @ Q,
+            Qh @ dgamma,
+            dfollowing,
+            d.C @ Q,
+            d.D,
+            True,
+        )
+
+
+def _rescaled(system: StateSpace, scale: FloatArray) -> StateSpace:
+    A, B, C, D = system
+    return StateSpace(A * scale / scale[:, None], B / scale[:, None], C * scale, D)
+
+
+Basis = EigenBasis | SchurBasis
+
+
+def eigenvectors(A: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:
+    """Eigenvalues, V and V⁻¹ of A (…, n, n); None where any V is too badly conditioned.
+
+    The condition is that of V with its rows scaled alike, so that the units of the states (rad
+    beside rad/s) do not count.
+    """
+    eigenvalues, V = np.linalg.eig(A)
+    V = V.astype(complex, copy=False)
+    try:
+        inverse = np.linalg.inv(V)
+    except np.linalg.LinAlgError:
+        return None
+    size = np.linalg.norm(V, axis=-1)
+    condition = np.linalg.norm(V / size[..., None], axis=(-2, -1)) * np.linalg.norm(
+        inverse * size[..., None, :], axis=(-2, -1)
+    )
+    if not np.all(condition < WORST_CONDITION):
+        return None
+    return eigenvalues.astype(complex, copy=False), V, inverse
+
+
+def basis_of(at: StateSpace, derivative: StateSpace | None = None) -> Basis:
+    """Eigenvectors where they are good, Schur coordinates where they are not."""
+    if derivative is None:
+        derivative = StateSpace(*(np.zeros((0, *M.shape)) for M in at))
+    eigen = eigenvectors(at.A)
+    return SchurBasis(at, derivative) if eigen is None else EigenBasis(at, derivative, eigen)
+
+
+def points(omega: FloatArray, hold: Hold) -> ComplexArray:
+    """Where the response is taken: exp(jω·period) of the hold, or jω without one."""
+    if isinstance(hold, PeriodicHold):
+        return np.exp(1j * hold.period * omega)
+    return 1j * omega
+
+
+def transition(basis: Basis, dt: float) -> SampledPlant:
+    """The plant's free motion over ``dt`` (s): exp(A dt) and its derivative, for the transient."""
+    return basis.through(ZeroOrderHold(dt))
+
+
+def transfer(plant: SampledPlant, z: ComplexArray) -> ComplexArray:
+    """Response of a sampled plant, (outputs, inputs, lines)."""
+    m = plant.gamma.shape[-1]
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
+    return plant.output(plant.solve(z, plant.drive(z, U)), U)
+
+
+def frequency_response(
+    at: StateSpace,
+    omega: Any,
+    hold: Hold | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+) -> FrequencyResponse:
+    """Response of the plant at ``omega`` (rad/s), continuous or through a hold."""
+    omega = np.atleast_1d(np.asarray(omega, dtype=float))
+    if omega.ndim != 1 or not np.isfinite(omega).all():
+        raise ValueError(f"omega has shape {omega.shape}; expected finite frequencies (rad/s), (K,)")
+    if hold is not None and not isinstance(hold, Hold):
+        raise ValueError(
+            f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
+            "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
+        )
+    plant = basis_of(at).through(BandLimited() if hold is None else hold)
+    z = points(omega, BandLimited() if hold is None else hold)
+    dt = hold.period if isinstance(hold, PeriodicHold) else 0.0
+    return FrequencyResponse(
+        omega / (2 * np.pi),
+        transfer(plant, z),
+        dt=dt,
+        hold=hold,
+        input_names=inputs,
+        output_names=outputs,
+    )

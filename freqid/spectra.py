@@ -1,0 +1,105 @@
+"""Spectra: the DFT of a record at the lines of a band, with every alias that folds onto them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.fft
+
+from freqid.checks import ComplexArray, FloatArray, band
+from freqid.record import Record
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """DFT of a record at K lines of its output.
+
+    ``omega`` (K,) in rad/s. ``Y`` (outputs, K). ``U`` (inputs, K, M) holds the input's DFT at the
+    M frequencies ``omega_input`` (K, M) that fold onto each line when the output keeps every M-th
+    sample, already divided by M, so that with the response G of the plant
+
+        Y(ω) = Σ_m G(ω + 2πm/T) U(ω + 2πm/T) + transient.
+
+    For M = 1 this is the usual relation; for M > 1 it is the lifted model in the frequency domain.
+    ``multiplicity`` (K,) is 2 for a line that stands for ±ω and 1 at zero and Nyquist, so that
+    Σ multiplicity·|Y|²/N over all lines is Σ y² (Parseval). ``n_samples`` is N.
+    """
+
+    omega: FloatArray
+    omega_input: FloatArray
+    U: ComplexArray
+    Y: ComplexArray
+    multiplicity: FloatArray
+    n_samples: int
+    dt: float
+
+    @property
+    def frequency(self) -> FloatArray:
+        """Frequency of the lines in Hz, (K,)."""
+        return self.omega / (2 * np.pi)
+
+
+def spectra(record: Record, limits: tuple[float, float] | None = None) -> Spectra:
+    """DFT of a record at the lines inside ``limits`` (Hz), ends included; None takes all lines.
+
+    Where the input is faster than the output the band is that of the input: a line is kept when
+    any frequency that folds onto it lies inside. Raises ValueError for a band outside
+    (0, Nyquist), one that holds no line, or an input that is zero over it.
+    """
+    M = record.factor
+    N = len(record.u) // M
+    if N < 2:
+        raise ValueError(f"record has {N} whole output samples; a spectrum needs two or more")
+    u, y = record.inputs[: N * M], record.outputs[:N]
+    # real FFTs along contiguous rows; the two signals share one call where their lengths agree
+    if M == 1:
+        both = scipy.fft.rfft(np.vstack([u.T, y.T]), axis=1, workers=-1)
+        Uf, Yf = both[: u.shape[1]], both[u.shape[1] :]
+    else:
+        Uf = scipy.fft.rfft(u.T, axis=1, workers=-1)
+        Yf = scipy.fft.rfft(y.T, axis=1, workers=-1)
+
+    # line k of the output collects the lines k + mN of the fast input, on both sides of zero
+    lines = _lines(record, N, limits)
+    folded = lines[:, None] + N * (np.arange(M) - (M - 1) // 2)
+    folded[folded > N * M // 2] -= N * M
+    position, negative = np.abs(folded), folded < 0
+    Us = Uf[:, position] / M
+    Us[:, negative] = Us[:, negative].conj()
+    if not np.abs(Us).max() > 1e-13 * np.abs(u).max() * np.sqrt(N):
+        raise ValueError(
+            f"u is zero over band={limits}; an input without energy there identifies nothing"
+        )
+    step = 2 * np.pi / (N * record.dt)
+    return Spectra(
+        omega=step * lines,
+        omega_input=step * folded,
+        U=Us,
+        Y=Yf[:, lines],
+        multiplicity=np.where((lines == 0) | (2 * lines == N), 1.0, 2.0),
+        n_samples=N,
+        dt=record.dt,
+    )
+
+
+def _lines(record: Record, N: int, limits: tuple[float, float] | None) -> npt.NDArray[np.int64]:
+    """The output lines, 0 to N/2, onto which a frequency inside the band folds."""
+    last_line = N // 2
+    if limits is None:
+        return np.arange(last_line + 1)
+    low, high = band(limits, 0.5 / record.input_dt)
+    spacing = 1 / (N * record.dt)
+    # a band edge on a line, up to rounding, is inside
+    first, last = int(np.ceil(low / spacing - 1e-6)), int(np.floor(high / spacing + 1e-6))
+    inside = np.arange(first, last + 1)
+    if record.factor > 1:
+        inside = inside % N
+        inside = np.unique(np.minimum(inside, N - inside))
+    if len(inside) == 0:
+        raise ValueError(
+            f"band=({low:g}, {high:g}) Hz holds no DFT line; lines are {spacing:g} Hz apart: "
+            "widen the band or use a longer record"
+        )
+    return inside
