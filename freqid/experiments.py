@@ -69,24 +69,29 @@ class SpectralExperiment:
         hold: Hold,
         transient_dt: float | None,
         n_real: int = 0,
+        lift: int = 1,
     ) -> None:
+        self.lift = lift
         self.hold, self.U, self.Y, self.scale = hold, U, Y, scale
         self.aliases = omega_input.size // len(omega)
-        self.z = points(omega_input.ravel(), hold)
+        if lift > 1 and isinstance(hold, PeriodicHold):
+            self.z = np.exp(1j * hold.period * lift * omega)
+        else:
+            self.z = points(omega_input.ravel(), hold)
         self.transient_dt = transient_dt
-        # one resolvent serves input and transient when the hold's period is the sample time
+        # one resolvent serves input and transient when both have the same period
         self.shared = (
             self.aliases == 1
             and isinstance(hold, PeriodicHold)
             and transient_dt is not None
-            and abs(hold.period / transient_dt - 1) < 1e-12
+            and abs(hold.period * lift / transient_dt - 1) < 1e-12
         )
         self.z_slow = None if transient_dt is None else np.exp(1j * omega * transient_dt)
         self.n_rows = 2 * Y.size - n_real
 
     @classmethod
     def of_record(
-        cls, s: Spectra, hold: Hold, weights: FloatArray, transient: bool
+        cls, s: Spectra, n_inputs: int, hold: Hold, weights: FloatArray, transient: bool
     ) -> SpectralExperiment:
         """Lines of a record; ``weights`` (K,) or (outputs, K) multiply the squared error."""
         scale = np.sqrt(s.multiplicity * weights / s.n_samples)
@@ -100,6 +105,7 @@ class SpectralExperiment:
             hold,
             s.dt if transient else None,
             n_real,
+            lift=len(s.U) // n_inputs,
         )
 
     @classmethod
@@ -131,7 +137,7 @@ class _SpectralEvaluation:
     def __init__(self, experiment: SpectralExperiment, realisation: Realisation) -> None:
         e, basis = experiment, realisation.basis
         self.experiment, self.basis = e, basis
-        self.plant = basis.through(e.hold)
+        self.plant = basis.through(e.hold, e.lift)
         self.x = self.plant.solve(e.z, self.plant.drive(e.z, e.U))
         y = self.plant.output(self.x, e.U)
         if e.aliases > 1:

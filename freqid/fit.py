@@ -160,9 +160,11 @@ def _experiment(
     if domain == "time" or initial_state == "zero":
         if initial_state != "steady":
             return _time_experiment(data, assumed, band, weights, initial_state), assumed
-    s = spectra(data, band)
+    known = isinstance(assumed, PeriodicHold) and np.isclose(assumed.period, data.input_dt, 1e-9)
+    s = spectra(data, band, lifted=bool(known))
     w = _weights(weights, s.Y.shape)
-    return SpectralExperiment.of_record(s, assumed, w, initial_state == "estimate"), assumed
+    free = initial_state == "estimate"
+    return SpectralExperiment.of_record(s, data.n_inputs, assumed, w, free), assumed
 
 
 def _response_experiment(

@@ -13,7 +13,7 @@ where Γ⁺ is zero under a zero-order hold.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -26,7 +26,7 @@ class Sampled(NamedTuple):
 
     phi: Array
     gamma: Array
-    gamma_next: Array
+    gamma_next: Any
 
 
 class ModalSampled(NamedTuple):

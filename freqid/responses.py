@@ -15,7 +15,7 @@ Axes: (…, states, channels, lines). Leading axes are a batch of plants; only e
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -24,7 +24,14 @@ import scipy.linalg
 
 from freqid.checks import Array, ComplexArray, FloatArray
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import BandLimited, Hold, PeriodicHold, ZeroOrderHold
+from freqid.holds import (
+    BandLimited,
+    Hold,
+    PeriodicHold,
+    Sampled,
+    ZeroOrderHold,
+    phi_functions,
+)
 
 # beyond this the eigenbasis loses more digits than the fit can spare
 WORST_CONDITION = 1e5
@@ -108,18 +115,24 @@ class SampledPlant:
 
         ``w`` is ``output_rows(z)`` and ``x`` the state. Runs of ``aliases`` lines are summed: the
         products of w with x and U do not depend on the parameter, so they are summed before the
-        parameters enter in one matrix product.
+        parameters enter in one matrix product. With many inputs dΓ u is formed first, which takes
+        fewer products than w and u together.
         """
         n, p = w.shape[-2], w.shape[-3]
         lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
         P = self.dphi.shape[-3]
         moving_C, moving_D = self.dC.any(), U is not None and self.dD.any()
+        push = None
+        if U is not None and len(U) > 2:
+            push = _times(self.dgamma, U)
+            if self.dgamma_next is not None:
+                push = push + _times(self.dgamma_next, z * U)
         rows = []
         for o in range(p):
             wo = w[..., o, :, None, :]
             factors = [(wo[..., None, :] * x[..., None, :, :, :]).reshape(*lead, n * n, E, lines)]
             weights = [self.dphi.reshape(*lead, P, n * n)]
-            if U is not None:
+            if U is not None and push is None:
                 m = len(U)
                 wu = (wo[..., None, :] * U).reshape(*lead, n * m, E, lines)
                 factors.append(wu)
@@ -136,7 +149,11 @@ class SampledPlant:
             F = np.concatenate(factors, axis=-3)
             F = _sum_runs(F, aliases)
             flat = F.reshape(*lead, F.shape[-3], -1)
-            rows.append((np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, -1))
+            row = (np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, -1)
+            if push is not None:
+                direct = (w[..., None, o, :, None, :] * push).sum(axis=-3)
+                row = row + _sum_runs(direct, aliases)
+            rows.append(row)
         return np.stack(rows, axis=-3)
 
 
@@ -163,37 +180,87 @@ class EigenBasis:
         self.dA = Vip @ derivative.A @ Vp
         self.dB, self.dC, self.dD = Vip @ derivative.B, derivative.C @ Vp, derivative.D
 
-    def through(self, hold: Hold) -> SampledPlant:
-        """The plant as ``hold`` samples it."""
+    def through(self, hold: Hold, lift: int = 1) -> SampledPlant:
+        """The plant as ``hold`` samples it, its output kept at every ``lift``-th sample.
+
+        A lifted plant has ``lift`` times the inputs: the samples of one slow period in turn,
+        x(k+1) = Φ^M x(k) + Σ_i Φ^(M−1−i) (Γ u(kM+i) + Γ⁺ u(kM+i+1)).
+        """
         if not isinstance(hold, PeriodicHold):
             phi, gamma, dphi, dgamma = self.eigenvalues, self.B, self.dA, self.dB
-            return SampledPlant(
-                phi, gamma, None, self.C, self.D, dphi, dgamma, None, self.dC, self.dD, False
-            )
-        f = hold.modal(self.eigenvalues)
-        gamma, dgamma = self._input(f.gamma, f.dgamma)
-        following = dfollowing = None
-        if hold.name != "zoh":
-            following, dfollowing = self._input(f.gamma_next, f.dgamma_next)
-        dphi = f.dphi[..., None, :, :] * self.dA
+            following = dfollowing = None
+            D, dD = self.D, self.dD
+        else:
+            f = hold.modal(self.eigenvalues)
+            phi, dphi = f.phi, f.dphi[..., None, :, :] * self.dA
+            gamma, dgamma = self._input(f.gamma, f.dgamma)
+            following = dfollowing = None
+            if hold.name != "zoh":
+                following, dfollowing = self._input(f.gamma_next, f.dgamma_next)
+            D, dD = self.D, self.dD
+            if lift > 1:
+                step = Sampled(phi, gamma, following), Sampled(dphi, dgamma, dfollowing)
+                powers, dpowers = self._powers(hold.period, lift)
+                phi, dphi = powers[-1], dpowers[-1]
+                gamma, following, dgamma, dfollowing = _lifted_inputs(
+                    *step,
+                    lambda l, x: powers[l][:, None] * x,
+                    lambda l, x: dpowers[l] @ x,
+                    lift,
+                )
+                D, dD = _widened(D, lift), _widened(dD, lift)
         return SampledPlant(
-            f.phi,
-            gamma,
-            following,
-            self.C,
-            self.D,
-            dphi,
-            dgamma,
-            dfollowing,
-            self.dC,
-            self.dD,
-            False,
+            phi, gamma, following, self.C, D, dphi, dgamma, dfollowing, self.dC, dD, False
         )
+
+    def _powers(self, period: float, lift: int) -> tuple[ComplexArray, ComplexArray]:
+        """Φ^l and its derivatives for l = 0 … lift, from exp(A l·period) at once."""
+        times = period * np.arange(lift + 1)
+        value, difference = phi_functions(self.eigenvalues * times[:, None])
+        change = (times[:, None, None] * difference[0])[:, None] * self.dA
+        return value[0], change
 
     def _input(self, f: ComplexArray, df: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """f(A) B in the basis, and its derivative by Fréchet's product rule."""
         change = (df[..., None, :, :] * self.dA) @ self.B[..., None, :, :]
         return f[..., None] * self.B, change + f[..., None, :, None] * self.dB
+
+
+def _lifted_inputs(
+    step: Sampled,
+    change: Sampled,
+    power: Callable[[int, Array], Array],
+    dpower: Callable[[int, Array], Array],
+    lift: int,
+) -> tuple[Array, Array | None, Array, Array | None]:
+    """Γ and Γ⁺ of the lifted plant and their derivatives, the inputs of one slow period in turn."""
+    columns, dcolumns = [], []
+    for i in range(lift):
+        l = lift - 1 - i
+        columns.append(power(l, step.gamma))
+        dcolumns.append(dpower(l, step.gamma) + power(l, change.gamma))
+        if step.gamma_next is not None and i > 0:
+            columns[-1] = columns[-1] + power(l + 1, step.gamma_next)
+            dcolumns[-1] = (
+                dcolumns[-1] + dpower(l + 1, step.gamma_next) + power(l + 1, change.gamma_next)
+            )
+    gamma, dgamma = np.concatenate(columns, axis=-1), np.concatenate(dcolumns, axis=-1)
+    if step.gamma_next is None:
+        return gamma, None, dgamma, None
+    # the sample after the last one of a period is the first one of the next
+    return (
+        gamma,
+        _widened(step.gamma_next, lift),
+        dgamma,
+        _widened(change.gamma_next, lift),
+    )
+
+
+def _widened(M: Array, lift: int) -> Array:
+    """M with zeros for the inputs that come later in the slow period."""
+    wide = np.zeros((*M.shape[:-1], M.shape[-1] * lift), M.dtype)
+    wide[..., : M.shape[-1]] = M
+    return wide
 
 
 class SchurBasis:
@@ -208,31 +275,52 @@ class SchurBasis:
         _, self.basis = scipy.linalg.schur(self.at.A, output="complex")
         self.to_basis = self.basis.conj().T / scale
 
-    def through(self, hold: Hold) -> SampledPlant:
-        """The plant as ``hold`` samples it."""
+    def through(self, hold: Hold, lift: int = 1) -> SampledPlant:
+        """The plant as ``hold`` samples it, its output kept at every ``lift``-th sample."""
         at, d, Q = self.at, self.derivative, self.basis
         Qh = Q.conj().T
-        following = dfollowing = None
+        phi, gamma, dphi, dgamma = at.A, at.B, d.A, d.B
+        following: Array | None = None
+        dfollowing: Array | None = None
+        D, dD = at.D, d.D
         if isinstance(hold, PeriodicHold):
             value, change = hold.sampled_derivatives(at.A, at.B, d.A, d.B)
             phi, gamma, dphi, dgamma = value.phi, value.gamma, change.phi, change.gamma
             if hold.name != "zoh":
-                following, dfollowing = Qh @ value.gamma_next, Qh @ change.gamma_next
-        else:
-            phi, gamma, dphi, dgamma = at.A, at.B, d.A, d.B
+                following, dfollowing = value.gamma_next, change.gamma_next
+            if lift > 1:
+                step = Sampled(phi, gamma, following), Sampled(dphi, dgamma, dfollowing)
+                powers, dpowers = self._powers(hold.period, lift)
+                phi, dphi = powers[-1], dpowers[-1]
+                gamma, following, dgamma, dfollowing = _lifted_inputs(
+                    *step, lambda l, x: powers[l] @ x, lambda l, x: dpowers[l] @ x, lift
+                )
+                D, dD = _widened(D, lift), _widened(dD, lift)
         return SampledPlant(
             np.triu(Qh @ phi @ Q),
             Qh @ gamma,
-            following,
+            None if following is None else Qh @ following,
             at.C @ Q,
-            at.D,
+            D,
             Qh @ dphi @ Q,
             Qh @ dgamma,
-            dfollowing,
+            None if dfollowing is None else Qh @ dfollowing,
             d.C @ Q,
-            d.D,
+            dD,
             True,
         )
+
+    def _powers(self, period: float, lift: int) -> tuple[list[Array], list[Array]]:
+        """Φ^l and its derivatives for l = 0 … lift, each from its own exponential."""
+        n, count = len(self.at.A), len(self.derivative.A)
+        powers, dpowers = [np.eye(n)], [np.zeros((count, n, n))]
+        for l in range(1, lift + 1):
+            value, change = ZeroOrderHold(l * period).sampled_derivatives(
+                self.at.A, self.at.B, self.derivative.A, self.derivative.B
+            )
+            powers.append(value.phi)
+            dpowers.append(change.phi)
+        return powers, dpowers
 
 
 def _rescaled(system: StateSpace, scale: FloatArray) -> StateSpace:

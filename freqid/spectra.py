@@ -23,6 +23,8 @@ class Spectra:
         Y(ω) = Σ_m G(ω + 2πm/T) U(ω + 2πm/T) + transient.
 
     For M = 1 this is the usual relation; for M > 1 it is the lifted model in the frequency domain.
+    With ``lifted``, U (inputs·M, K, 1) holds instead the DFTs of the M interleaved input sequences
+    u(i::M), i in turn, at the lines themselves.
     ``multiplicity`` (K,) is 2 for a line that stands for ±ω and 1 at zero and Nyquist, so that
     Σ multiplicity·|Y|²/N over all lines is Σ y² (Parseval). ``n_samples`` is N.
     """
@@ -34,6 +36,7 @@ class Spectra:
     multiplicity: FloatArray
     n_samples: int
     dt: float
+    lifted: bool = False
 
     @property
     def frequency(self) -> FloatArray:
@@ -41,7 +44,9 @@ class Spectra:
         return self.omega / (2 * np.pi)
 
 
-def spectra(record: Record, limits: tuple[float, float] | None = None) -> Spectra:
+def spectra(
+    record: Record, limits: tuple[float, float] | None = None, lifted: bool = False
+) -> Spectra:
     """DFT of a record at the lines inside ``limits`` (Hz), ends included; None takes all lines.
 
     Where the input is faster than the output the band is that of the input: a line is kept when
@@ -53,22 +58,22 @@ def spectra(record: Record, limits: tuple[float, float] | None = None) -> Spectr
     if N < 2:
         raise ValueError(f"record has {N} whole output samples; a spectrum needs two or more")
     u, y = record.inputs[: N * M], record.outputs[:N]
-    # real FFTs along contiguous rows; the two signals share one call where their lengths agree
-    if M == 1:
-        both = scipy.fft.rfft(np.vstack([u.T, y.T]), axis=1, workers=-1)
-        Uf, Yf = both[: u.shape[1]], both[u.shape[1] :]
-    else:
-        Uf = scipy.fft.rfft(u.T, axis=1, workers=-1)
-        Yf = scipy.fft.rfft(y.T, axis=1, workers=-1)
-
-    # line k of the output collects the lines k + mN of the fast input, on both sides of zero
     lines = _lines(record, N, limits)
-    folded = lines[:, None] + N * (np.arange(M) - (M - 1) // 2)
-    folded[folded > N * M // 2] -= N * M
-    position, negative = np.abs(folded), folded < 0
-    Us = Uf[:, position] / M
-    Us[:, negative] = Us[:, negative].conj()
-    if not np.abs(Us).max() > 1e-13 * np.abs(u).max() * np.sqrt(N):
+    lifted = lifted and M > 1
+    if M == 1:
+        # the two signals share one call of the real FFT along contiguous rows
+        both = scipy.fft.rfft(np.vstack([u.T, y.T]), axis=1, workers=-1)
+        U, Y = both[: u.shape[1], lines, None], both[u.shape[1] :]
+        folded = lines[:, None]
+    else:
+        Y = scipy.fft.rfft(y.T, axis=1, workers=-1)
+        if lifted:
+            turns = u.reshape(N, -1).T
+            U = scipy.fft.rfft(turns, axis=1, workers=-1)[:, lines, None]
+            folded = lines[:, None]
+        else:
+            U, folded = _aliases(scipy.fft.rfft(u.T, axis=1, workers=-1), lines, N, M)
+    if not np.abs(U).max() > 1e-13 * np.abs(u).max() * np.sqrt(N):
         raise ValueError(
             f"u is zero over band={limits}; an input without energy there identifies nothing"
         )
@@ -76,12 +81,24 @@ def spectra(record: Record, limits: tuple[float, float] | None = None) -> Spectr
     return Spectra(
         omega=step * lines,
         omega_input=step * folded,
-        U=Us,
-        Y=Yf[:, lines],
+        U=U,
+        Y=Y[:, lines],
         multiplicity=np.where((lines == 0) | (2 * lines == N), 1.0, 2.0),
         n_samples=N,
         dt=record.dt,
+        lifted=lifted,
     )
+
+
+def _aliases(
+    U: ComplexArray, lines: npt.NDArray[np.int64], N: int, M: int
+) -> tuple[ComplexArray, npt.NDArray[np.int64]]:
+    """U/M (inputs, K, M) at the fast lines k + mN that fold onto each line, and their numbers."""
+    folded = lines[:, None] + N * (np.arange(M) - (M - 1) // 2)
+    folded[folded > N * M // 2] -= N * M
+    values = U[:, np.abs(folded)] / M
+    values[:, folded < 0] = values[:, folded < 0].conj()
+    return values, folded
 
 
 def _lines(record: Record, N: int, limits: tuple[float, float] | None) -> npt.NDArray[np.int64]:
