@@ -8,6 +8,8 @@ from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
 from freqid.models import GreyBox, Parameter
 from freqid.plants import first_order, two_mass
+from freqid.plots import bode, nyquist, plot_coherence, plot_record
+from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.simulation import simulate
 
@@ -19,13 +21,18 @@ __all__ = [
     "FirstOrderHold",
     "FrequencyResponse",
     "GreyBox",
+    "OutputError",
     "Parameter",
     "Record",
     "ZeroOrderHold",
+    "bode",
     "chirp",
     "etfe",
     "first_order",
     "fit",
+    "nyquist",
+    "plot_coherence",
+    "plot_record",
     "simulate",
     "sine",
     "two_mass",

@@ -5,22 +5,25 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Sequence
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
+# what an array holds is said by its name here; numpy's own types follow precision too closely
 Array = npt.NDArray[Any]
+FloatArray = npt.NDArray[Any]
+ComplexArray = npt.NDArray[Any]
 
 
 def positive(name: str, value: Any, unit: str = "") -> float:
     """Return ``value`` as a float; ValueError unless it is finite and above zero."""
     number = finite(name, value)
     if number <= 0:
-        raise ValueError(f"{name}={value!r} must be a positive number{f' ({unit})' if unit else ''}")
+        raise ValueError(
+            f"{name}={value!r} must be a positive number{f' ({unit})' if unit else ''}"
+        )
     return number
 
 
@@ -33,24 +36,23 @@ def finite(name: str, value: Any) -> float:
 
 def whole(name: str, value: Any, least: int = 1) -> int:
     """Return ``value`` as an int; ValueError unless it is a whole number of at least ``least``."""
-    if isinstance(value, bool) or not isinstance(value, Real) or value != value:
+    number = finite(name, value)
+    if not number.is_integer() or number < least:
         raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
-    if not isinstance(value, Integral) and not float(value).is_integer():
-        raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
-    if value < least:
-        raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
-    return int(value)
+    return int(number)
 
 
 def samples(name: str, values: Any) -> FloatArray:
-    """Return a read-only copy of signal samples, (N,) or (N, channels), checked to be finite."""
+    """A read-only copy of signal samples, (N,) or (N, channels), checked to be finite."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{name} must be an array of real numbers, (N,) or (N, channels)") from None
+        raise ValueError(
+            f"{name} must be an array of real numbers, (N,) or (N, channels)"
+        ) from None
     if array.ndim not in (1, 2) or array.size == 0:
         raise ValueError(
-            f"{name} has shape {array.shape}; expected (N,) or (N, channels) with at least one sample"
+            f"{name} has shape {array.shape}; expected (N,) or (N, channels) at least one sample"
         )
     bad = ~np.isfinite(array)
     if bad.any():
@@ -79,7 +81,7 @@ def band(value: Any, nyquist: float, name: str = "band") -> tuple[float, float]:
 
 
 def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
-    """Return ``value`` if it is one of ``allowed``, else raise a ValueError with the nearest name."""
+    """Return ``value`` if it is one of ``allowed``; ValueError with the nearest name."""
     if isinstance(value, str) and value in allowed:
         return value
     raise ValueError(unknown(name, value, allowed))

@@ -20,9 +20,17 @@ import scipy.fft
 
 from freqid.checks import Array, ComplexArray, FloatArray
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import Hold, PeriodicHold
+from freqid.holds import BandLimited, Hold, PeriodicHold, Sampled
 from freqid.record import Record
-from freqid.responses import Basis, Linearisation, basis_of, points, transition
+from freqid.responses import (
+    Basis,
+    Linearisation,
+    Plane,
+    basis_of,
+    points,
+    sum_runs,
+    transition,
+)
 from freqid.simulation import FreeMotion, forcing, propagate
 from freqid.spectra import Spectra
 
@@ -52,11 +60,11 @@ class Evaluation(Protocol):
 
 
 class SpectralExperiment:
-    """DFT lines of a record, or of a frequency response, against the model's (theory: V(θ)).
+    """DFT lines of a record, or of a frequency response, against the model's.
 
     ``Y`` (outputs, channels, K) and ``U`` (inputs, channels, K·M): one channel for a record, one
     for each input for a frequency response. ``scale`` multiplies the residual, broadcasting
-    against ``Y``.
+    against ``Y``. ``transient_dt`` is the sample time of the output; None leaves the transient out.
     """
 
     def __init__(
@@ -70,28 +78,48 @@ class SpectralExperiment:
         transient_dt: float | None,
         n_real: int = 0,
         lift: int = 1,
+        plane: Plane | None = None,
     ) -> None:
-        self.lift = lift
-        self.hold, self.U, self.Y, self.scale = hold, U, Y, scale
+        self.hold, self.U, self.Y, self.scale, self.lift = hold, U, Y, scale, lift
         self.aliases = omega_input.size // len(omega)
-        if lift > 1 and isinstance(hold, PeriodicHold):
-            self.z = np.exp(1j * hold.period * lift * omega)
-        else:
-            self.z = points(omega_input.ravel(), hold)
         self.transient_dt = transient_dt
+        discrete, plane = plane is not None, plane or Plane()
+        period = hold.period * lift if isinstance(hold, PeriodicHold) else None
+        if lift > 1 and period is not None:
+            z = np.exp(1j * period * omega)
+        else:
+            z = points(omega_input.ravel(), hold)
+        self.z = plane.points(z)
+        self.U_state = U * plane.input_factor(self.z)
         # one resolvent serves input and transient when both have the same period
-        self.shared = (
-            self.aliases == 1
-            and isinstance(hold, PeriodicHold)
-            and transient_dt is not None
-            and abs(hold.period * lift / transient_dt - 1) < 1e-12
-        )
-        self.z_slow = None if transient_dt is None else np.exp(1j * omega * transient_dt)
+        self.shared = False
+        self.free_aliases = 1
+        if transient_dt is not None:
+            z_free = np.exp(1j * omega * transient_dt)
+            ratio = 0.0 if period is None else transient_dt / period
+            self.shared = self.aliases == 1 and abs(ratio - 1) < 1e-9
+            if discrete and not self.shared and isinstance(hold, PeriodicHold):
+                # (z^M I − Φ^M)⁻¹ z^M is the mean of (zI − Φ)⁻¹ z over the M aliases
+                self.free_aliases = round(transient_dt / hold.period)
+                turns = 2 * np.pi * np.arange(self.free_aliases) / transient_dt
+                z_free = np.exp(1j * (omega[:, None] + turns).ravel() * hold.period)
+            self.z_free = plane.points(z_free)
+            self.free_factor = plane.free_factor(self.z_free) / self.free_aliases
+        self.discrete = discrete
+        if discrete:
+            # the matrices are sampled already: the kernel takes them as they are
+            self.hold = BandLimited()
         self.n_rows = 2 * Y.size - n_real
 
     @classmethod
     def of_record(
-        cls, s: Spectra, n_inputs: int, hold: Hold, weights: FloatArray, transient: bool
+        cls,
+        s: Spectra,
+        n_inputs: int,
+        hold: Hold,
+        weights: FloatArray,
+        transient: bool,
+        plane: Plane | None = None,
     ) -> SpectralExperiment:
         """Lines of a record; ``weights`` (K,) or (outputs, K) multiply the squared error."""
         scale = np.sqrt(s.multiplicity * weights / s.n_samples)
@@ -106,17 +134,18 @@ class SpectralExperiment:
             s.dt if transient else None,
             n_real,
             lift=len(s.U) // n_inputs,
+            plane=plane,
         )
 
     @classmethod
     def of_response(
-        cls, frf: FrequencyResponse, hold: Hold, weights: FloatArray
+        cls, frf: FrequencyResponse, hold: Hold, weights: FloatArray, plane: Plane | None = None
     ) -> SpectralExperiment:
         """A measured response: unit input on each channel; ``weights`` broadcast against it."""
         m, K = frf.response.shape[1:]
         U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, K))
         scale = np.broadcast_to(np.sqrt(weights), frf.response.shape)
-        return cls(frf.omega, frf.omega, U, frf.response, scale, hold, None)
+        return cls(frf.omega, frf.omega, U, frf.response, scale, hold, None, plane=plane)
 
     @property
     def energy(self) -> float:
@@ -138,45 +167,51 @@ class _SpectralEvaluation:
         e, basis = experiment, realisation.basis
         self.experiment, self.basis = e, basis
         self.plant = basis.through(e.hold, e.lift)
-        self.x = self.plant.solve(e.z, self.plant.drive(e.z, e.U))
-        y = self.plant.output(self.x, e.U)
-        if e.aliases > 1:
-            y = y.reshape(*y.shape[:-1], -1, e.aliases).sum(axis=-1)
+        self.x = self.plant.solve(e.z, self.plant.drive(e.z, e.U_state))
+        y = sum_runs(self.plant.output(self.x, e.U), e.aliases)
         self.residual = e.rows(y - e.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
-        if e.z_slow is not None and e.transient_dt is not None:
-            self.free = self.plant if e.shared else transition(basis, e.transient_dt)
-            self._w = self.free.output_rows(e.z_slow)
+        if e.transient_dt is not None:
+            same = e.shared or e.discrete
+            self.free = self.plant if same else transition(basis, e.transient_dt)
+            self._w = self.free.output_rows(e.z_free)
             # (outputs, states, K) to one column for each physical state
-            columns = np.tensordot(basis.to_basis.T, self._w * e.z_slow, (1, 1))
+            seen = sum_runs(self._w * e.free_factor, e.free_aliases)
+            columns = np.tensordot(basis.to_basis.T, seen, (1, 1))
             self.transient = e.rows(columns[:, :, None, :]).T
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        e = self.experiment
-        x_free = None
-        if initial is not None and e.z_slow is not None:
-            delta = (self.basis.to_basis @ initial)[:, None, None]
-            x_free = self.free.solve(e.z_slow, delta * e.z_slow)
-        if e.shared and x_free is not None and self._w is not None:
-            dy = self.plant.sensitivity(e.z, self._w, self.x + x_free, e.U)
-        else:
-            w = self.plant.output_rows(e.z)
-            dy = self.plant.sensitivity(e.z, w, self.x, e.U, e.aliases)
-            if x_free is not None and e.z_slow is not None and self._w is not None:
-                dy = dy + self.free.sensitivity(e.z_slow, self._w, x_free, None)
-        return e.rows(dy).T
+        e, plant = self.experiment, self.plant
+        if initial is None or self._w is None:
+            w = plant.output_rows(e.z)
+            return e.rows(plant.sensitivity(e.z, w, self.x, e.U_state, e.aliases, e.U)).T
+        delta = (self.basis.to_basis @ initial)[:, None, None]
+        x_free = self.free.solve(e.z_free, delta * e.free_factor)
+        if e.shared:
+            x = self.x + x_free
+            return e.rows(plant.sensitivity(e.z, self._w, x, e.U_state, direct=e.U)).T
+        w = plant.output_rows(e.z)
+        forced = plant.sensitivity(e.z, w, self.x, e.U_state, e.aliases, e.U)
+        return e.rows(
+            forced + self.free.sensitivity(e.z_free, self._w, x_free, None, e.free_aliases)
+        ).T
 
 
 class TimeExperiment:
     """Output error in the time domain, on all samples or on the DFT lines of a band.
 
     The initial state is either free or that of the sampled model at rest, x(0) = Γ⁺ u(0): under a
-    first-order hold the input then ramps up from zero over the period before the record.
+    first-order hold the input then ramps up from zero over the period before the record. Without
+    a hold the matrices are those of a sampled model already.
     """
 
     def __init__(
-        self, record: Record, hold: PeriodicHold, lines: Spectra | None, free_state: bool
+        self,
+        record: Record,
+        hold: PeriodicHold | None,
+        lines: Spectra | None,
+        free_state: bool,
     ) -> None:
         self.factor = record.factor
         N = len(record.u) // self.factor
@@ -187,9 +222,7 @@ class TimeExperiment:
         if lines is not None:
             index = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
             self.lines = (index, np.sqrt(lines.multiplicity / N))
-        self.n_rows = (
-            self.y.size if lines is None else int(lines.multiplicity.sum()) * len(self.y)
-        )
+        self.n_rows = self.y.size if lines is None else int(lines.multiplicity.sum()) * len(self.y)
 
     @property
     def energy(self) -> float:
@@ -213,7 +246,12 @@ class _TimeEvaluation:
         e, self.lin = experiment, lin
         self.experiment = e
         at, d = lin
-        self.sampled, self.change = e.hold.sampled_derivatives(at.A, at.B, d.A, d.B)
+        if e.hold is None:
+            none = np.zeros_like(at.B)
+            self.sampled = Sampled(at.A, at.B, none)
+            self.change = Sampled(d.A, d.B, np.zeros_like(d.B))
+        else:
+            self.sampled, self.change = e.hold.sampled_derivatives(at.A, at.B, d.A, d.B)
         every = e.factor
         self.transient: FloatArray | None = None
         push = forcing(self.sampled, e.u)

@@ -7,16 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from freqid.black_box import fit_black_box
 from freqid.checks import FloatArray, choice, unknown
 from freqid.estimate import Estimate
-from freqid.experiments import Experiment, Realisation, SpectralExperiment, TimeExperiment
+from freqid.experiments import Realisation
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import Hold, PeriodicHold, as_hold
+from freqid.holds import Hold
 from freqid.models import GreyBox
-from freqid.optimise import Objective, Solution, minimise
+from freqid.optimise import Objective, Solution, minimise, noise_variance
+from freqid.preparation import Options, enough_rows, prepare
+from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.responses import Linearisation, StateSpace
-from freqid.spectra import spectra
 from freqid.trust import physical_warnings, uncertainty
 
 
@@ -63,7 +65,7 @@ def fit(
     Minimises Σ w |Y − G U − transient|² (the bias integral, paper eq. 2, for w = 1).
 
     Args:
-        model: a GreyBox.
+        model: a GreyBox, or OutputError(order) for a black box.
         data: a Record, a FrequencyResponse, or several; each record has its own initial state.
         hold: what the input did between its samples; None is what each record remembers, a name
             means that hold at the record's own sample time, as other tools assume.
@@ -90,33 +92,33 @@ def fit(
     """
     choice("domain", domain, ("frequency", "time"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
-    if not isinstance(model, GreyBox):
-        raise ValueError(f"model={type(model).__name__} is not a model; expected a GreyBox")
-    model = _started(model, start)
-    structure = GreyStructure(model)
-    if not structure.names:
-        raise ValueError("model has no free parameter; free one with model.free(name)")
     sets = [data] if isinstance(data, (Record, FrequencyResponse)) else list(data)
     if not sets:
         raise ValueError("data=[] holds no experiment; give at least one record or response")
     all_weights = weights if isinstance(weights, (list, tuple)) else [weights] * len(sets)
     if len(all_weights) != len(sets):
         raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
-    experiments: list[Experiment] = []
-    holds: list[Hold] = []
-    for item, w in zip(sets, all_weights, strict=True):
-        experiment, assumed = _experiment(item, model, hold, band, w, initial_state, domain)
-        experiments.append(experiment)
-        holds.append(assumed)
-    n_rows = sum(e.n_rows for e in experiments)
-    if n_rows < len(structure.names):
+    options = Options(hold, band, initial_state, domain)
+    if isinstance(model, OutputError):
+        if start is not None:
+            raise ValueError("start has no meaning for a black box, which needs none; leave it out")
+        return fit_black_box(model, sets, all_weights, options)
+    if not isinstance(model, GreyBox):
         raise ValueError(
-            f"data hold {n_rows} real values for {len(structure.names)} free parameters; "
-            "widen the band, lengthen the record or fix parameters"
+            f"model={type(model).__name__} is not a model; expected a GreyBox or OutputError"
         )
+    model = _started(model, start)
+    structure = GreyStructure(model)
+    if not structure.names:
+        raise ValueError("model has no free parameter; free one with model.free(name)")
+    at = model.state_space()
+    shape = (at.C.shape[0], at.B.shape[1])
+    pairs = [prepare(d, shape, w, options) for d, w in zip(sets, all_weights, strict=True)]
+    experiments = [experiment for experiment, _ in pairs]
+    enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     solution = minimise(objective, structure.values / structure.scale)
-    return _estimate(structure, objective, solution, holds[0], sets[0].dt, n_rows)
+    return _estimate(structure, objective, solution, pairs[0][1], sets[0].dt)
 
 
 def _started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:
@@ -128,114 +130,19 @@ def _started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:
     return model.with_values(**start)
 
 
-def _experiment(
-    data: Any,
-    model: GreyBox,
-    hold: Hold | str | None,
-    band: tuple[float, float] | None,
-    weights: Any,
-    initial_state: str,
-    domain: str,
-) -> tuple[Experiment, Hold]:
-    """One data set as residuals, and the hold that was assumed for it."""
-    if not isinstance(data, (Record, FrequencyResponse)):
-        raise ValueError(f"data holds a {type(data).__name__}; expected Record or FrequencyResponse")
-    at = model.state_space()
-    shape = (at.C.shape[0], at.B.shape[1])
-    if isinstance(data, FrequencyResponse):
-        given = data.response.shape[:2]
-    else:
-        given = (data.n_outputs, data.n_inputs)
-    if given != shape:
-        raise ValueError(
-            f"data have {given[0]} outputs and {given[1]} inputs; the model has {shape[0]} and "
-            f"{shape[1]}"
-        )
-    if isinstance(data, FrequencyResponse):
-        if domain == "time":
-            raise ValueError("domain='time' needs a Record, not a FrequencyResponse")
-        return _response_experiment(data, hold, band, weights)
-    # a name means the hold at the record's own sample time: that of the input as it was kept
-    assumed = as_hold(hold, data.input_dt, data.hold)
-    if domain == "time" or initial_state == "zero":
-        if initial_state != "steady":
-            return _time_experiment(data, assumed, band, weights, initial_state), assumed
-    known = isinstance(assumed, PeriodicHold) and np.isclose(assumed.period, data.input_dt, 1e-9)
-    s = spectra(data, band, lifted=bool(known))
-    w = _weights(weights, s.Y.shape)
-    free = initial_state == "estimate"
-    return SpectralExperiment.of_record(s, data.n_inputs, assumed, w, free), assumed
-
-
-def _response_experiment(
-    frf: FrequencyResponse, hold: Hold | str | None, band: Any, weights: Any
-) -> tuple[Experiment, Hold]:
-    if isinstance(hold, str) and hold != "bl" and frf.dt == 0:
-        raise ValueError(f"hold={hold!r} needs a sample time and this response has dt=0; give a Hold")
-    continuous = as_hold("bl", 1.0)
-    assumed = as_hold(hold, frf.dt or 1.0, frf.hold or continuous)
-    if band is not None:
-        frf = frf.select(band)
-    shape = frf.response.shape
-    if weights is None:
-        w = np.ones(shape) if frf.input_spectrum is None else frf.input_spectrum
-    elif isinstance(weights, str):
-        choice("weights", weights, ("noise",))
-        if frf.variance is None:
-            raise ValueError("weights='noise' needs frf.variance, and this response has none")
-        w = 1 / frf.variance
-    else:
-        w = _weights(weights, shape)
-    return SpectralExperiment.of_response(frf, assumed, w), assumed
-
-
-def _time_experiment(
-    record: Record, assumed: Hold, band: Any, weights: Any, initial_state: str
-) -> Experiment:
-    if weights is not None:
-        raise ValueError("weights need domain='frequency' and an initial state that is not 'zero'")
-    if not isinstance(assumed, PeriodicHold) or abs(assumed.period / record.input_dt - 1) > 1e-9:
-        raise ValueError(
-            f"hold={assumed!r} cannot be simulated from an input at {record.input_dt:g} s; use "
-            "domain='frequency' with initial_state='estimate', or keep the input when decimating"
-        )
-    s = spectra(record, band)
-    return TimeExperiment(record, assumed, None if band is None else s, initial_state == "estimate")
-
-
-def _weights(weights: Any, shape: tuple[int, ...]) -> FloatArray:
-    if weights is None:
-        return np.ones(shape)
-    if isinstance(weights, str):
-        choice("weights", weights, ("noise",))
-        raise ValueError(
-            "weights='noise' needs the variance at each line, which a record does not carry; give "
-            "an array of 1/variance, or fit a FrequencyResponse with a variance"
-        )
-    array = np.asarray(weights, dtype=float)
-    if array.shape not in ((shape[-1],), shape):
-        raise ValueError(f"weights has shape {array.shape}; expected ({shape[-1]},) or {shape}")
-    if not np.isfinite(array).all() or (array < 0).any() or not array.any():
-        raise ValueError("weights must be finite and not negative, with at least one above zero")
-    return array
-
-
 def _estimate(
     structure: GreyStructure,
     objective: Objective,
     solution: Solution,
     hold: Hold,
     dt: float,
-    n_rows: int,
 ) -> Estimate:
     point, scale = solution.point, structure.scale
     values = solution.x * scale
     energy = sum(e.energy for e in objective.experiments)
-    unknowns = len(values) + sum(len(d) for d in point.initial if d is not None)
-    freedom = max(n_rows - unknowns, 1)
-    u = uncertainty(
-        point.jacobian / scale, values, structure.names, point.cost / freedom, np.sqrt(energy)
-    )
+    n_rows = sum(e.n_rows for e in objective.experiments)
+    noise = noise_variance(objective, point, len(values))
+    u = uncertainty(point.jacobian / scale, values, structure.names, noise, np.sqrt(energy))
     warnings = [] if solution.converged else [f"not converged: {solution.message}"]
     warnings += u.warnings + physical_warnings(structure.parameters, values)
     return Estimate(

@@ -67,7 +67,11 @@ class FrequencyResponse:
         if not np.isfinite(self.dt) or self.dt < 0:
             raise ValueError(f"dt={self.dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape
-        for name, shape in (("variance", G.shape), ("coherence", G.shape), ("input_spectrum", (m, K))):
+        for name, shape in (
+            ("variance", G.shape),
+            ("coherence", G.shape),
+            ("input_spectrum", (m, K)),
+        ):
             value = getattr(self, name)
             if value is not None:
                 array = np.array(value, dtype=float)
@@ -106,7 +110,7 @@ class FrequencyResponse:
                 f"limits=({low:g}, {high:g}) Hz hold no frequency; the response has "
                 f"{len(self.frequency)} from {self.frequency[0]:g} to {self.frequency[-1]:g} Hz"
             )
-        cut = {
+        cut: dict[str, Any] = {
             name: None if getattr(self, name) is None else getattr(self, name)[..., keep]
             for name in ("frequency", "response", "variance", "coherence", "input_spectrum")
         }

@@ -30,7 +30,7 @@ class Sampled(NamedTuple):
 
 
 class ModalSampled(NamedTuple):
-    """The scalar functions of an eigenvalue λ that a hold applies to A, and their divided differences.
+    """What a hold makes of an eigenvalue λ of A, and the divided differences of that.
 
     φ = exp(λ h); γ and γ⁺ multiply the rows of V⁻¹B. ``d…`` (…, n, n) are the divided differences
     f[λi, λj], the factors of the Fréchet derivative in the eigenbasis (Higham, Functions of
@@ -104,11 +104,15 @@ class PeriodicHold(Hold):
         """φ, γ, γ⁺ and their divided differences at the eigenvalues of A, (…, n) in rad/s."""
         h = self.period
         value, difference = phi_functions(eigenvalues * h)
+        gamma, gamma_next = self._weights(value)
+        dgamma, dgamma_next = self._weights(difference)
         return ModalSampled(
             value[0],
-            *(h * f for f in self._weights(value)),
+            h * gamma,
+            h * gamma_next,
             h * difference[0],
-            *(h**2 * f for f in self._weights(difference)),
+            h**2 * dgamma,
+            h**2 * dgamma_next,
         )
 
     def _generator(self, A: FloatArray, B: FloatArray) -> FloatArray:
@@ -250,11 +254,8 @@ def phi_functions(
     return (phi0, phi1, phi2), (d0, d1, d2)
 
 
-NAMES = ("zoh", "foh", "bl")
-
-
 def as_hold(hold: Hold | str | None, dt: float, remembered: Hold | None = None) -> Hold:
-    """The hold that an argument means: a Hold as it is, a name at ``dt`` (s), None the remembered one.
+    """The hold an argument means: a Hold itself, a name at ``dt`` (s), None the remembered one.
 
     Raises ValueError for anything else.
 

@@ -12,10 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, finite, unknown
+from freqid.checks import Array, FloatArray, finite, unknown
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import Hold
-from freqid.responses import Linearisation, StateSpace, frequency_response
+from freqid.responses import (
+    Linearisation,
+    StateSpace,
+    frequency_response,
+    response_derivatives,
+)
 
 Matrices = Callable[..., Sequence[Any]]
 
@@ -175,6 +180,17 @@ class GreyBox:
         """
         return frequency_response(self.state_space(), omega, hold, self.inputs, self.outputs)
 
+    def response_with_variance(
+        self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
+    ) -> FrequencyResponse:
+        """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``."""
+        lin = self.linearise(self.values, names)
+        frf = self.frequency_response(omega, hold)
+        J = response_derivatives(lin, frf.omega, hold)
+        known = np.where(np.isfinite(covariance), covariance, 0)
+        variance = np.einsum("apmk,ab,bpmk->pmk", J.conj(), known, J).real
+        return dataclasses.replace(frf, variance=variance)
+
     def to_control(self) -> Any:
         """The plant as a continuous ``control.StateSpace``."""
         import control
@@ -236,11 +252,19 @@ class GreyBox:
         values, names = self.values, [p.name for p in self.free_parameters]
         try:
             exact = self._differentiate(values, names, by_complex_step=True)
-        except (TypeError, ValueError, AttributeError, ArithmeticError, np.exceptions.ComplexWarning):
+        except (
+            TypeError,
+            ValueError,
+            AttributeError,
+            ArithmeticError,
+            np.exceptions.ComplexWarning,
+        ):
             return False
         rough = self._differentiate(values, names, by_complex_step=False)
         return all(
-            bool(np.all(np.abs(a - b) <= 1e-4 * np.abs(b).max(axis=(1, 2), keepdims=True, initial=0)))
+            bool(
+                np.all(np.abs(a - b) <= 1e-4 * np.abs(b).max(axis=(1, 2), keepdims=True, initial=0))
+            )
             for a, b in zip(exact, rough, strict=True)
         )
 
@@ -269,7 +293,9 @@ def _channels(name: str, given: Sequence[str] | None, count: int, letter: str) -
         return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
     names = (given,) if isinstance(given, str) else tuple(given)
     if len(names) != count:
-        raise ValueError(f"{name}={list(names)} names {len(names)} channels; the matrices have {count}")
+        raise ValueError(
+            f"{name}={list(names)} names {len(names)} channels; the matrices have {count}"
+        )
     return names
 
 
@@ -299,4 +325,3 @@ def _shaped(matrices: Sequence[Any], values: Mapping[str, float]) -> StateSpace:
         at = ", ".join(f"{k}={v:g}" for k, v in values.items())
         raise ValueError(f"matrices are not finite at {at}; change the values or the function")
     return out
-

@@ -106,7 +106,12 @@ class Objective:
         if not np.isfinite(stacked).all():
             self.failure = ArithmeticError("the response is not finite")
             return None
-        return Point(np.linalg.qr(stacked, mode="r"), initial, parts)
+        return Point(triangle(stacked), initial, parts)
+
+
+def triangle(matrix: FloatArray) -> FloatArray:
+    """R of the QR decomposition."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
 def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -137,6 +142,13 @@ class Solution:
     point: Point
     converged: bool
     message: str
+
+
+def noise_variance(objective: Objective, point: Point, n_parameters: int) -> float:
+    """Variance of the weighted residual: the cost over its degrees of freedom."""
+    rows = sum(e.n_rows for e in objective.experiments)
+    unknowns = n_parameters + sum(len(d) for d in point.initial if d is not None)
+    return point.cost / max(rows - unknowns, 1)
 
 
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened

@@ -110,6 +110,7 @@ class SampledPlant:
         x: ComplexArray,
         U: ComplexArray | None,
         aliases: int = 1,
+        direct: ComplexArray | None = None,
     ) -> ComplexArray:
         """dy for each parameter, (…, P, outputs, channels, lines / aliases).
 
@@ -144,15 +145,16 @@ class SampledPlant:
                 factors.append(x)
                 weights.append(self.dC[..., o, :])
             if moving_D:
-                factors.append(np.broadcast_to(U, (*lead, *np.shape(U))))
+                straight = np.asarray(U if direct is None else direct)
+                factors.append(np.broadcast_to(straight, (*lead, *np.shape(straight))))
                 weights.append(self.dD[..., o, :])
             F = np.concatenate(factors, axis=-3)
-            F = _sum_runs(F, aliases)
+            F = sum_runs(F, aliases)
             flat = F.reshape(*lead, F.shape[-3], -1)
             row = (np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, -1)
             if push is not None:
-                direct = (w[..., None, o, :, None, :] * push).sum(axis=-3)
-                row = row + _sum_runs(direct, aliases)
+                driven = (w[..., None, o, :, None, :] * push).sum(axis=-3)
+                row = row + sum_runs(driven, aliases)
             rows.append(row)
         return np.stack(rows, axis=-3)
 
@@ -163,7 +165,8 @@ def _times(M: Array, x: ComplexArray) -> ComplexArray:
     return (M @ flat).reshape(*(M @ flat[..., :1]).shape[:-1], *x.shape[-2:])
 
 
-def _sum_runs(F: ComplexArray, aliases: int) -> ComplexArray:
+def sum_runs(F: ComplexArray, aliases: int) -> ComplexArray:
+    """Sums of runs of ``aliases`` lines, (…, lines / aliases)."""
     return F if aliases == 1 else F.reshape(*F.shape[:-1], -1, aliases).sum(axis=-1)
 
 
@@ -204,8 +207,8 @@ class EigenBasis:
                 phi, dphi = powers[-1], dpowers[-1]
                 gamma, following, dgamma, dfollowing = _lifted_inputs(
                     *step,
-                    lambda l, x: powers[l][:, None] * x,
-                    lambda l, x: dpowers[l] @ x,
+                    lambda k, x: powers[k][:, None] * x,
+                    lambda k, x: dpowers[k] @ x,
                     lift,
                 )
                 D, dD = _widened(D, lift), _widened(dD, lift)
@@ -214,7 +217,7 @@ class EigenBasis:
         )
 
     def _powers(self, period: float, lift: int) -> tuple[ComplexArray, ComplexArray]:
-        """Φ^l and its derivatives for l = 0 … lift, from exp(A l·period) at once."""
+        """Φ^k and its derivatives for k = 0 … lift, from exp(A k·period) at once."""
         times = period * np.arange(lift + 1)
         value, difference = phi_functions(self.eigenvalues * times[:, None])
         change = (times[:, None, None] * difference[0])[:, None] * self.dA
@@ -236,13 +239,15 @@ def _lifted_inputs(
     """Γ and Γ⁺ of the lifted plant and their derivatives, the inputs of one slow period in turn."""
     columns, dcolumns = [], []
     for i in range(lift):
-        l = lift - 1 - i
-        columns.append(power(l, step.gamma))
-        dcolumns.append(dpower(l, step.gamma) + power(l, change.gamma))
+        left = lift - 1 - i
+        columns.append(power(left, step.gamma))
+        dcolumns.append(dpower(left, step.gamma) + power(left, change.gamma))
         if step.gamma_next is not None and i > 0:
-            columns[-1] = columns[-1] + power(l + 1, step.gamma_next)
+            columns[-1] = columns[-1] + power(left + 1, step.gamma_next)
             dcolumns[-1] = (
-                dcolumns[-1] + dpower(l + 1, step.gamma_next) + power(l + 1, change.gamma_next)
+                dcolumns[-1]
+                + dpower(left + 1, step.gamma_next)
+                + power(left + 1, change.gamma_next)
             )
     gamma, dgamma = np.concatenate(columns, axis=-1), np.concatenate(dcolumns, axis=-1)
     if step.gamma_next is None:
@@ -293,7 +298,7 @@ class SchurBasis:
                 powers, dpowers = self._powers(hold.period, lift)
                 phi, dphi = powers[-1], dpowers[-1]
                 gamma, following, dgamma, dfollowing = _lifted_inputs(
-                    *step, lambda l, x: powers[l] @ x, lambda l, x: dpowers[l] @ x, lift
+                    *step, lambda k, x: powers[k] @ x, lambda k, x: dpowers[k] @ x, lift
                 )
                 D, dD = _widened(D, lift), _widened(dD, lift)
         return SampledPlant(
@@ -311,11 +316,11 @@ class SchurBasis:
         )
 
     def _powers(self, period: float, lift: int) -> tuple[list[Array], list[Array]]:
-        """Φ^l and its derivatives for l = 0 … lift, each from its own exponential."""
+        """Φ^k and its derivatives for k = 0 … lift, each from its own exponential."""
         n, count = len(self.at.A), len(self.derivative.A)
         powers, dpowers = [np.eye(n)], [np.zeros((count, n, n))]
-        for l in range(1, lift + 1):
-            value, change = ZeroOrderHold(l * period).sampled_derivatives(
+        for k in range(1, lift + 1):
+            value, change = ZeroOrderHold(k * period).sampled_derivatives(
                 self.at.A, self.at.B, self.derivative.A, self.derivative.B
             )
             powers.append(value.phi)
@@ -367,6 +372,29 @@ def points(omega: FloatArray, hold: Hold) -> ComplexArray:
     return 1j * omega
 
 
+@dataclass(frozen=True)
+class Plane:
+    """The plane in which the resolvent is taken: z itself, or a Möbius map of it.
+
+    w = (z − a)/(1 − a z) spreads a short arc of the unit circle over all of it, and a sampled
+    plant becomes C (wI − Φ̃)⁻¹ ((1 + a w) Γ u + (w + a) δ) + D u, of the same order.
+    """
+
+    a: float = 0.0
+
+    def points(self, z: ComplexArray) -> ComplexArray:
+        """w at z."""
+        return z if self.a == 0 else (z - self.a) / (1 - self.a * z)
+
+    def input_factor(self, w: ComplexArray) -> ComplexArray | float:
+        """What multiplies Γ u."""
+        return 1.0 if self.a == 0 else 1 + self.a * w
+
+    def free_factor(self, w: ComplexArray) -> ComplexArray:
+        """What multiplies δ."""
+        return w if self.a == 0 else w + self.a
+
+
 def transition(basis: Basis, dt: float) -> SampledPlant:
     """The plant's free motion over ``dt`` (s): exp(A dt) and its derivative, for the transient."""
     return basis.through(ZeroOrderHold(dt))
@@ -379,6 +407,18 @@ def transfer(plant: SampledPlant, z: ComplexArray) -> ComplexArray:
     return plant.output(plant.solve(z, plant.drive(z, U)), U)
 
 
+def response_derivatives(
+    lin: Linearisation, omega: FloatArray, hold: Hold | None = None
+) -> ComplexArray:
+    """Exact derivatives of the response by each parameter, (P, outputs, inputs, lines)."""
+    between = BandLimited() if hold is None else hold
+    plant, z = basis_of(*lin).through(between), points(omega, between)
+    m = lin.at.B.shape[1]
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
+    x = plant.solve(z, plant.drive(z, U))
+    return plant.sensitivity(z, plant.output_rows(z), x, U)
+
+
 def frequency_response(
     at: StateSpace,
     omega: Any,
@@ -389,14 +429,16 @@ def frequency_response(
     """Response of the plant at ``omega`` (rad/s), continuous or through a hold."""
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     if omega.ndim != 1 or not np.isfinite(omega).all():
-        raise ValueError(f"omega has shape {omega.shape}; expected finite frequencies (rad/s), (K,)")
+        raise ValueError(
+            f"omega has shape {omega.shape}; expected finite frequencies (rad/s), (K,)"
+        )
     if hold is not None and not isinstance(hold, Hold):
         raise ValueError(
             f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
             "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
         )
-    plant = basis_of(at).through(BandLimited() if hold is None else hold)
-    z = points(omega, BandLimited() if hold is None else hold)
+    between = BandLimited() if hold is None else hold
+    plant, z = basis_of(at).through(between), points(omega, between)
     dt = hold.period if isinstance(hold, PeriodicHold) else 0.0
     return FrequencyResponse(
         omega / (2 * np.pi),

@@ -104,7 +104,9 @@ def simulate(
     u = samples("u", u)
     between = as_hold("zoh" if hold is None else hold, dt)
     if isinstance(between, PeriodicHold) and abs(between.period - dt) > 1e-9 * dt:
-        raise ValueError(f"hold={between!r} must have the period dt={dt:g} s of the input's samples")
+        raise ValueError(
+            f"hold={between!r} must have the period dt={dt:g} s of the input's samples"
+        )
     system, discrete_dt = _state_space(model)
     inputs = u.reshape(len(u), -1)
     n, m = system.B.shape
@@ -116,11 +118,12 @@ def simulate(
     if discrete_dt and abs(discrete_dt - dt) > 1e-9 * dt:
         raise ValueError(f"dt={dt:g} s, but the model is discrete with dt={discrete_dt:g} s")
 
-    if discrete_dt or isinstance(between, PeriodicHold):
-        if discrete_dt:
-            sampled = Sampled(system.A, system.B, np.zeros_like(system.B))
-        else:
-            sampled = between.sampled(system.A, system.B)  # type: ignore[union-attr]
+    sampled = None
+    if discrete_dt:
+        sampled = Sampled(system.A, system.B, np.zeros_like(system.B))
+    elif isinstance(between, PeriodicHold):
+        sampled = between.sampled(system.A, system.B)
+    if sampled is not None:
         x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
         y = (system.C @ x + system.D @ inputs.T).T
     else:
@@ -150,7 +153,11 @@ def _state_space(model: Any) -> tuple[StateSpace, float]:
     import control
 
     if not isinstance(model, control.lti.LTI):
-        raise ValueError(f"model={type(model).__name__} is not a model, an estimate or a control system")
+        raise ValueError(
+            f"model={type(model).__name__} is not a model, an estimate or a control system"
+        )
     system = control.ss(model)
     dt = 1.0 if system.dt is True else float(system.dt or 0.0)
-    return StateSpace(*(np.asarray(M, dtype=float) for M in (system.A, system.B, system.C, system.D))), dt
+    return StateSpace(
+        *(np.asarray(M, dtype=float) for M in (system.A, system.B, system.C, system.D))
+    ), dt

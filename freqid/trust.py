@@ -23,7 +23,11 @@ class Uncertainty:
 
 
 def uncertainty(
-    jacobian: FloatArray, values: FloatArray, names: Sequence[str], noise_variance: float, size: float
+    jacobian: FloatArray,
+    values: FloatArray,
+    names: Sequence[str],
+    noise_variance: float,
+    size: float,
 ) -> Uncertainty:
     """σ² (JᵀJ)⁻¹ at the estimate, and the parameters that it cannot separate.
 
@@ -66,7 +70,9 @@ def _combination(names: list[str], change: FloatArray) -> str:
     if len(names) == 2:
         ratio = change[1] / change[0]
         if abs(ratio + 1) < 1e-3:
-            text += f" as they are: only the product {names[0]}*{names[1]} is determined, so fix one"
+            text += (
+                f" as they are: only the product {names[0]}*{names[1]} is determined, so fix one"
+            )
             return text
         if abs(ratio - 1) < 1e-3:
             text += f" as they are: only the ratio {names[0]}/{names[1]} is determined, so fix one"

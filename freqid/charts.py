@@ -1,0 +1,105 @@
+"""Black boxes as the optimiser sees them: a local chart of all state-space models of one order.
+
+A state space has n² entries more than the model has parameters, because any change of its states
+leaves the model as it is. The chart moves only at right angles to those changes (data driven local
+coordinates: McKelvey, Helmersson and Ribarits, Automatica 40, 2004), which is well conditioned at
+any order and for any number of channels, where coefficients of polynomials are not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from freqid.checks import FloatArray
+from freqid.experiments import Realisation
+from freqid.responses import Linearisation, Plane, StateSpace
+
+
+class Chart:
+    """Models near a state space (Φ̃, Γ, C, D) of a plane, by unknowns x that are zero there."""
+
+    def __init__(self, centre: StateSpace, feedthrough: bool, plane: Plane, moves: int = 0) -> None:
+        self.moves = moves
+        self.centre, self.feedthrough, self.plane = balanced(centre), feedthrough, plane
+        A, B, C, D = self.centre
+        n, m, p = len(A), B.shape[1], len(C)
+        free_D = D.size if feedthrough else 0
+        # derivative of the entries by T in (A T − T A, −T B, C T)
+        eye = np.eye(n)
+        tangent = np.concatenate(
+            [
+                np.kron(A, eye) - np.kron(eye, A.T),
+                -np.kron(eye, B.T),
+                np.kron(C, eye),
+            ]
+        )
+        Q = np.linalg.qr(tangent, mode="complete")[0][:, n * n :]
+        self.size = Q.shape[1] + free_D
+        directions = np.zeros((self.size, n * n + n * m + p * n + D.size))
+        directions[: Q.shape[1], : len(Q)] = Q.T
+        if free_D:
+            directions[Q.shape[1] :, len(Q) :] = np.eye(free_D)
+        parts = np.split(directions, np.cumsum([n * n, n * m, p * n]), axis=1)
+        self.derivative = StateSpace(
+            parts[0].reshape(-1, n, n),
+            parts[1].reshape(-1, n, m),
+            parts[2].reshape(-1, p, n),
+            parts[3].reshape(-1, p, m),
+        )
+        self.lower = np.full(self.size, -np.inf)
+        self.upper = np.full(self.size, np.inf)
+
+    def matrices(self, x: FloatArray) -> StateSpace:
+        """The state space at x."""
+        return StateSpace(
+            *(c + np.tensordot(x, d, 1) for c, d in zip(self.centre, self.derivative, strict=True))
+        )
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """The state space at x and its derivatives."""
+        return Realisation.of(Linearisation(self.matrices(x), self.derivative))
+
+    def moved(self, x: FloatArray) -> Chart:
+        """A chart around the model at x."""
+        return Chart(self.matrices(x), self.feedthrough, self.plane, self.moves + 1)
+
+    def describe(self, x: FloatArray) -> str:
+        """Said of the trial point in errors."""
+        return f"poles {np.linalg.eigvals(self.matrices(x).A)}"
+
+    def in_z(self, x: FloatArray) -> StateSpace:
+        """The state space at x in the z plane."""
+        return from_plane(self.matrices(x), self.plane)
+
+
+def balanced(model: StateSpace) -> StateSpace:
+    """The same model with reachability and observability Gramians equal, where it is stable."""
+    A, B, C, D = model
+    if np.abs(np.linalg.eigvals(A)).max() >= 1 - 1e-9:
+        size_B, size_C = float(np.linalg.norm(B)), float(np.linalg.norm(C))
+        ratio = np.sqrt(size_C / size_B) if size_B and size_C else 1.0
+        return StateSpace(A, B * ratio, C / ratio, D)
+    reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T)
+    observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C)
+    try:
+        L, K = np.linalg.cholesky(reach), np.linalg.cholesky(observe)
+    except np.linalg.LinAlgError:
+        return model
+    U, s, Vt = np.linalg.svd(K.T @ L)
+    T = L @ Vt.T / np.sqrt(s)
+    Ti = (U / np.sqrt(s)).T @ K.T
+    return StateSpace(Ti @ A @ T, Ti @ B, C @ T, D)
+
+
+def from_plane(model: StateSpace, plane: Plane) -> StateSpace:
+    """Φ, Γ, C, D in z of a model C (wI − Φ̃)⁻¹ (1 + a w) Γ' + D, w = (z − a)/(1 − a z)."""
+    a = plane.a
+    if a == 0:
+        return model
+    A, B, C, D = model
+    n = len(A)
+    inverse = np.linalg.inv(np.eye(n) + a * A)
+    Phi = (A + a * np.eye(n)) @ inverse
+    # (wI − Φ̃)⁻¹ = (1 − a z)(zI − Φ)⁻¹(I + aΦ̃)⁻¹ and 1 + a w = (1 − a²)/(1 − a z)
+    return StateSpace(Phi, (1 - a**2) * inverse @ B, C, D)
