@@ -12,7 +12,7 @@ from freqid.checks import ComplexArray, FloatArray
 from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import PeriodicHold
+from freqid.holds import FirstOrderHold, PeriodicHold
 from freqid.optimise import Objective, Solution, minimise, noise_variance
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
@@ -49,6 +49,32 @@ def fit_black_box(
     hold = pairs[0][1]
     dt = hold.period if isinstance(hold, PeriodicHold) else _input_dt(sets[0])
     return _estimate(chart, solution, objective, hold, dt, names)
+
+
+def reference_cost(
+    order: int,
+    feedthrough: bool,
+    sets: Sequence[Any],
+    weights: Sequence[Any],
+    options: Options,
+) -> float | None:
+    """Cost that a black box of this order reaches in a few steps; None where it has no start.
+
+    An input that runs in straight lines reaches the output of the same sample through any plant.
+    """
+    shape = len(sets[0].output_names), len(sets[0].input_names)
+    if any(getattr(d, "factor", 1) > 1 for d in sets):
+        return None
+    try:
+        plane = plane_for(_lines(sets, shape, options))
+        pairs = [prepare(d, shape, w, options, plane) for d, w in zip(sets, weights, strict=True)]
+        lines = [e for e, _ in pairs if isinstance(e, SpectralExperiment)]
+        direct = feedthrough or isinstance(pairs[0][1], FirstOrderHold)
+        chart = Chart(identify(lines, order, direct), direct, plane)
+        solution = minimise(Objective(chart, lines), np.zeros(chart.size), limit=12)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    return solution.point.cost
 
 
 def _without_zero(initial_state: str) -> str:

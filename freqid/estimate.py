@@ -27,7 +27,8 @@ class Estimate:
     """The result of ``fit``.
 
     ``model`` is the model at the estimate; ``cost`` the least weighted sum of squared errors, in
-    units of the output squared; ``fit_percent`` 100·(1 − √(cost / energy of the data fitted));
+    units of the output squared; ``n_agreed`` of ``n_starts`` starts
+    ended in the minimum reported; ``fit_percent`` 100·(1 − √(cost / energy of the data fitted));
     ``warnings`` the reasons for which the result should not be trusted, in sentences.
     """
 
@@ -45,6 +46,8 @@ class Estimate:
     hold: Hold
     dt: float
     n_rows: int
+    n_starts: int = 1
+    n_agreed: int = 1
     warnings: list[str] = field(default_factory=list)
 
     def __getitem__(self, name: str) -> float:

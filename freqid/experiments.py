@@ -26,8 +26,10 @@ from freqid.responses import (
     Basis,
     Linearisation,
     Plane,
+    StateSpace,
     basis_of,
     points,
+    response_and_derivatives,
     sum_runs,
     transition,
 )
@@ -46,6 +48,19 @@ class Realisation:
     def of(cls, linearisation: Linearisation) -> Realisation:
         """Choose the state coordinates for these matrices."""
         return cls(linearisation, basis_of(*linearisation))
+
+    def scaled(self, by: FloatArray) -> Realisation:
+        """The same point with each derivative multiplied, (P,)."""
+        at, d = self.linearisation
+        factor = by[:, None, None]
+        return Realisation.of(Linearisation(at, StateSpace(*(M * factor for M in d))))
+
+
+def sampled_response(
+    realisation: Realisation, omega: FloatArray, hold: Hold
+) -> tuple[ComplexArray, ComplexArray]:
+    """Response (outputs, inputs, lines) through a hold and its derivatives, parameters first."""
+    return response_and_derivatives(realisation.basis, omega, hold)
 
 
 class Evaluation(Protocol):
@@ -80,6 +95,7 @@ class SpectralExperiment:
         lift: int = 1,
         plane: Plane | None = None,
     ) -> None:
+        self.omega, self.omega_input = omega, omega_input
         self.hold, self.U, self.Y, self.scale, self.lift = hold, U, Y, scale, lift
         self.aliases = omega_input.size // len(omega)
         self.transient_dt = transient_dt

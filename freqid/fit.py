@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from freqid.black_box import fit_black_box
-from freqid.checks import FloatArray, choice, unknown
+from freqid.black_box import fit_black_box, reference_cost
+from freqid.checks import FloatArray, choice, unknown, whole
 from freqid.estimate import Estimate
-from freqid.experiments import Realisation
+from freqid.experiments import Realisation, SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import Hold
 from freqid.models import GreyBox
-from freqid.optimise import Objective, Solution, minimise, noise_variance
+from freqid.optimise import Objective, minimise, noise_variance
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import OutputError
 from freqid.record import Record
-from freqid.responses import Linearisation, StateSpace
+from freqid.responses import Linearisation, StateSpace, many_responses
+from freqid.starts import Found, log_targets, noise_floor, search
 from freqid.trust import physical_warnings, uncertainty
 
 
@@ -44,6 +45,11 @@ class GreyStructure:
         by = self.scale[:, None, None]
         return Realisation.of(Linearisation(at, StateSpace(*(M * by for M in d))))
 
+    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
+        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
+        columns = dict(zip(self.names, (points * self.scale).T, strict=True))
+        return many_responses(self.model.state_spaces(**columns), omega, hold)
+
     def describe(self, x: FloatArray) -> str:
         """The parameter values at x."""
         return ", ".join(f"{n}={v:g}" for n, v in zip(self.names, x * self.scale, strict=True))
@@ -58,6 +64,8 @@ def fit(
     weights: Any = None,
     initial_state: str = "estimate",
     start: Mapping[str, float] | None = None,
+    n_starts: int | str = "auto",
+    seed: int = 0,
     domain: str = "frequency",
 ) -> Estimate:
     """Estimate a model's free parameters by weighted least squares on the lines of a band.
@@ -77,6 +85,10 @@ def fit(
         initial_state: ``"estimate"`` (free), ``"zero"`` (the sampled model starts at rest) or
             ``"steady"`` (no transient).
         start: parameter values to begin from; the model's own where not given.
+        n_starts: how many starts to try: the first, then scattered ones inside the bounds or
+            within a factor of ten of the first. ``"auto"`` stops when two agree on the best
+            minimum, and after one that explains the data to their noise.
+        seed: of the scattered starts.
         domain: ``"frequency"`` or ``"time"``, the paper's output error.
 
     Returns an Estimate. Raises ValueError for arguments that do not fit the data or the model.
@@ -92,6 +104,8 @@ def fit(
     """
     choice("domain", domain, ("frequency", "time"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
+    count = None if n_starts == "auto" else whole("n_starts", n_starts)
+    whole("seed", seed, least=0)
     sets = [data] if isinstance(data, (Record, FrequencyResponse)) else list(data)
     if not sets:
         raise ValueError("data=[] holds no experiment; give at least one record or response")
@@ -117,8 +131,43 @@ def fit(
     experiments = [experiment for experiment, _ in pairs]
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
-    solution = minimise(objective, structure.values / structure.scale)
-    return _estimate(structure, objective, solution, pairs[0][1], sets[0].dt)
+    found = _search(structure, objective, sets, all_weights, options, shape, count, seed)
+    return _estimate(structure, objective, found, pairs[0][1], sets[0].dt)
+
+
+def _search(
+    structure: GreyStructure,
+    objective: Objective,
+    sets: Sequence[Any],
+    weights: Sequence[Any],
+    options: Options,
+    shape: tuple[int, int],
+    n_starts: int | None,
+    seed: int,
+) -> Found:
+    """The best minimum; fits in time look for it at the lines of the same data, then polish."""
+    start = structure.values / structure.scale
+    at = structure.model.state_space()
+    order, direct = len(at.A), bool(at.D.any())
+    at_lines = Options(options.hold, options.band, _without_zero(options), "frequency")
+
+    def reference() -> float | None:
+        return reference_cost(order, direct, sets, weights, at_lines)
+
+    if all(isinstance(e, SpectralExperiment) for e in objective.experiments):
+        targets, floor = log_targets(objective.experiments), noise_floor(objective.experiments)
+        return search(objective, start, targets, n_starts, seed, floor, reference)
+    twins = [prepare(d, shape, w, at_lines)[0] for d, w in zip(sets, weights, strict=True)]
+    twin = Objective(structure, twins)
+    targets, floor = log_targets(twins), noise_floor(twins)
+    found = search(twin, start, targets, n_starts, seed, floor, reference)
+    objective.n_evaluations = twin.n_evaluations
+    return Found(minimise(objective, found.solution.x), found.n_starts, found.n_agreed)
+
+
+def _without_zero(options: Options) -> str:
+    """The initial state that a fit at the lines has in place of one at rest."""
+    return "estimate" if options.initial_state == "zero" else options.initial_state
 
 
 def _started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:
@@ -133,11 +182,12 @@ def _started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:
 def _estimate(
     structure: GreyStructure,
     objective: Objective,
-    solution: Solution,
+    found: Found,
     hold: Hold,
     dt: float,
 ) -> Estimate:
-    point, scale = solution.point, structure.scale
+    solution, scale = found.solution, structure.scale
+    point = solution.point
     values = solution.x * scale
     energy = sum(e.energy for e in objective.experiments)
     n_rows = sum(e.n_rows for e in objective.experiments)
@@ -160,5 +210,7 @@ def _estimate(
         hold=hold,
         dt=dt,
         n_rows=n_rows,
+        n_starts=found.n_starts,
+        n_agreed=found.n_agreed,
         warnings=warnings,
     )

@@ -18,8 +18,9 @@ from freqid.holds import Hold
 from freqid.responses import (
     Linearisation,
     StateSpace,
+    basis_of,
     frequency_response,
-    response_derivatives,
+    response_and_derivatives,
 )
 
 Matrices = Callable[..., Sequence[Any]]
@@ -168,6 +169,16 @@ class GreyBox:
         """
         return _shaped(self.matrices(**{**self.values, **values}), self.values | values)
 
+    def state_spaces(self, **columns: FloatArray) -> StateSpace:
+        """A, B, C, D at many points at once: each argument (S,), each matrix (S, …)."""
+        count = len(next(iter(columns.values())))
+        full = {n: columns.get(n, np.full(count, v)) for n, v in self.values.items()}
+        if self.vectorized:
+            return StateSpace(*(np.asarray(M, dtype=float) for M in self.matrices(**full)))
+        rows = [dict(zip(full, row, strict=True)) for row in np.array(list(full.values())).T]
+        each = [_dense(self.matrices(**{k: float(v) for k, v in r.items()}), float) for r in rows]
+        return StateSpace(*(np.stack(M) for M in zip(*each, strict=True)))
+
     def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
         """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
 
@@ -186,7 +197,7 @@ class GreyBox:
         """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``."""
         lin = self.linearise(self.values, names)
         frf = self.frequency_response(omega, hold)
-        J = response_derivatives(lin, frf.omega, hold)
+        _, J = response_and_derivatives(basis_of(*lin), frf.omega, hold)
         known = np.where(np.isfinite(covariance), covariance, 0)
         variance = np.einsum("apmk,ab,bpmk->pmk", J.conj(), known, J).real
         return dataclasses.replace(frf, variance=variance)

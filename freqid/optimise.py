@@ -18,6 +18,7 @@ import scipy.optimize
 
 from freqid.checks import FloatArray
 from freqid.experiments import Experiment, Realisation
+from freqid.holds import Hold
 
 
 class Structure(Protocol):
@@ -32,6 +33,10 @@ class Structure(Protocol):
 
     def describe(self, x: FloatArray) -> str:
         """The trial point in the user's words, for errors."""
+        ...
+
+    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
+        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
         ...
 
 
@@ -155,10 +160,13 @@ def noise_variance(objective: Objective, point: Point, n_parameters: int) -> flo
 _WALL = 1e100
 
 
-def minimise(objective: Objective, start: FloatArray, tolerance: float = 1e-14) -> Solution:
+def minimise(
+    objective: Objective, start: FloatArray, tolerance: float = 1e-14, limit: int | None = None
+) -> Solution:
     """Least squares from one start: Levenberg-Marquardt, or trust-region reflective with bounds.
 
-    Raises ValueError when the model cannot be computed at the start.
+    ``limit`` is the most evaluations. Raises ValueError when the model cannot be computed at the
+    start.
     """
     first = objective.point(start)
     if first is None:
@@ -186,9 +194,9 @@ def minimise(objective: Objective, start: FloatArray, tolerance: float = 1e-14) 
         method="trf" if bounded else "lm",
         x_scale="jac",
         ftol=max(tolerance, 1e-15),
-        xtol=1e-12,
+        xtol=max(1e-2 * tolerance, 1e-12),
         gtol=1e-15,
-        max_nfev=200 * size if bounded else 400 * size,
+        max_nfev=limit or 400 * size,
     )
     point = objective.point(result.x)
     if point is None:

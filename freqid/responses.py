@@ -15,7 +15,7 @@ Axes: (…, states, channels, lines). Leading axes are a batch of plants; only e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -206,10 +206,7 @@ class EigenBasis:
                 powers, dpowers = self._powers(hold.period, lift)
                 phi, dphi = powers[-1], dpowers[-1]
                 gamma, following, dgamma, dfollowing = _lifted_inputs(
-                    *step,
-                    lambda k, x: powers[k][:, None] * x,
-                    lambda k, x: dpowers[k] @ x,
-                    lift,
+                    *step, powers[:, :, None] * np.eye(len(phi)), dpowers
                 )
                 D, dD = _widened(D, lift), _widened(dD, lift)
         return SampledPlant(
@@ -230,35 +227,38 @@ class EigenBasis:
 
 
 def _lifted_inputs(
-    step: Sampled,
-    change: Sampled,
-    power: Callable[[int, Array], Array],
-    dpower: Callable[[int, Array], Array],
-    lift: int,
+    step: Sampled, change: Sampled, powers: Array, dpowers: Array
 ) -> tuple[Array, Array | None, Array, Array | None]:
-    """Γ and Γ⁺ of the lifted plant and their derivatives, the inputs of one slow period in turn."""
-    columns, dcolumns = [], []
-    for i in range(lift):
-        left = lift - 1 - i
-        columns.append(power(left, step.gamma))
-        dcolumns.append(dpower(left, step.gamma) + power(left, change.gamma))
-        if step.gamma_next is not None and i > 0:
-            columns[-1] = columns[-1] + power(left + 1, step.gamma_next)
-            dcolumns[-1] = (
-                dcolumns[-1]
-                + dpower(left + 1, step.gamma_next)
-                + power(left + 1, change.gamma_next)
-            )
-    gamma, dgamma = np.concatenate(columns, axis=-1), np.concatenate(dcolumns, axis=-1)
+    """Γ and Γ⁺ of the lifted plant and their derivatives, the inputs of one slow period in turn.
+
+    ``powers`` (M + 1, n, n) are Φ^k for k = 0 … M, ``dpowers`` (M + 1, P, n, n) their derivatives.
+    """
+
+    def columns(first: int, last: int, G: Array, dG: Array) -> tuple[Array, Array]:
+        # Φ^k G and its derivative for k from last down to first
+        P, dP = powers[first : last + 1][::-1], dpowers[first : last + 1][::-1]
+        return P @ G, dP @ G + P[:, None] @ dG
+
+    lift = len(powers) - 1
+    gamma, dgamma = columns(0, lift - 1, step.gamma, change.gamma)
     if step.gamma_next is None:
-        return gamma, None, dgamma, None
+        return _in_turn(gamma), None, _in_turn(dgamma), None
+    following, dfollowing = columns(1, lift - 1, step.gamma_next, change.gamma_next)
+    gamma[1:] += following
+    dgamma[1:] += dfollowing
     # the sample after the last one of a period is the first one of the next
     return (
-        gamma,
+        _in_turn(gamma),
         _widened(step.gamma_next, lift),
-        dgamma,
+        _in_turn(dgamma),
         _widened(change.gamma_next, lift),
     )
+
+
+def _in_turn(blocks: Array) -> Array:
+    """Blocks (M, …, n, m) side by side, (…, n, M m)."""
+    moved = np.moveaxis(blocks, 0, -2)
+    return moved.reshape(*moved.shape[:-2], -1)
 
 
 def _widened(M: Array, lift: int) -> Array:
@@ -297,9 +297,7 @@ class SchurBasis:
                 step = Sampled(phi, gamma, following), Sampled(dphi, dgamma, dfollowing)
                 powers, dpowers = self._powers(hold.period, lift)
                 phi, dphi = powers[-1], dpowers[-1]
-                gamma, following, dgamma, dfollowing = _lifted_inputs(
-                    *step, lambda k, x: powers[k] @ x, lambda k, x: dpowers[k] @ x, lift
-                )
+                gamma, following, dgamma, dfollowing = _lifted_inputs(*step, powers, dpowers)
                 D, dD = _widened(D, lift), _widened(dD, lift)
         return SampledPlant(
             np.triu(Qh @ phi @ Q),
@@ -315,7 +313,7 @@ class SchurBasis:
             True,
         )
 
-    def _powers(self, period: float, lift: int) -> tuple[list[Array], list[Array]]:
+    def _powers(self, period: float, lift: int) -> tuple[Array, Array]:
         """Φ^k and its derivatives for k = 0 … lift, each from its own exponential."""
         n, count = len(self.at.A), len(self.derivative.A)
         powers, dpowers = [np.eye(n)], [np.zeros((count, n, n))]
@@ -325,7 +323,7 @@ class SchurBasis:
             )
             powers.append(value.phi)
             dpowers.append(change.phi)
-        return powers, dpowers
+        return np.array(powers), np.array(dpowers)
 
 
 def _rescaled(system: StateSpace, scale: FloatArray) -> StateSpace:
@@ -407,16 +405,32 @@ def transfer(plant: SampledPlant, z: ComplexArray) -> ComplexArray:
     return plant.output(plant.solve(z, plant.drive(z, U)), U)
 
 
-def response_derivatives(
-    lin: Linearisation, omega: FloatArray, hold: Hold | None = None
-) -> ComplexArray:
-    """Exact derivatives of the response by each parameter, (P, outputs, inputs, lines)."""
+def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArray:
+    """Responses of a batch of plants, (S, outputs, inputs, lines); NaN where A is defective."""
+    eigenvalues, V = np.linalg.eig(at.A)
+    V = V.astype(complex)
+    try:
+        inverse = np.linalg.inv(V)
+    except np.linalg.LinAlgError:
+        inverse = np.full_like(V, np.nan)
+    none = StateSpace(*(np.zeros((len(M), 0, *M.shape[1:])) for M in at))
+    basis = EigenBasis(at, none, (eigenvalues.astype(complex), V, inverse))
+    plant, z = basis.through(hold), points(omega, hold)
+    m = at.B.shape[-1]
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
+    return plant.output(plant.solve(z, plant.drive(z, U)), U)
+
+
+def response_and_derivatives(
+    basis: Basis, omega: FloatArray, hold: Hold | None = None
+) -> tuple[ComplexArray, ComplexArray]:
+    """Response (outputs, inputs, lines) and its exact derivatives, with the parameters first."""
     between = BandLimited() if hold is None else hold
-    plant, z = basis_of(*lin).through(between), points(omega, between)
-    m = lin.at.B.shape[1]
+    plant, z = basis.through(between), points(omega, between)
+    m = plant.gamma.shape[-1]
     U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
     x = plant.solve(z, plant.drive(z, U))
-    return plant.sensitivity(z, plant.output_rows(z), x, U)
+    return plant.output(x, U), plant.sensitivity(z, plant.output_rows(z), x, U)
 
 
 def frequency_response(
