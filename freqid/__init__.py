@@ -1,8 +1,10 @@
 """freqid: physical parameters from chirp experiments, whatever the input did between samples."""
 
+from freqid import paper
 from freqid.estimate import Estimate
 from freqid.estimators import etfe
 from freqid.excitation import chirp, sine
+from freqid.files import read, write
 from freqid.fit import fit
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
@@ -31,9 +33,12 @@ __all__ = [
     "first_order",
     "fit",
     "nyquist",
+    "paper",
     "plot_coherence",
     "plot_record",
+    "read",
     "simulate",
     "sine",
     "two_mass",
+    "write",
 ]

@@ -74,6 +74,21 @@ class Evaluation(Protocol):
         ...
 
 
+class Experiment(Protocol):
+    """A data set as residuals. ``n_rows`` counts real values; ``energy`` is a zero model's cost."""
+
+    n_rows: int
+
+    @property
+    def energy(self) -> float:
+        """Weighted energy of the data, the cost of a model that is zero."""
+        ...
+
+    def at(self, realisation: Realisation) -> Evaluation:
+        """Evaluate at one trial point."""
+        ...
+
+
 class SpectralExperiment:
     """DFT lines of a record, or of a frequency response, against the model's.
 
@@ -307,6 +322,3 @@ def _independent(columns: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
     _, s, Vt = np.linalg.svd(columns / pair, full_matrices=False)
     mix = (Vt[:n][s[:n] > 1e-11 * s[0]] / pair).T
     return mix, columns @ mix
-
-
-Experiment = SpectralExperiment | TimeExperiment

@@ -145,7 +145,7 @@ def _search(
     n_starts: int | None,
     seed: int,
 ) -> Found:
-    """The best minimum; fits in time look for it at the lines of the same data, then polish."""
+    """The best minimum; a fit in time looks for it at the lines of the same data, then polishes."""
     start = structure.values / structure.scale
     at = structure.model.state_space()
     order, direct = len(at.A), bool(at.D.any())
@@ -162,7 +162,10 @@ def _search(
     targets, floor = log_targets(twins), noise_floor(twins)
     found = search(twin, start, targets, n_starts, seed, floor, reference)
     objective.n_evaluations = twin.n_evaluations
-    return Found(minimise(objective, found.solution.x), found.n_starts, found.n_agreed)
+    # a twin with an unstable estimate has no counterpart from rest: begin from the start too
+    polished = [minimise(objective, x) for x in (found.solution.x, start)]
+    best = min(polished, key=lambda solution: solution.point.cost)
+    return Found(best, found.n_starts, found.n_agreed)
 
 
 def _without_zero(options: Options) -> str:

@@ -35,6 +35,10 @@ class Structure(Protocol):
         """The trial point in the user's words, for errors."""
         ...
 
+
+class ScannableStructure(Structure, Protocol):
+    """A structure whose responses can be had at many trial points at once."""
+
     def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""
         ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -85,4 +86,4 @@ def _stack(rows: list[list[Any]]) -> Any:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-PLANTS = {"first-order": first_order, "two-mass": two_mass}
+PLANTS: dict[str, Callable[[], GreyBox]] = {"first-order": first_order, "two-mass": two_mass}

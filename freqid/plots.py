@@ -16,6 +16,7 @@ from freqid.style import context, line
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_OFFSETS = [(13, 3), (-13, 3), (3, -10), (3, 10)]
 _UNITS = {"rad/s": 1.0, "Hz": 1 / (2 * np.pi)}
 
 
@@ -95,7 +96,7 @@ def _bode_curve(
         low, high = np.maximum(magnitude - half, magnitude * 1e-3), magnitude + half
         if decibel:
             low, high = _in_decibel(low), _in_decibel(high)
-        colour = {"color": style.get("color"), "alpha": 0.2, "linewidth": 0}
+        colour: dict[str, Any] = {"color": style.get("color"), "alpha": 0.2, "linewidth": 0}
         amplitude.fill_between(x, low, high, **colour)
         turn = np.rad2deg(np.arcsin(np.minimum(half / magnitude, 1)))
         phase.fill_between(x, angle - turn, angle + turn, **colour)
@@ -135,12 +136,16 @@ def nyquist(
                     if frf.omega[0] <= at <= frf.omega[-1]:
                         point = np.interp(at, frf.omega, G.real), np.interp(at, frf.omega, G.imag)
                         ax.plot(*point, "o", markersize=4, color=style.get("color"))
+                        # each curve's labels stand off in a direction of their own
                         ax.annotate(
                             f"{tick:g}",
                             point,
-                            xytext=(4, 4),
+                            xytext=_OFFSETS[index % len(_OFFSETS)],
                             textcoords="offset points",
+                            ha="center",
+                            va="center",
                             fontsize=8,
+                            color=style.get("color"),
                         )
         ax.set(xlabel="real part", ylabel="imaginary part")
         ax.set_aspect("equal", adjustable="datalim")

@@ -17,7 +17,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import Experiment, Realisation, SpectralExperiment, sampled_response
 from freqid.holds import PeriodicHold
-from freqid.optimise import Objective, Solution, Structure, minimise
+from freqid.optimise import Objective, ScannableStructure, Solution, Structure, minimise
 
 # scattered points that are looked at before the best of them are walked from
 _GLANCES = 512
@@ -52,7 +52,11 @@ class LogResponse:
     def __init__(self, omega: FloatArray, response: ComplexArray, hold: Any) -> None:
         self.omega, self.measured, self.hold = omega, response, hold
         self.n_rows = 2 * response.size
-        self.energy = float(self.n_rows)
+
+    @property
+    def energy(self) -> float:
+        """Errors of one neper and one radian at every line."""
+        return float(self.n_rows)
 
     def at(self, realisation: Realisation) -> _LogEvaluation:
         """Evaluate at one trial point."""
@@ -60,14 +64,13 @@ class LogResponse:
 
 
 class _LogEvaluation:
-    transient = None
-
     def __init__(self, target: LogResponse, realisation: Realisation) -> None:
         G, self.dG = sampled_response(realisation, target.omega, target.hold)
         self.G = G
         ratio = G / target.measured
         error = np.log(np.abs(ratio)) + 1j * np.angle(ratio)
         self.residual = error.reshape(-1).view(float)
+        self.transient: FloatArray | None = None
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         relative = self.dG / self.G
@@ -266,7 +269,7 @@ def _promising(
     seed: int,
 ) -> FloatArray:
     """Scattered points in order of their cost: a look at many is cheaper than a walk from one."""
-    structure = objective.structure
+    structure: ScannableStructure = objective.structure  # type: ignore[assignment]
     if targets:
         points = _scatter(structure, start, max(_GLANCES, count), seed)
         cost = np.zeros(len(points))

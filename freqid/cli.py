@@ -1,0 +1,238 @@
+"""The command line: freqid reproduce, demo, frf and fit."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import cyclopts
+import numpy as np
+from cyclopts import Parameter as Option
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+import freqid as fq
+from freqid.files import whole_file
+from freqid.plants import PLANTS
+
+notes = Console(stderr=True)
+app = cyclopts.App(
+    name="freqid",
+    help="Physical parameters from chirp experiments, whatever the input did between the samples.",
+    version=fq.__version__,
+    result_action="return_value",
+)
+
+Band = Annotated[tuple[float, float] | None, Option(help="lowest and highest frequency in Hz")]
+Hold = Annotated[
+    str | None,
+    Option(
+        help="what the input did between samples: zoh, foh or bl at the record's sample time, or "
+        "zoh:PERIOD, foh:PERIOD in s; by default what the record remembers"
+    ),
+]
+Dt = Annotated[float | None, Option(help="sample time in s, for data without a time column")]
+Columns = Annotated[list[str] | None, Option(consume_multiple=True)]
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point: 0 done, 1 the fit did not converge, 2 bad arguments or bad input."""
+    try:
+        status = app(arguments, exit_on_error=False, print_error=False)
+    except cyclopts.CycloptsError as error:
+        _fail(str(error))
+    except (ValueError, FileNotFoundError, IsADirectoryError, PermissionError) as error:
+        _fail(str(error))
+    except KeyboardInterrupt:
+        _fail("interrupted")
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(message: str) -> None:
+    print(f"freqid: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _progress() -> Progress:
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        TimeElapsedColumn(),
+        console=notes,
+        transient=True,
+        disable=not notes.is_terminal,
+    )
+
+
+@app.command
+def reproduce(out: Path = Path("out")) -> None:
+    """Every figure, table and equation of the paper, into a folder and on the screen."""
+    from freqid.paper_figures import draw, save
+
+    _folder(out)
+    with _progress() as progress:
+        task = progress.add_task("Table 2", total=None)
+        table = fq.paper.table2()
+        _write(out / "table2.csv", lambda path: table.to_csv(path, index=False))
+        progress.update(task, description="equations 3, 6 and 15")
+        equations = fq.paper.equations()
+        _write(out / "equations.csv", lambda path: equations.to_csv(path, index=False))
+        for number in range(1, 11):
+            progress.update(task, description=f"Figure {number} of 10")
+            save(draw(number), number, out)
+    _show("Table 2: two-mass plant, decimated by 10", table)
+    _show("Equations", equations)
+    print(
+        f"Phase of G_T1 against G_T2 at 50 rad/s: {fq.paper.phase_difference():.4f} degrees "
+        "(paper: about 7)"
+    )
+    print("Two printed values do not fit the rest:")
+    for what, note in fq.paper.NOTES.items():
+        print(f"  {what}: {note}")
+    for name, estimate in (("ZOH", fq.paper.study().zoh), ("FOH", fq.paper.study().foh)):
+        for warning in estimate.warnings:
+            print(f"  {name} estimate: {warning}")
+    print(f"Figures 1 to 10 (.png, .pdf), table2.csv and equations.csv are in {out}/")
+
+
+@app.command
+def demo(out: Path = Path("data")) -> None:
+    """Write the paper's chirp experiment as CSV at both rates."""
+    _folder(out)
+    s = fq.paper.study_records()
+    for name, record in (("chirp_fast.csv", s[0]), ("chirp_slow.csv", s[1])):
+        fq.write(record, out / name)
+        print(f"{out / name}: {record!r}")
+
+
+@app.command
+def frf(
+    data: Path,
+    *,
+    input: Columns = None,
+    output: Columns = None,
+    dt: Dt = None,
+    band: Band = None,
+    method: Literal["etfe"] = "etfe",
+    out: Path | None = None,
+    plot: Path | None = None,
+) -> None:
+    """Frequency response of a record, to the screen, a CSV file or a picture."""
+    response = fq.etfe(fq.read(data, input, output, dt), band)
+    frame = response.to_frame()
+    if out is not None:
+        _write(out, lambda path: frame.to_csv(path, index=False))
+    if plot is not None:
+        axes = fq.bode(response, labels=[data.name], unit="Hz")
+        _write(plot, lambda path: axes[0].figure.savefig(path))
+    if out is None and plot is None:
+        print(frame.to_string(index=False))
+    else:
+        print(repr(response)[1:-1])
+
+
+@app.command
+def fit(
+    data: Path,
+    *,
+    model: Literal["two-mass", "first-order", "output-error"],
+    order: int = 3,
+    input: Columns = None,
+    output: Columns = None,
+    dt: Dt = None,
+    decimate: int = 1,
+    keep_input: bool = False,
+    hold: Hold = None,
+    band: Band = None,
+    domain: Literal["frequency", "time"] = "frequency",
+    initial_state: Literal["estimate", "zero", "steady"] = "estimate",
+    out: Path | None = None,
+) -> int:
+    """Estimate a model's parameters from a record.
+
+    Parameters
+    ----------
+    data
+        CSV file with a column of time and one for each channel.
+    model
+        two-mass (the paper's), first-order, or output-error, a black box of --order.
+    decimate
+        keep every so many-th sample before the fit; the hold is remembered.
+    keep_input
+        when decimating, keep the whole input (the lifted model).
+    out
+        JSON file for the estimate.
+    """
+    record = fq.read(data, input, output, dt)
+    if decimate != 1:
+        record = record.decimate(decimate, keep_input=keep_input)
+    plant = fq.OutputError(order) if model == "output-error" else _plant(model)
+    between = _hold(hold)
+    with _progress() as progress:
+        progress.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
+        estimate = fq.fit(
+            plant, record, hold=between, band=band, domain=domain, initial_state=initial_state
+        )
+    if out is not None:
+        text = json.dumps(_plain(estimate.to_dict()), indent=2, allow_nan=False)
+        _write(out, lambda path: path.write_text(text + "\n"))
+    _show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
+    print(
+        f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
+        f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
+    )
+    for warning in estimate.warnings:
+        print(f"warning: {warning}")
+    return 0 if estimate.converged else 1
+
+
+def _hold(text: str | None) -> Any:
+    if text is None or ":" not in text:
+        return text
+    kind, _, period = text.partition(":")
+    kinds = {"zoh": fq.ZeroOrderHold, "foh": fq.FirstOrderHold}
+    try:
+        return kinds[kind](float(period))
+    except (KeyError, ValueError):
+        raise ValueError(
+            f"--hold {text} is not a hold; expected zoh, foh, bl, zoh:PERIOD or foh:PERIOD (s)"
+        ) from None
+
+
+def _folder(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise ValueError(f"--out {out} is a file; give a folder")
+    out.mkdir(parents=True, exist_ok=True)
+
+
+def _write(path: Path, save: Callable[[Path], Any]) -> None:
+    with whole_file(path) as beside:
+        save(beside)
+
+
+def _plain(value: Any) -> Any:
+    """JSON has neither infinity nor NaN: null stands for both."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def _plant(name: str) -> fq.GreyBox:
+    return PLANTS[name]()
+
+
+def _show(title: str, frame: Any) -> None:
+    """A table whose columns are as wide as they need, for screens, pipes and papers alike."""
+    shown = frame.map(lambda v: f"{v:.5g}" if isinstance(v, float) else str(v))
+    print(f"{title}\n{shown.replace('nan', '').to_string(index=False)}\n")
+
+
+if __name__ == "__main__":
+    main()
