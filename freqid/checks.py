@@ -90,6 +90,7 @@ def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
 def unknown(name: str, value: Any, allowed: Iterable[str]) -> str:
     """Sentence for a name that is not among ``allowed``, with the nearest one as a hint."""
     names = [str(a) for a in allowed]
-    near = difflib.get_close_matches(str(value), names, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    folded = {n.casefold(): n for n in names}
+    near = difflib.get_close_matches(str(value).casefold(), folded, n=1, cutoff=0.5)
+    hint = f"; did you mean {folded[near[0]]!r}?" if near else ""
     return f"{name}={value!r} is not one of {', '.join(map(repr, names))}{hint}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -78,8 +79,8 @@ def fit(
         hold: what the input did between its samples; None is what each record remembers, a name
             means that hold at the record's own sample time, as other tools assume.
         band: (low, high) in Hz; None takes all lines, and the cost is the output error of the
-            time domain (Parseval). Where the input is faster than the output this is the input's
-            band.
+            time domain (Parseval), but for the line at zero of a plant that integrates. Where the
+            input is faster than the output this is the input's band.
         weights: None for ones (for a response its input spectrum, where known), ``"noise"`` for
             1/variance, or an array, (lines,) or (outputs, lines).
         initial_state: ``"estimate"`` (free), ``"zero"`` (the sampled model starts at rest) or
@@ -112,7 +113,8 @@ def fit(
     all_weights = weights if isinstance(weights, (list, tuple)) else [weights] * len(sets)
     if len(all_weights) != len(sets):
         raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
-    options = Options(hold, band, initial_state, domain)
+    integrates = isinstance(model, GreyBox) and _integrates(model)
+    options = Options(hold, band, initial_state, domain, integrates)
     if isinstance(model, OutputError):
         if start is not None:
             raise ValueError("start has no meaning for a black box, which needs none; leave it out")
@@ -149,7 +151,8 @@ def _search(
     start = structure.values / structure.scale
     at = structure.model.state_space()
     order, direct = len(at.A), bool(at.D.any())
-    at_lines = Options(options.hold, options.band, _without_zero(options), "frequency")
+    resting = "estimate" if options.initial_state == "zero" else options.initial_state
+    at_lines = dataclasses.replace(options, initial_state=resting, domain="frequency")
 
     def reference() -> float | None:
         return reference_cost(order, direct, sets, weights, at_lines)
@@ -168,9 +171,10 @@ def _search(
     return Found(best, found.n_starts, found.n_agreed)
 
 
-def _without_zero(options: Options) -> str:
-    """The initial state that a fit at the lines has in place of one at rest."""
-    return "estimate" if options.initial_state == "zero" else options.initial_state
+def _integrates(model: GreyBox) -> bool:
+    """Whether the plant has a pole at zero whatever its parameters, up to rounding."""
+    poles = np.abs(np.linalg.eigvals(model.state_space().A))
+    return bool((poles <= 1e-12 * max(poles.max(), 1.0)).any())
 
 
 def _started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:

@@ -234,7 +234,7 @@ def phi_functions(
     gap, middle = a - b, (a + b) / 2
     close = np.abs(gap) < 1
     half = np.where(close, gap / 2, 0)
-    sinhc = np.where(half == 0, 1, np.sinh(half) / np.where(half == 0, 1, half))
+    sinhc = _sinhc(half)
     apart = (phi0[..., :, None] - phi0[..., None, :]) / np.where(close, 1, gap)
     d0 = np.where(close, np.exp(np.where(close, middle, 0)) * sinhc, apart)
     # divide by the larger argument: y f[x, y] = g[x, y] − f(x)
@@ -247,11 +247,16 @@ def phi_functions(
     if both_small.any():
         s = _NODES
         angle = np.where(both_small, gap / 2, 0)[..., None] * s
-        ratio = np.where(angle == 0, 1, np.sinh(angle) / np.where(angle == 0, 1, angle))
-        kernel = s * np.exp(np.where(both_small, middle, 0)[..., None] * s) * ratio
+        kernel = s * np.exp(np.where(both_small, middle, 0)[..., None] * s) * _sinhc(angle)
         d1 = np.where(both_small, kernel @ _WEIGHTS, d1)
         d2 = np.where(both_small, kernel @ (_WEIGHTS * (1 - s)), d2)
     return (phi0, phi1, phi2), (d0, d1, d2)
+
+
+def _sinhc(x: ComplexArray) -> ComplexArray:
+    """sinh(x)/x, 1 at zero."""
+    tiny = np.abs(x) < 1e-9
+    return np.where(tiny, 1, np.sinh(x) / np.where(tiny, 1, x))
 
 
 def as_hold(hold: Hold | str | None, dt: float, remembered: Hold | None = None) -> Hold:

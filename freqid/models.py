@@ -167,7 +167,13 @@ class GreyBox:
         >>> first_order(b=3, a=2).state_space().A
         array([[-2.]])
         """
-        return _shaped(self.matrices(**{**self.values, **values}), self.values | values)
+        at = self.values | values
+        try:
+            matrices = self.matrices(**at)
+        except Exception as error:  # the user's function may raise anything
+            where = ", ".join(f"{k}={v:g}" for k, v in at.items())
+            raise ValueError(f"the model cannot be computed at {where}: {error}") from error
+        return _shaped(matrices, at)
 
     def state_spaces(self, **columns: FloatArray) -> StateSpace:
         """A, B, C, D at many points at once: each argument (S,), each matrix (S, …)."""

@@ -112,8 +112,8 @@ def table2() -> pd.DataFrame:
     holds the parameters' names too.
 
     >>> table = table2()
-    >>> round(table.loc["d", "zoh"], 1), round(table.loc["d", "lifted"], 6)
-    (-230.7, 10.0)
+    >>> table.loc["d", ["zoh", "lifted"]].astype(float).round(1).tolist()
+    [-230.7, 10.0]
     """
     import pandas as pd
 

@@ -19,12 +19,16 @@ from freqid.spectra import spectra
 
 @dataclass(frozen=True)
 class Options:
-    """The arguments of ``fit`` that say how the data are to be read."""
+    """How the data are to be read: arguments of ``fit``, and whether to leave out the zero line.
+
+    A plant that integrates answers at zero frequency with anything at all.
+    """
 
     hold: Hold | str | None = None
     band: tuple[float, float] | None = None
     initial_state: str = "estimate"
     domain: str = "frequency"
+    skip_zero: bool = False
 
 
 def prepare(
@@ -61,6 +65,8 @@ def prepare(
         assumed.period, data.input_dt, rtol=1e-9
     )
     s = spectra(data, options.band, lifted=bool(at_input) and plane is None)
+    if options.skip_zero:
+        s = s.without_zero()
     w = _weights(weights, s.Y.shape)
     free = options.initial_state == "estimate"
     taken = _sampled_at(assumed, data.input_dt, plane)

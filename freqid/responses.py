@@ -151,7 +151,7 @@ class SampledPlant:
             F = np.concatenate(factors, axis=-3)
             F = sum_runs(F, aliases)
             flat = F.reshape(*lead, F.shape[-3], -1)
-            row = (np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, -1)
+            row = (np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, lines // aliases)
             if push is not None:
                 driven = (w[..., None, o, :, None, :] * push).sum(axis=-3)
                 row = row + sum_runs(driven, aliases)
@@ -334,32 +334,37 @@ def _rescaled(system: StateSpace, scale: FloatArray) -> StateSpace:
 Basis = EigenBasis | SchurBasis
 
 
-def eigenvectors(A: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:
-    """Eigenvalues, V and V⁻¹ of A (…, n, n); None where any V is too badly conditioned.
+def eigenvectors(at: StateSpace) -> tuple[ComplexArray, ComplexArray, ComplexArray] | None:
+    """Eigenvalues, V and V⁻¹ of A (n, n); None where V is too badly conditioned.
 
-    The condition is that of V with its rows scaled alike, so that the units of the states (rad
-    beside rad/s) do not count.
+    The condition is that of the eigenvectors of the balanced A, so that the units of the states
+    (rad beside rad/s) do not count and near-multiple eigenvalues do. The sizes of B and C are
+    balanced with it, or scaling would hide a near-double integrator.
     """
-    eigenvalues, V = np.linalg.eig(A)
+    n = len(at.A)
+    bordered = np.zeros((n + 1, n + 1))
+    bordered[:n, :n] = at.A
+    bordered[:n, n] = np.abs(at.B).sum(axis=1)
+    bordered[n, :n] = np.abs(at.C).sum(axis=0)
+    _, _, _, scale, _ = scipy.linalg.lapack.dgebal(bordered, scale=1, permute=0)
+    scale = scale[:n]
+    eigenvalues, V = np.linalg.eig(at.A * scale / scale[:, None])
     V = V.astype(complex, copy=False)
     try:
         inverse = np.linalg.inv(V)
     except np.linalg.LinAlgError:
         return None
-    size = np.linalg.norm(V, axis=-1)
-    condition = np.linalg.norm(V / size[..., None], axis=(-2, -1)) * np.linalg.norm(
-        inverse * size[..., None, :], axis=(-2, -1)
-    )
-    if not np.all(condition < WORST_CONDITION):
+    # the columns of V have unit length; a multiple eigenvalue shows in the rows of its inverse
+    if not np.abs(inverse).max() * n < WORST_CONDITION:
         return None
-    return eigenvalues.astype(complex, copy=False), V, inverse
+    return eigenvalues.astype(complex, copy=False), V * scale[:, None], inverse / scale
 
 
 def basis_of(at: StateSpace, derivative: StateSpace | None = None) -> Basis:
     """Eigenvectors where they are good, Schur coordinates where they are not."""
     if derivative is None:
         derivative = StateSpace(*(np.zeros((0, *M.shape)) for M in at))
-    eigen = eigenvectors(at.A)
+    eigen = eigenvectors(at)
     return SchurBasis(at, derivative) if eigen is None else EigenBasis(at, derivative, eigen)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,19 @@ class Spectra:
     def frequency(self) -> FloatArray:
         """Frequency of the lines in Hz, (K,)."""
         return self.omega / (2 * np.pi)
+
+    def without_zero(self) -> Spectra:
+        """The same without the line at zero frequency."""
+        if self.omega[0] != 0:
+            return self
+        return dataclasses.replace(
+            self,
+            omega=self.omega[1:],
+            omega_input=self.omega_input[1:],
+            U=self.U[:, 1:],
+            Y=self.Y[:, 1:],
+            multiplicity=self.multiplicity[1:],
+        )
 
 
 def spectra(

@@ -1,0 +1,49 @@
+"""Shared plants, records and switches of the suite."""
+
+import matplotlib
+import numpy as np
+import pytest
+
+matplotlib.use("agg")
+
+import freqid as fq
+
+T1, T2 = 0.5e-3, 5e-3
+BAND = (10, 80)
+
+
+@pytest.fixture(scope="session")
+def plant():
+    return fq.two_mass()
+
+
+@pytest.fixture(scope="session")
+def fast(plant):
+    """The paper's experiment: cosine chirp, 10 s at 2 kHz, noise-free."""
+    return fq.simulate(plant, fq.chirp(10, 80, duration=10, dt=T1), dt=T1)
+
+
+@pytest.fixture(scope="session")
+def slow(fast):
+    return fast.decimate(10)
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    import matplotlib.pyplot as plt
+
+    plt.close("all")
+
+
+@pytest.fixture
+def relative_error():
+    def of(estimate, plant):
+        return max(abs(estimate[n] / plant[n] - 1) for n in estimate.names)
+
+    return of
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(20051)

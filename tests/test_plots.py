@@ -1,0 +1,90 @@
+"""Pictures take anything that has a response, and name their units."""
+
+import control
+import numpy as np
+import pytest
+
+import freqid as fq
+
+
+def test_bode_takes_everything(plant, slow):
+    est = fq.fit(plant, slow, hold="foh", band=(10, 80))
+    frf = fq.etfe(slow, band=(10, 80))
+    axes = fq.bode(frf, est, plant, plant.to_control(), control.c2d(plant.to_control(), 5e-3),
+                   labels=list("abcde"))  # fmt: skip
+    assert len(axes[0].get_lines()) == 5
+    assert axes[1].get_xlabel() == "frequency / (rad/s)"
+    assert "degrees" in axes[1].get_ylabel()
+    again = est.bode(ax=axes, unit="Hz", decibel=True)
+    assert again is axes
+    assert "Hz" in axes[1].get_xlabel()
+    assert "dB" in axes[0].get_ylabel()
+
+
+def test_phases_lie_next_to_each_other():
+    omega = np.linspace(1, 10, 50)
+    one = fq.FrequencyResponse(omega, np.exp(-1j * omega / 5))
+    turned = fq.FrequencyResponse(omega, np.exp(-1j * (omega / 5 + 2 * np.pi + 0.05)))
+    axes = fq.bode(one, turned)
+    a, b = (line.get_ydata() for line in axes[1].get_lines())
+    assert np.abs(a - b).max() < 5
+
+
+def test_nyquist_record_and_coherence(plant, slow):
+    ax = fq.nyquist(plant, omega=np.linspace(60, 500, 50), ticks=[20], unit="Hz", labels=["x"])
+    assert ax.get_xlabel() == "real part"
+    assert [t.get_text() for t in ax.texts] == ["20"]
+    _, bottom = fq.plot_record(slow)
+    assert "time / s" in bottom.get_xlabel()
+    frf = fq.FrequencyResponse([1.0, 2], [1, 1j], coherence=[0.9, 1])
+    assert fq.plot_coherence(frf).get_ylabel() == "coherence"
+    with pytest.raises(ValueError, match="no coherence"):
+        fq.plot_coherence(fq.FrequencyResponse([1.0], [1]))
+    with pytest.raises(ValueError, match="unit='kHz'"):
+        fq.bode(plant, unit="kHz")
+    with pytest.raises(ValueError, match="labels has 2"):
+        fq.bode(plant, labels=["a", "b"])
+    with pytest.raises(ValueError, match="cannot be drawn"):
+        fq.bode("plant")
+
+
+def test_frequency_response_to_control_and_back(slow):
+    frf = fq.etfe(slow, band=(10, 80))
+    back = fq.FrequencyResponse.from_control(frf.to_control(), hold=frf.hold)
+    assert np.allclose(back.frequency, frf.frequency)
+    assert np.array_equal(back.response, frf.response)
+    assert back.dt == frf.dt
+    frame = frf.to_frame()
+    assert len(frame) == 701
+    assert np.allclose(
+        frame["magnitude"] * np.exp(1j * np.deg2rad(frame["phase"])), frf.response[0, 0]
+    )
+    part = frf.select((20, 30))
+    assert part.frequency.min() == pytest.approx(20)
+    assert part.input_spectrum.shape == (1, 101)
+    with pytest.raises(ValueError, match="hold no frequency"):
+        frf.select((200, 300))
+    with pytest.raises(ValueError, match="increasing"):
+        fq.FrequencyResponse([2.0, 1], [1, 1])
+    with pytest.raises(ValueError, match="response has shape"):
+        fq.FrequencyResponse([1.0, 2], [1, 1, 1])
+
+
+def test_etfe_of_a_periodic_record_is_the_held_plant():
+    plant, dt, n = fq.first_order(), 1e-3, 1000
+    u = np.tile(np.random.default_rng(0).standard_normal(n), 6)
+    record = fq.simulate(plant, u, dt).slice(5 * n * dt)
+    frf = fq.etfe(record, band=(5, 100))
+    exact = plant.frequency_response(frf.omega, record.hold).response
+    assert np.abs(frf.response / exact - 1).max() < 1e-9
+    assert frf.hold == record.hold
+    with pytest.raises(ValueError, match="has 2 inputs"):
+        fq.etfe(fq.Record(np.ones((9, 2)), np.ones(9), 1))
+
+
+def test_no_global_setting_is_changed(plant):
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    fq.bode(plant)
+    assert dict(mpl.rcParams) == before
