@@ -165,9 +165,15 @@ def _search(
     targets, floor = log_targets(twins), noise_floor(twins)
     found = search(twin, start, targets, n_starts, seed, floor, reference)
     objective.n_evaluations = twin.n_evaluations
-    # a twin with an unstable estimate has no counterpart from rest: begin from the start too
-    polished = [minimise(objective, x) for x in (found.solution.x, start)]
-    best = min(polished, key=lambda solution: solution.point.cost)
+    # a twin with an unstable estimate has no counterpart from rest: the start may be nearer
+    points = [(x, objective.point(x)) for x in (found.solution.x, start)]
+    nearer = sorted((p.cost, i) for i, (_, p) in enumerate(points) if p is not None)
+    order_tried = [points[i][0] for _, i in nearer] or [start]
+    best = minimise(objective, order_tried[0])
+    for x in order_tried[1:]:
+        other = minimise(objective, x, limit=40)
+        if other.point.cost < best.point.cost * (1 - 1e-9):
+            best = minimise(objective, other.x)
     return Found(best, found.n_starts, found.n_agreed)
 
 
