@@ -12,7 +12,7 @@ Inverse Problems 19, 2003).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -20,12 +20,13 @@ import scipy.fft
 
 from freqid.checks import Array, ComplexArray, FloatArray
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import BandLimited, Hold, PeriodicHold, Sampled
+from freqid.holds import BandLimited, Hold, PeriodicHold, Sampled, ZeroOrderHold
 from freqid.record import Record
 from freqid.responses import (
     Basis,
     Linearisation,
     Plane,
+    SampledPlant,
     StateSpace,
     basis_of,
     points,
@@ -43,24 +44,47 @@ class Realisation:
 
     linearisation: Linearisation
     basis: Basis
+    # s; where the hold is estimated, its period, by which the last parameter counts
+    period: float | None = None
+    period_scale: float = 1.0
 
     @classmethod
-    def of(cls, linearisation: Linearisation) -> Realisation:
+    def of(
+        cls, linearisation: Linearisation, period: float | None = None, period_scale: float = 1.0
+    ) -> Realisation:
         """Choose the state coordinates for these matrices."""
-        return cls(linearisation, basis_of(*linearisation))
+        return cls(linearisation, basis_of(*linearisation), period, period_scale)
 
     def scaled(self, by: FloatArray) -> Realisation:
         """The same point with each derivative multiplied, (P,)."""
         at, d = self.linearisation
         factor = by[:, None, None]
-        return Realisation.of(Linearisation(at, StateSpace(*(M * factor for M in d))))
+        scale = self.period_scale * float(by[-1])
+        lin = Linearisation(at, StateSpace(*(M * factor for M in d)))
+        return Realisation.of(lin, self.period, scale)
+
+    def seen_through(
+        self, hold: Hold, lift: int, omega: FloatArray, z: ComplexArray
+    ) -> tuple[SampledPlant, ComplexArray, ComplexArray | None]:
+        """The sampled plant, z at ``omega`` and the derivative of z by an estimated period."""
+        if self.period is None:
+            return self.basis.through(hold, lift), z, None
+        hold = ZeroOrderHold(self.period)
+        z = points(omega, hold)
+        plant = self.basis.by_period(self.basis.through(hold))
+        s = self.period_scale
+        dphi, dgamma = plant.dphi.copy(), plant.dgamma.copy()
+        dphi[-1] *= s
+        dgamma[-1] *= s
+        return replace(plant, dphi=dphi, dgamma=dgamma), z, 1j * omega * z * s
 
 
 def sampled_response(
     realisation: Realisation, omega: FloatArray, hold: Hold
 ) -> tuple[ComplexArray, ComplexArray]:
     """Response (outputs, inputs, lines) through a hold and its derivatives, parameters first."""
-    return response_and_derivatives(realisation.basis, omega, hold)
+    plant, z, dz = realisation.seen_through(hold, 1, omega, points(omega, hold))
+    return response_and_derivatives(plant, z, dz)
 
 
 class Evaluation(Protocol):
@@ -197,14 +221,17 @@ class _SpectralEvaluation:
     def __init__(self, experiment: SpectralExperiment, realisation: Realisation) -> None:
         e, basis = experiment, realisation.basis
         self.experiment, self.basis = e, basis
-        self.plant = basis.through(e.hold, e.lift)
-        self.x = self.plant.solve(e.z, self.plant.drive(e.z, e.U_state))
+        self.plant, self.z, self.dz = realisation.seen_through(
+            e.hold, e.lift, e.omega_input.ravel(), e.z
+        )
+        self.x = self.plant.solve(self.z, self.plant.drive(self.z, e.U_state))
         y = sum_runs(self.plant.output(self.x, e.U), e.aliases)
         self.residual = e.rows(y - e.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
         if e.transient_dt is not None:
-            same = e.shared or e.discrete
+            self.shared = e.shared and realisation.period is None
+            same = self.shared or e.discrete
             self.free = self.plant if same else transition(basis, e.transient_dt)
             self._w = self.free.output_rows(e.z_free)
             # (outputs, states, K) to one column for each physical state
@@ -215,15 +242,17 @@ class _SpectralEvaluation:
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         e, plant = self.experiment, self.plant
         if initial is None or self._w is None:
-            w = plant.output_rows(e.z)
-            return e.rows(plant.sensitivity(e.z, w, self.x, e.U_state, e.aliases, e.U)).T
+            w = plant.output_rows(self.z)
+            return e.rows(
+                plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz)
+            ).T
         delta = (self.basis.to_basis @ initial)[:, None, None]
         x_free = self.free.solve(e.z_free, delta * e.free_factor)
-        if e.shared:
+        if self.shared:
             x = self.x + x_free
             return e.rows(plant.sensitivity(e.z, self._w, x, e.U_state, direct=e.U)).T
-        w = plant.output_rows(e.z)
-        forced = plant.sensitivity(e.z, w, self.x, e.U_state, e.aliases, e.U)
+        w = plant.output_rows(self.z)
+        forced = plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz)
         return e.rows(
             forced + self.free.sensitivity(e.z_free, self._w, x_free, None, e.free_aliases)
         ).T

@@ -9,51 +9,20 @@ from typing import Any
 import numpy as np
 
 from freqid.black_box import fit_black_box, reference_cost
-from freqid.checks import FloatArray, choice, unknown, whole
+from freqid.checks import choice, unknown, whole
 from freqid.estimate import Estimate
-from freqid.experiments import Realisation, SpectralExperiment
+from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import Hold
+from freqid.hold_tests import decimation_warning, rejected_hold
+from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
 from freqid.optimise import Objective, minimise, noise_variance
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import OutputError
 from freqid.record import Record
-from freqid.responses import Linearisation, StateSpace, many_responses
 from freqid.starts import Found, log_targets, noise_floor, search
+from freqid.structures import GreyStructure
 from freqid.trust import physical_warnings, uncertainty
-
-
-class GreyStructure:
-    """A grey box as the optimiser sees it: free parameters in units of their own size."""
-
-    def __init__(self, model: GreyBox) -> None:
-        self.model = model
-        self.parameters = model.free_parameters
-        self.names = [p.name for p in self.parameters]
-        self.values = np.array([p.value for p in self.parameters])
-        self.scale = np.where(self.values == 0, 1, np.abs(self.values))
-        self.lower = np.array([p.lower for p in self.parameters]) / self.scale
-        self.upper = np.array([p.upper for p in self.parameters]) / self.scale
-        self._fixed = model.values
-
-    def realise(self, x: FloatArray) -> Realisation:
-        """Matrices at x and their derivatives by x."""
-        values = self._fixed | dict(zip(self.names, (x * self.scale).tolist(), strict=True))
-        at, d = self.model.linearise(values, self.names)
-        if not all(np.isfinite(M).all() for M in (*at, *d)):
-            raise ArithmeticError("the matrices are not finite")
-        by = self.scale[:, None, None]
-        return Realisation.of(Linearisation(at, StateSpace(*(M * by for M in d))))
-
-    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
-        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
-        columns = dict(zip(self.names, (points * self.scale).T, strict=True))
-        return many_responses(self.model.state_spaces(**columns), omega, hold)
-
-    def describe(self, x: FloatArray) -> str:
-        """The parameter values at x."""
-        return ", ".join(f"{n}={v:g}" for n, v in zip(self.names, x * self.scale, strict=True))
 
 
 def fit(
@@ -77,7 +46,9 @@ def fit(
         model: a GreyBox, or OutputError(order) for a black box.
         data: a Record, a FrequencyResponse, or several; each record has its own initial state.
         hold: what the input did between its samples; None is what each record remembers, a name
-            means that hold at the record's own sample time, as other tools assume.
+            means that hold at the record's own sample time, as other tools assume;
+            ``"estimate"`` makes the period of a zero-order hold one more unknown. A hold that is
+            given here and that the data reject is reported in ``est.warnings``.
         band: (low, high) in Hz; None takes all lines, and the cost is the output error of the
             time domain (Parseval), but for the line at zero of a plant that integrates. Where the
             input is faster than the output this is the input's band.
@@ -114,7 +85,9 @@ def fit(
     if len(all_weights) != len(sets):
         raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
     integrates = isinstance(model, GreyBox) and _integrates(model)
-    options = Options(hold, band, initial_state, domain, integrates)
+    options = Options(
+        "zoh" if hold == "estimate" else hold, band, initial_state, domain, integrates
+    )
     if isinstance(model, OutputError):
         if start is not None:
             raise ValueError("start has no meaning for a black box, which needs none; leave it out")
@@ -124,8 +97,9 @@ def fit(
             f"model={type(model).__name__} is not a model; expected a GreyBox or OutputError"
         )
     model = _started(model, start)
-    structure = GreyStructure(model)
-    if not structure.names:
+    estimated = isinstance(hold, str) and hold == "estimate"
+    structure = GreyStructure(model, _common_dt(sets, domain, initial_state) if estimated else None)
+    if not structure.physical_names:
         raise ValueError("model has no free parameter; free one with model.free(name)")
     at = model.state_space()
     shape = (at.C.shape[0], at.B.shape[1])
@@ -134,7 +108,10 @@ def fit(
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     found = _search(structure, objective, sets, all_weights, options, shape, count, seed)
-    return _estimate(structure, objective, found, pairs[0][1], sets[0].dt)
+    est = _estimate(structure, objective, found, pairs[0][1], sets[0].dt)
+    if hold is None or estimated:
+        return est
+    return rejected_hold(est, structure, objective)
 
 
 def _search(
@@ -148,7 +125,7 @@ def _search(
     seed: int,
 ) -> Found:
     """The best minimum; a fit in time looks for it at the lines of the same data, then polishes."""
-    start = structure.values / structure.scale
+    start = structure.start
     at = structure.model.state_space()
     order, direct = len(at.A), bool(at.D.any())
     resting = "estimate" if options.initial_state == "zero" else options.initial_state
@@ -183,6 +160,19 @@ def _integrates(model: GreyBox) -> bool:
     return bool((poles <= 1e-12 * max(poles.max(), 1.0)).any())
 
 
+def _common_dt(sets: Sequence[Any], domain: str, initial_state: str) -> float:
+    """The sample time in which an estimated hold is measured; ValueError where there is none."""
+    if domain == "time" or initial_state == "zero":
+        raise ValueError("hold='estimate' needs domain='frequency' and no initial state at rest")
+    times = {float(getattr(d, "input_dt", d.dt)) for d in sets if hasattr(d, "dt")}
+    if len(times) != 1 or 0.0 in times or any(getattr(d, "factor", 1) > 1 for d in sets):
+        raise ValueError(
+            "hold='estimate' needs data of one sample time, the same for input and output: an "
+            "input that was kept at its own rate tells its hold"
+        )
+    return times.pop()
+
+
 def _started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:
     if start is None:
         return model
@@ -207,13 +197,18 @@ def _estimate(
     noise = noise_variance(objective, point, len(values))
     u = uncertainty(point.jacobian / scale, values, structure.names, noise, np.sqrt(energy))
     warnings = [] if solution.converged else [f"not converged: {solution.message}"]
-    warnings += u.warnings + physical_warnings(structure.parameters, values)
+    count = len(structure.parameters)
+    warnings += u.warnings + physical_warnings(structure.parameters, values[:count])
+    if structure.dt is not None:
+        hold = ZeroOrderHold(values[-1])
+        warnings += decimation_warning(values[-1], np.sqrt(u.covariance[-1, -1]), dt)
+    named = dict(zip(structure.physical_names, values[:count], strict=True))
     return Estimate(
-        model=structure.model.with_values(**dict(zip(structure.names, values, strict=True))),
+        model=structure.model.with_values(**named),
         names=structure.names,
         values=values,
-        nominal=structure.values,
-        units=[p.unit for p in structure.parameters],
+        nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),
+        units=[*(p.unit for p in structure.parameters), "s"][: len(values)],
         covariance_matrix=u.covariance,
         cost=point.cost,
         fit_percent=100 * (1 - np.sqrt(point.cost / energy)),

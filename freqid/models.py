@@ -14,12 +14,13 @@ import numpy as np
 
 from freqid.checks import Array, FloatArray, finite, unknown
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import Hold
+from freqid.holds import BandLimited, Hold
 from freqid.responses import (
     Linearisation,
     StateSpace,
     basis_of,
     frequency_response,
+    points,
     response_and_derivatives,
 )
 
@@ -203,7 +204,9 @@ class GreyBox:
         """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``."""
         lin = self.linearise(self.values, names)
         frf = self.frequency_response(omega, hold)
-        _, J = response_and_derivatives(basis_of(*lin), frf.omega, hold)
+        between = BandLimited() if hold is None else hold
+        plant = basis_of(*lin).through(between)
+        _, J = response_and_derivatives(plant, points(frf.omega, between))
         known = np.where(np.isfinite(covariance), covariance, 0)
         variance = np.einsum("apmk,ab,bpmk->pmk", J.conj(), known, J).real
         return dataclasses.replace(frf, variance=variance)

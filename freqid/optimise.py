@@ -37,7 +37,11 @@ class Structure(Protocol):
 
 
 class ScannableStructure(Structure, Protocol):
-    """A structure whose responses can be had at many trial points at once."""
+    """A structure that can be looked at in many trial points at once."""
+
+    def span(self, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest values to scatter starts over."""
+        ...
 
     def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""

@@ -15,6 +15,7 @@ Axes: (…, states, channels, lines). Leading axes are a batch of plants; only e
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -111,13 +112,15 @@ class SampledPlant:
         U: ComplexArray | None,
         aliases: int = 1,
         direct: ComplexArray | None = None,
+        dz: ComplexArray | None = None,
     ) -> ComplexArray:
         """dy for each parameter, (…, P, outputs, channels, lines / aliases).
 
         ``w`` is ``output_rows(z)`` and ``x`` the state. Runs of ``aliases`` lines are summed: the
         products of w with x and U do not depend on the parameter, so they are summed before the
         parameters enter in one matrix product. With many inputs dΓ u is formed first, which takes
-        fewer products than w and u together.
+        fewer products than w and u together. ``direct`` is the input that D multiplies, where it
+        is not U; ``dz`` the derivative of z itself by the last parameter.
         """
         n, p = w.shape[-2], w.shape[-3]
         lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
@@ -155,6 +158,9 @@ class SampledPlant:
             if push is not None:
                 driven = (w[..., None, o, :, None, :] * push).sum(axis=-3)
                 row = row + sum_runs(driven, aliases)
+            if dz is not None:
+                # d(zI − Φ)⁻¹ = −R (dz I − dΦ) R
+                row[..., -1, :, :] -= sum_runs((wo * x).sum(axis=-3) * dz, aliases)
             rows.append(row)
         return np.stack(rows, axis=-3)
 
@@ -220,6 +226,11 @@ class EigenBasis:
         change = (times[:, None, None] * difference[0])[:, None] * self.dA
         return value[0], change
 
+    def by_period(self, plant: SampledPlant) -> SampledPlant:
+        """The last parameter made the period of a zero-order hold: dΦ = AΦ dh, dΓ = ΦB dh."""
+        moved = plant.phi[:, None] * self.B
+        return _last_row(plant, np.diag(self.eigenvalues * plant.phi), moved)
+
     def _input(self, f: ComplexArray, df: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """f(A) B in the basis, and its derivative by Fréchet's product rule."""
         change = (df[..., None, :, :] * self.dA) @ self.B[..., None, :, :]
@@ -266,6 +277,14 @@ def _widened(M: Array, lift: int) -> Array:
     wide = np.zeros((*M.shape[:-1], M.shape[-1] * lift), M.dtype)
     wide[..., : M.shape[-1]] = M
     return wide
+
+
+def _last_row(plant: SampledPlant, dphi: Array, dgamma: Array) -> SampledPlant:
+    return dataclasses.replace(
+        plant,
+        dphi=np.concatenate([plant.dphi[:-1], dphi[None]]),
+        dgamma=np.concatenate([plant.dgamma[:-1], dgamma[None]]),
+    )
 
 
 class SchurBasis:
@@ -324,6 +343,12 @@ class SchurBasis:
             powers.append(value.phi)
             dpowers.append(change.phi)
         return np.array(powers), np.array(dpowers)
+
+    def by_period(self, plant: SampledPlant) -> SampledPlant:
+        """The last parameter made the period of a zero-order hold: dΦ = AΦ dh, dΓ = ΦB dh."""
+        Qh = self.basis.conj().T
+        A, B = Qh @ self.at.A @ self.basis, Qh @ self.at.B
+        return _last_row(plant, A @ plant.phi, plant.phi @ B)
 
 
 def _rescaled(system: StateSpace, scale: FloatArray) -> StateSpace:
@@ -427,15 +452,13 @@ def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArra
 
 
 def response_and_derivatives(
-    basis: Basis, omega: FloatArray, hold: Hold | None = None
+    plant: SampledPlant, z: ComplexArray, dz: ComplexArray | None = None
 ) -> tuple[ComplexArray, ComplexArray]:
     """Response (outputs, inputs, lines) and its exact derivatives, with the parameters first."""
-    between = BandLimited() if hold is None else hold
-    plant, z = basis.through(between), points(omega, between)
     m = plant.gamma.shape[-1]
     U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
     x = plant.solve(z, plant.drive(z, U))
-    return plant.output(x, U), plant.sensitivity(z, plant.output_rows(z), x, U)
+    return plant.output(x, U), plant.sensitivity(z, plant.output_rows(z), x, U, dz=dz)
 
 
 def frequency_response(

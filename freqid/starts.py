@@ -23,12 +23,12 @@ from freqid.optimise import Objective, ScannableStructure, Solution, Structure, 
 _GLANCES = 512
 # lines of the first stage: enough to show every mode, few enough to cost next to nothing
 _LINES = 160
+# nepers from the start that the first stage may go: a parameter that wants to be zero stops here
+_REACH = 16.0
 # a first stage this much worse than the best one so far is not followed up
 _HOPELESS = 4.0
 # starts of n_starts="auto" at the most
 BUDGET = 48
-# a factor on each side of the nominal values, where there are no bounds
-SPREAD = 10.0
 # a cost of so many times the noise's own is explained by it
 _EXPLAINED = 1.5
 # a cost of so many times a black box's is no local minimum
@@ -91,13 +91,14 @@ class LogStructure:
 
     def value(self, xi: FloatArray) -> FloatArray:
         """The inner unknowns at xi."""
-        return np.where(self.log, self.start * np.exp(np.where(self.log, xi, 0)), xi)
+        reach = np.clip(np.where(self.log, xi, 0), -_REACH, _REACH)
+        return np.where(self.log, self.start * np.exp(reach), xi)
 
     def realise(self, xi: FloatArray) -> Realisation:
         """The plant and its derivatives by xi."""
         x = self.value(xi)
         realisation = self.inner.realise(x)
-        by = np.where(self.log, x, 1.0)
+        by = np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
         return realisation.scaled(by)
 
     def describe(self, xi: FloatArray) -> str:
@@ -287,17 +288,14 @@ def _promising(
     return points[np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")[:count]]
 
 
-def _scatter(structure: Structure, start: FloatArray, count: int, seed: int) -> FloatArray:
-    """Scrambled Sobol points inside the bounds, or within a factor of the start."""
+def _scatter(structure: ScannableStructure, start: FloatArray, count: int, seed: int) -> FloatArray:
+    """Scrambled Sobol points over the span of the structure, logarithmic where signs allow."""
     from scipy.stats import qmc
 
     lower, upper = structure.lower, structure.upper
     power = int(np.ceil(np.log2(max(count, 2))))
     u = qmc.Sobol(len(start), scramble=True, rng=seed).random_base2(power)[:count]
-    bounded = np.isfinite(lower) & np.isfinite(upper)
-    size = np.where(start == 0, 1.0, start)
-    low = np.where(bounded, lower, np.where(start == 0, -1.0, size / SPREAD))
-    high = np.where(bounded, upper, np.where(start == 0, 1.0, size * SPREAD))
+    low, high = structure.span(start)
     logarithmic = (low * high > 0) & (low != high)
     with np.errstate(invalid="ignore", divide="ignore"):
         geometric = low * (np.where(logarithmic, high / low, 1.0)) ** u

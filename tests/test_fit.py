@@ -109,9 +109,9 @@ def test_band_in_time_and_steady_state(plant, slow):
 def test_the_lifted_cost_is_that_of_its_aliases(plant, fast):
     """Interleaved inputs and sums over alias frequencies are the same model."""
     from freqid.experiments import SpectralExperiment
-    from freqid.fit import GreyStructure
     from freqid.optimise import Objective
     from freqid.spectra import spectra
+    from freqid.structures import GreyStructure
 
     record = fast.decimate(20, keep_input=True)
     costs = []

@@ -1,0 +1,89 @@
+"""Grey boxes as the optimiser sees them: free parameters and, where free, the hold's period."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.experiments import Realisation
+from freqid.holds import Hold, ZeroOrderHold
+from freqid.models import GreyBox
+from freqid.responses import Linearisation, StateSpace, many_responses
+
+# scattered starts lie within this factor of the start, where there are no bounds
+SPREAD = 10.0
+# scattered periods of the hold, as parts of the sample time
+PERIODS = (0.02, 1.0)
+HOLD_PERIOD = "hold_period"
+
+
+class GreyStructure:
+    """A grey box: free parameters in units of their own size.
+
+    With ``dt`` (s) the period of a zero-order hold is one more unknown, the last, in units of it.
+    """
+
+    def __init__(self, model: GreyBox, dt: float | None = None) -> None:
+        self.model, self.dt = model, dt
+        self.parameters = model.free_parameters
+        self.physical_names = [p.name for p in self.parameters]
+        values = [p.value for p in self.parameters]
+        scale = [abs(v) or 1.0 for v in values]
+        lower, upper = [p.lower for p in self.parameters], [p.upper for p in self.parameters]
+        if dt is not None:
+            values, scale = [*values, dt / 2], [*scale, dt]
+            lower, upper = [*lower, -np.inf], [*upper, np.inf]
+        self.names = self.physical_names + ([HOLD_PERIOD] if dt is not None else [])
+        self.values, self.scale = np.array(values), np.array(scale)
+        self.lower, self.upper = np.array(lower) / self.scale, np.array(upper) / self.scale
+        self._fixed = model.values
+
+    @property
+    def start(self) -> FloatArray:
+        """The unknowns at the model's values."""
+        return self.values / self.scale
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """Matrices at x and their derivatives by x."""
+        count = len(self.physical_names)
+        theta = (x * self.scale).tolist()
+        values = self._fixed | dict(zip(self.physical_names, theta[:count], strict=True))
+        at, d = self.model.linearise(values, self.physical_names)
+        if not all(np.isfinite(M).all() for M in (*at, *d)):
+            raise ArithmeticError("the matrices are not finite")
+        by = self.scale[:count, None, None]
+        scaled = StateSpace(*(M * by for M in d))
+        if self.dt is None:
+            return Realisation.of(Linearisation(at, scaled))
+        if not 1e-6 < x[-1] < 4:
+            raise ArithmeticError(f"a hold of {theta[-1]:g} s is out of reach")
+        still = (np.concatenate([M, np.zeros((1, *M.shape[1:]))]) for M in scaled)
+        return Realisation.of(Linearisation(at, StateSpace(*still)), theta[-1], self.dt)
+
+    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
+        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
+        count = len(self.physical_names)
+        theta = points * self.scale
+        columns = dict(zip(self.physical_names, theta.T[:count], strict=True))
+        at = self.model.state_spaces(**columns)
+        if self.dt is None:
+            return many_responses(at, omega, hold)
+        each = (
+            many_responses(StateSpace(*(M[[i]] for M in at)), omega, ZeroOrderHold(theta[i, -1]))
+            for i in range(len(theta))
+        )
+        return np.concatenate(list(each))
+
+    def span(self, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Bounds where there are both, else a factor on each side of the start."""
+        bounded = np.isfinite(self.lower) & np.isfinite(self.upper)
+        size = np.where(start == 0, 1.0, start)
+        low = np.where(bounded, self.lower, np.where(start == 0, -1.0, size / SPREAD))
+        high = np.where(bounded, self.upper, np.where(start == 0, 1.0, size * SPREAD))
+        if self.dt is not None:
+            low[-1], high[-1] = PERIODS
+        return low, high
+
+    def describe(self, x: FloatArray) -> str:
+        """The parameter values at x."""
+        return ", ".join(f"{n}={v:g}" for n, v in zip(self.names, x * self.scale, strict=True))
