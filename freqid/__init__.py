@@ -9,7 +9,7 @@ from freqid.fit import fit
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
 from freqid.models import GreyBox, Parameter
-from freqid.plants import first_order, two_mass
+from freqid.plants import drivetrain, first_order, two_mass
 from freqid.plots import bode, nyquist, plot_coherence, plot_record
 from freqid.rational import OutputError
 from freqid.record import Record
@@ -29,6 +29,7 @@ __all__ = [
     "ZeroOrderHold",
     "bode",
     "chirp",
+    "drivetrain",
     "etfe",
     "first_order",
     "fit",

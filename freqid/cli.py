@@ -138,7 +138,7 @@ def frf(
 def fit(
     data: Path,
     *,
-    model: Literal["two-mass", "first-order", "output-error"],
+    model: Literal["two-mass", "three-mass", "first-order", "output-error"],
     order: int = 3,
     input: Columns = None,
     output: Columns = None,
@@ -158,7 +158,7 @@ def fit(
     data
         CSV file with a column of time and one for each channel.
     model
-        two-mass (the paper's), first-order, or output-error, a black box of --order.
+        two-mass (the paper's), three-mass, first-order, or output-error, a black box of --order.
     decimate
         keep every so many-th sample before the fit; the hold is remembered.
     keep_input

@@ -18,6 +18,7 @@ from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
 from freqid.optimise import Objective, minimise, noise_variance
 from freqid.preparation import Options, enough_rows, prepare
+from freqid.priors import Prior
 from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.starts import Found, log_targets, noise_floor, search
@@ -108,6 +109,7 @@ def fit(
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     found = _search(structure, objective, sets, all_weights, options, shape, count, seed)
+    found, objective = _with_prior(structure, objective, found, all_weights)
     est = _estimate(structure, objective, found, pairs[0][1], sets[0].dt)
     if hold is None or estimated:
         return est
@@ -158,6 +160,28 @@ def _integrates(model: GreyBox) -> bool:
     """Whether the plant has a pole at zero whatever its parameters, up to rounding."""
     poles = np.abs(np.linalg.eigvals(model.state_space().A))
     return bool((poles <= 1e-12 * max(poles.max(), 1.0)).any())
+
+
+def _with_prior(
+    structure: GreyStructure, objective: Objective, found: Found, weights: Sequence[Any]
+) -> tuple[Found, Objective]:
+    """The minimum with the priors in the cost, once the data alone have told their noise."""
+    known = isinstance(weights[0], str)  # "noise": the cost is in units of the noise already
+    noise = noise_variance(objective, found.solution.point, len(structure.names))
+    energy = sum(e.energy for e in objective.experiments)
+    rows = sum(e.n_rows for e in objective.experiments)
+    variance = 1.0 if known else max(noise, 1e-15 * energy / rows)
+    prior = Prior.of(structure.parameters, structure.scale, variance)
+    if prior is None:
+        return found, objective
+    with_prior = Objective(structure, objective.experiments, prior)
+    with_prior.n_evaluations = objective.n_evaluations
+    means = np.array([p.value if p.prior is None else p.prior[0] for p in structure.parameters])
+    believed = found.solution.x.copy()
+    believed[: len(means)] = means / structure.scale[: len(means)]
+    tried = [minimise(with_prior, x) for x in (found.solution.x, believed)]
+    best = min(tried, key=lambda solution: solution.point.cost)
+    return dataclasses.replace(found, solution=best), with_prior
 
 
 def _common_dt(sets: Sequence[Any], domain: str, initial_state: str) -> float:

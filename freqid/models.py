@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
 from typing import Any
@@ -23,6 +23,7 @@ from freqid.responses import (
     points,
     response_and_derivatives,
 )
+from freqid.ties import Ties
 
 Matrices = Callable[..., Sequence[Any]]
 
@@ -32,8 +33,9 @@ class Parameter:
     """A physical parameter: its name, nominal value, unit and what is known of its range.
 
     ``lower`` and ``upper`` bound the search of a fit. ``physical`` (low, high) only flags: an
-    estimate outside it is reported in ``est.warnings``, never prevented. Raises ValueError for a
-    value that is not finite or lies outside its bounds, and for bounds that cross.
+    estimate outside it is reported in ``est.warnings``, never prevented. ``prior`` (mean, standard
+    deviation) is what was known before the experiment. Raises ValueError for a value that is not
+    finite or outside its bounds, for bounds that cross, and for a fixed parameter with a prior.
 
     >>> Parameter("k", 1.5e5, unit="N m/rad", lower=0).name
     'k'
@@ -46,6 +48,7 @@ class Parameter:
     upper: float = math.inf
     fixed: bool = False
     physical: tuple[float, float] = (0, math.inf)
+    prior: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
@@ -60,6 +63,22 @@ class Parameter:
                 f"parameter {self.name}={self.value:g} lies outside its bounds "
                 f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
             )
+        if self.prior is not None:
+            try:
+                mean, std = (float(v) for v in self.prior)
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"parameter {self.name}: prior={self.prior!r} must be (mean, std)"
+                ) from None
+            if not (math.isfinite(mean) and math.isfinite(std) and std > 0):
+                raise ValueError(
+                    f"parameter {self.name}: prior={self.prior!r} must have a finite mean and a "
+                    "positive standard deviation"
+                )
+            if self.fixed:
+                raise ValueError(
+                    f"parameter {self.name} is fixed and has a prior; free it or drop the prior"
+                )
 
 
 @dataclass(frozen=True)
@@ -72,6 +91,10 @@ class GreyBox:
         parameters: the Parameter objects, in the order in which results list them.
         outputs, inputs: names of the channels.
         name: shown in reports.
+        ties: expressions of other parameters by name, ``{"Ja": "2 * Jm"}``: a parameter that is
+            tied takes the expression's value and is not estimated.
+        jacobian: ``jacobian(**values)`` returns for each parameter's name the derivatives
+            (dA, dB, dC, dD) of the matrices; complex steps or differences are taken without it.
         vectorized: True says that ``matrices`` also takes arrays of values, (batch,), and then
             returns matrices with that leading axis. It only saves time.
 
@@ -90,6 +113,9 @@ class GreyBox:
     inputs: Sequence[str] | None = None
     name: str = "grey box"
     vectorized: bool = False
+    ties: Mapping[str, str] = field(default_factory=dict)
+    jacobian: Callable[..., Mapping[str, Sequence[Any]]] | None = None
+    _ties: Ties = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         parameters = tuple(self.parameters)
@@ -100,19 +126,20 @@ class GreyBox:
         names = [p.name for p in parameters]
         if len(set(names)) < len(names):
             raise ValueError(f"parameters={names} has a name twice; names must differ")
+        object.__setattr__(self, "_ties", Ties(self.ties, [p.name for p in parameters]))
         at = self.state_space()
         object.__setattr__(self, "outputs", _channels("outputs", self.outputs, at.C.shape[0], "y"))
         object.__setattr__(self, "inputs", _channels("inputs", self.inputs, at.B.shape[1], "u"))
 
     @property
     def values(self) -> dict[str, float]:
-        """Value of every parameter by name."""
-        return {p.name: p.value for p in self.parameters}
+        """Value of every parameter by name, tied ones resolved."""
+        return self._ties.resolve({p.name: p.value for p in self.parameters})
 
     @property
     def free_parameters(self) -> tuple[Parameter, ...]:
-        """The parameters that a fit moves."""
-        return tuple(p for p in self.parameters if not p.fixed)
+        """The parameters that a fit moves: neither fixed nor tied."""
+        return tuple(p for p in self.parameters if not p.fixed and p.name not in self.ties)
 
     @property
     def n_inputs(self) -> int:
@@ -125,7 +152,8 @@ class GreyBox:
         return self.state_space().C.shape[0]
 
     def __getitem__(self, name: str) -> float:
-        return self.parameter(name).value
+        self.parameter(name)
+        return self.values[name]
 
     def parameter(self, name: str) -> Parameter:
         """The Parameter called ``name``; ValueError if there is none."""
@@ -155,9 +183,32 @@ class GreyBox:
         """The same plant with other search bounds, ``with_bounds(k=(1e4, 1e6))``."""
         return self._changed({n: {"lower": lo, "upper": hi} for n, (lo, hi) in bounds.items()})
 
+    def with_prior(self, **priors: tuple[float, float] | None) -> GreyBox:
+        """The same plant with priors (mean, standard deviation), ``with_prior(k=(1.5e5, 1e4))``."""
+        return self._changed({n: {"prior": prior} for n, prior in priors.items()})
+
+    def tie(self, **expressions: str) -> GreyBox:
+        """The same plant with parameters tied to expressions of others, ``tie(Ja="2 * Jm")``.
+
+        Raises ValueError for an unknown name, an expression that cannot be computed, or a tie to a
+        tied parameter.
+
+        >>> from freqid import two_mass
+        >>> two_mass().tie(Ja="1e4 * Jm")["Ja"]
+        9.0
+        """
+        for name in expressions:
+            self.parameter(name)
+        return dataclasses.replace(self, ties={**self.ties, **expressions})
+
     def _changed(self, changes: Mapping[str, Mapping[str, Any]]) -> GreyBox:
         for name in changes:
             self.parameter(name)
+        for name in self.ties:
+            if "value" in changes.get(name, {}) and changes[name]["value"] != self.values[name]:
+                raise ValueError(
+                    f"parameter {name} is tied to {self.ties[name]!r}; set the parameters it is of"
+                )
         new = tuple(dataclasses.replace(p, **changes.get(p.name, {})) for p in self.parameters)
         return dataclasses.replace(self, parameters=new)
 
@@ -168,7 +219,7 @@ class GreyBox:
         >>> first_order(b=3, a=2).state_space().A
         array([[-2.]])
         """
-        at = self.values | values
+        at = self._ties.resolve(self.values | values)
         try:
             matrices = self.matrices(**at)
         except Exception as error:  # the user's function may raise anything
@@ -180,6 +231,7 @@ class GreyBox:
         """A, B, C, D at many points at once: each argument (S,), each matrix (S, …)."""
         count = len(next(iter(columns.values())))
         full = {n: columns.get(n, np.full(count, v)) for n, v in self.values.items()}
+        full = self._ties.resolve(full)
         if self.vectorized:
             return StateSpace(*(np.asarray(M, dtype=float) for M in self.matrices(**full)))
         rows = [dict(zip(full, row, strict=True)) for row in np.array(list(full.values())).T]
@@ -225,18 +277,42 @@ class GreyBox:
         A complex step (Squire and Trapp, SIAM Review 40, 1998) gives the derivative to rounding;
         where the user's function does not carry complex numbers through, central differences.
         """
+        if self.jacobian is not None:
+            resolved = self._ties.resolve(values)
+            return Linearisation(
+                _shaped(self.matrices(**resolved), resolved), self._by_jacobian(values, names)
+            )
         if self.vectorized:
             return self._complex_batch(values, names)
-        at = _shaped(self.matrices(**values), values)
+        resolved = self._ties.resolve(values)
+        at = _shaped(self.matrices(**resolved), resolved)
         derivative = self._differentiate(values, names, self._takes_complex)
         return Linearisation(at, derivative)
+
+    def _by_jacobian(self, values: Mapping[str, float], names: Sequence[str]) -> StateSpace:
+        """The user's derivatives, carried through the ties by the chain rule."""
+        assert self.jacobian is not None
+        by = self.jacobian(**self._ties.resolve(values))
+        shapes = [M.shape for M in self.state_space()]
+        total = [np.zeros((len(names), *shape)) for shape in shapes]
+        for i, name in enumerate(names):
+            moved = self._ties.resolve({**values, name: values[name] + _COMPLEX_STEP * 1j})
+            for other, value in moved.items():
+                slope = np.imag(value) / _COMPLEX_STEP
+                if slope == 0:
+                    continue
+                if other not in by:
+                    raise ValueError(f"jacobian returned no derivative by {other!r}")
+                for part, d in zip(total, by[other], strict=True):
+                    part[i] += slope * np.asarray(0.0 if d is None else d, dtype=float)
+        return StateSpace(*total)
 
     def _complex_batch(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
         count = len(names)
         batch: dict[str, Any] = {name: np.full(count + 1, v, complex) for name, v in values.items()}
         for i, name in enumerate(names):
             batch[name][i + 1] += _COMPLEX_STEP * 1j
-        stacked = self.matrices(**batch)
+        stacked = self.matrices(**self._ties.resolve(batch))
         return Linearisation(
             StateSpace(*(M[0].real for M in stacked)),
             StateSpace(*(M[1:].imag / _COMPLEX_STEP for M in stacked)),
@@ -249,13 +325,15 @@ class GreyBox:
         for name in names:
             v = values[name]
             if by_complex_step:
-                moved = _dense(self.matrices(**{**values, name: v + _COMPLEX_STEP * 1j}), complex)
+                at = self._ties.resolve({**values, name: v + _COMPLEX_STEP * 1j})
+                moved = _dense(self.matrices(**at), complex)
                 columns.append([M.imag / _COMPLEX_STEP for M in moved])
             else:
                 # the step that balances rounding against the third derivative
                 step = np.finfo(float).eps ** (1 / 3) * max(abs(v), 1e-8)
                 up, down = (
-                    _dense(self.matrices(**{**values, name: v + s}), float) for s in (step, -step)
+                    _dense(self.matrices(**self._ties.resolve({**values, name: v + s})), float)
+                    for s in (step, -step)
                 )
                 columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])
         shapes = [M.shape for M in self.state_space()]
@@ -289,7 +367,10 @@ class GreyBox:
         )
 
     def __repr__(self) -> str:
-        inside = ", ".join(f"{p.name}={p.value:g}{' fixed' * p.fixed}" for p in self.parameters)
+        inside = ", ".join(
+            f"{p.name}={v:g}{' fixed' * p.fixed}{' tied' * (p.name in self.ties)}"
+            for p, v in zip(self.parameters, self.values.values(), strict=True)
+        )
         return f"<GreyBox {self.name}: {inside}>"
 
     def _repr_html_(self) -> str:

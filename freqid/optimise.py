@@ -19,6 +19,7 @@ import scipy.optimize
 from freqid.checks import FloatArray
 from freqid.experiments import Experiment, Realisation
 from freqid.holds import Hold
+from freqid.priors import Prior
 
 
 class Structure(Protocol):
@@ -50,7 +51,10 @@ class ScannableStructure(Structure, Protocol):
 
 @dataclass(frozen=True)
 class Point:
-    """Cost at a trial point, with the triangle (P+1, P+1) of Jacobian and residual."""
+    """Cost at a trial point, with the triangle (P+1, P+1) of Jacobian and residual.
+
+    ``parts`` are the shares of the experiments, in order, and then that of the prior.
+    """
 
     triangle: FloatArray
     initial: list[FloatArray | None]
@@ -75,8 +79,13 @@ class Point:
 class Objective:
     """The cost of a structure on experiments, remembering the last points it computed."""
 
-    def __init__(self, structure: Structure, experiments: Sequence[Experiment]) -> None:
-        self.structure, self.experiments = structure, experiments
+    def __init__(
+        self,
+        structure: Structure,
+        experiments: Sequence[Experiment],
+        prior: Prior | None = None,
+    ) -> None:
+        self.structure, self.experiments, self.prior = structure, experiments, prior
         self.n_evaluations = 0
         self.failure: Exception | None = None
         self._points: dict[bytes, Point | None] = {}
@@ -115,6 +124,10 @@ class Objective:
         except (np.linalg.LinAlgError, ValueError) as error:
             self.failure = error
             return None
+        if self.prior is not None:
+            known = self.prior.rows(x)
+            blocks.append(known)
+            parts.append(float(known[:, -1] @ known[:, -1]))
         stacked = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
         if not np.isfinite(stacked).all():
             self.failure = ArithmeticError("the response is not finite")
@@ -161,7 +174,8 @@ def noise_variance(objective: Objective, point: Point, n_parameters: int) -> flo
     """Variance of the weighted residual: the cost over its degrees of freedom."""
     rows = sum(e.n_rows for e in objective.experiments)
     unknowns = n_parameters + sum(len(d) for d in point.initial if d is not None)
-    return point.cost / max(rows - unknowns, 1)
+    data = sum(point.parts[: len(objective.experiments)])
+    return data / max(rows - unknowns, 1)
 
 
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
