@@ -3,8 +3,8 @@
 Every experiment answers ``at(realisation)`` with an object that has
 
     residual   (rows,)    model at rest minus data, weighted, real and imaginary parts in turn
-    transient  (rows, q)  what each unknown of the initial state adds to the residual, or None
-    jacobian(initial)     (rows, P), given the values of those unknowns
+    transient  (q, rows)  what each unknown of the initial state adds to the residual, or None
+    jacobian(initial)     (P, rows), given the values of those unknowns
 
 The fit eliminates the unknowns of the initial state (variable projection: Golub and Pereyra,
 Inverse Problems 19, 2003).
@@ -61,7 +61,7 @@ class Realisation:
         factor = by[:, None, None]
         scale = self.period_scale * float(by[-1])
         lin = Linearisation(at, StateSpace(*(M * factor for M in d)))
-        return Realisation.of(lin, self.period, scale)
+        return Realisation(lin, self.basis.scaled(factor), self.period, scale)
 
     def seen_through(
         self, hold: Hold, lift: int, omega: FloatArray, z: ComplexArray
@@ -94,7 +94,7 @@ class Evaluation(Protocol):
     transient: FloatArray | None
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        """Derivative of the residual by each parameter, (rows, P)."""
+        """Derivative of the residual by each parameter, (P, rows)."""
         ...
 
 
@@ -135,6 +135,13 @@ class SpectralExperiment:
         plane: Plane | None = None,
     ) -> None:
         self.omega, self.omega_input = omega, omega_input
+        # one weight for all channels of a line is put into the data once and for all
+        line = scale[0, 0]
+        self.line_scale: FloatArray | None = None
+        if bool((scale == line).all()):
+            self.line_scale = line
+            U = U * np.repeat(line, omega_input.size // len(omega))
+            Y = Y * line
         self.hold, self.U, self.Y, self.scale, self.lift = hold, U, Y, scale, lift
         self.aliases = omega_input.size // len(omega)
         self.transient_dt = transient_dt
@@ -160,6 +167,8 @@ class SpectralExperiment:
                 z_free = np.exp(1j * (omega[:, None] + turns).ravel() * hold.period)
             self.z_free = plane.points(z_free)
             self.free_factor = plane.free_factor(self.z_free) / self.free_aliases
+            if self.line_scale is not None:
+                self.free_factor = self.free_factor * np.repeat(line, self.free_aliases)
         self.discrete = discrete
         if discrete:
             # the matrices are sampled already: the kernel takes them as they are
@@ -205,7 +214,7 @@ class SpectralExperiment:
     @property
     def energy(self) -> float:
         """Weighted energy of the data, the cost of a model that is zero."""
-        return float(np.sum(np.abs(self.Y * self.scale) ** 2))
+        return float(np.sum(self.rows(self.Y) ** 2))
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
@@ -213,8 +222,8 @@ class SpectralExperiment:
 
     def rows(self, values: ComplexArray) -> FloatArray:
         """Weighted (…, outputs, channels, K) as real rows, (…, 2·outputs·channels·K)."""
-        weighted = values * self.scale
-        return weighted.reshape(*weighted.shape[:-3], -1).view(float)
+        weighted = values if self.line_scale is not None else values * self.scale
+        return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-3], -1)).view(float)
 
 
 class _SpectralEvaluation:
@@ -224,7 +233,9 @@ class _SpectralEvaluation:
         self.plant, self.z, self.dz = realisation.seen_through(
             e.hold, e.lift, e.omega_input.ravel(), e.z
         )
-        self.x = self.plant.solve(self.z, self.plant.drive(self.z, e.U_state))
+        self.inverse = self.plant.resolvent(self.z)
+        drive = self.plant.drive(self.z, e.U_state)
+        self.x = self.plant.solve(self.z, drive, self.inverse)
         y = sum_runs(self.plant.output(self.x, e.U), e.aliases)
         self.residual = e.rows(y - e.Y)
         self.transient: FloatArray | None = None
@@ -233,29 +244,28 @@ class _SpectralEvaluation:
             self.shared = e.shared and realisation.period is None
             same = self.shared or e.discrete
             self.free = self.plant if same else transition(basis, e.transient_dt)
-            self._w = self.free.output_rows(e.z_free)
+            self.free_inverse = self.inverse if self.shared else None
+            self._w = self.free.output_rows(e.z_free, self.free_inverse)
             # (outputs, states, K) to one column for each physical state
             seen = sum_runs(self._w * e.free_factor, e.free_aliases)
-            columns = np.tensordot(basis.to_basis.T, seen, (1, 1))
-            self.transient = e.rows(columns[:, :, None, :]).T
+            columns = np.moveaxis(basis.to_basis.T @ seen, 0, 1)
+            self.transient = e.rows(columns[:, :, None, :])
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         e, plant = self.experiment, self.plant
         if initial is None or self._w is None:
-            w = plant.output_rows(self.z)
-            return e.rows(
-                plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz)
-            ).T
+            w = plant.output_rows(self.z, self.inverse)
+            return e.rows(plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz))
         delta = (self.basis.to_basis @ initial)[:, None, None]
-        x_free = self.free.solve(e.z_free, delta * e.free_factor)
+        x_free = self.free.solve(e.z_free, delta * e.free_factor, self.free_inverse)
         if self.shared:
             x = self.x + x_free
-            return e.rows(plant.sensitivity(e.z, self._w, x, e.U_state, direct=e.U)).T
-        w = plant.output_rows(self.z)
+            return e.rows(plant.sensitivity(e.z, self._w, x, e.U_state, direct=e.U))
+        w = plant.output_rows(self.z, self.inverse)
         forced = plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz)
         return e.rows(
             forced + self.free.sensitivity(e.z_free, self._w, x_free, None, e.free_aliases)
-        ).T
+        )
 
 
 class TimeExperiment:
@@ -319,7 +329,7 @@ class _TimeEvaluation:
             self.free = FreeMotion(self.sampled.phi, e.u.shape[1])
             self.x = self.free.particular(push)
             self.mix, self.transient = _independent(
-                e.rows((at.C @ self.free.motions)[..., ::every]).T, len(at.A)
+                e.rows((at.C @ self.free.motions)[..., ::every]), len(at.A)
             )
         else:
             self.x = propagate(self.sampled.phi, push, self.sampled.gamma_next @ e.u[:, 0])
@@ -336,18 +346,18 @@ class _TimeEvaluation:
         else:
             dx = propagate(self.sampled.phi, push, self.change.gamma_next @ e.u[:, 0])
         dy = at.C @ dx + d.C @ x + d.D @ e.u
-        return e.rows(dy[..., :: e.factor]).T
+        return e.rows(dy[..., :: e.factor])
 
 
-def _independent(columns: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
-    """Of 2n columns, real parts then imaginary parts of n motions, at most n that span them all.
+def _independent(motions: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
+    """Of 2n rows, real parts then imaginary parts of n motions, at most n that span them all.
 
-    Returns the combinations (2n, q) and the combined columns (rows, q). Both parts of a motion are
+    Returns the combinations (2n, q) and the combined rows (q, rows). Both parts of a motion are
     scaled alike, so that a part that is zero up to rounding stays so.
     """
-    size = np.linalg.norm(columns, axis=0)
+    size = np.linalg.norm(motions, axis=1)
     pair = np.tile(np.hypot(size[:n], size[n:]), 2)
     pair[pair == 0] = 1
-    _, s, Vt = np.linalg.svd(columns / pair, full_matrices=False)
-    mix = (Vt[:n][s[:n] > 1e-11 * s[0]] / pair).T
-    return mix, columns @ mix
+    U, s, _ = np.linalg.svd(motions / pair[:, None], full_matrices=False)
+    mix = U[:, :n][:, s[:n] > 1e-11 * s[0]] / pair[:, None]
+    return mix, mix.T @ motions

@@ -103,7 +103,7 @@ class PeriodicHold(Hold):
     def modal(self, eigenvalues: ComplexArray) -> ModalSampled:
         """φ, γ, γ⁺ and their divided differences at the eigenvalues of A, (…, n) in rad/s."""
         h = self.period
-        value, difference = phi_functions(eigenvalues * h)
+        value, difference = phi_functions(eigenvalues * h, second=self.name == "foh")
         gamma, gamma_next = self._weights(value)
         dgamma, dgamma_next = self._weights(difference)
         return ModalSampled(
@@ -207,56 +207,92 @@ _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 
 
 def phi_functions(
-    x: ComplexArray,
+    x: ComplexArray, second: bool = True
 ) -> tuple[tuple[ComplexArray, ...], tuple[ComplexArray, ...]]:
     """φ0 = e^x, φ1 = ∫e^{xs}ds, φ2 = ∫(1−s)e^{xs}ds over [0, 1], and their divided differences.
 
-    Args: x (…, n), complex. Returns three (…, n) arrays and three (…, n, n) arrays. Where an
-    argument is of size 1 or more the recurrences x φ1 = φ0 − 1, x φ2 = φ1 − 1 (and their divided
-    differences) are stable; nearer zero they cancel, and the integrals are summed instead.
+    Args: x (…, n), complex; ``second`` says whether φ2 is wanted. Returns three (…, n) arrays and
+    three (…, n, n) arrays. Where an argument is of size 1 or more the recurrences x φ1 = φ0 − 1,
+    x φ2 = φ1 − 1 (and their divided differences) are stable; nearer zero they cancel, and the
+    integrals are summed instead.
 
     >>> value, difference = phi_functions(np.array([0.0, 1.0]))
     >>> bool(np.isclose(difference[0][0, 1], np.e - 1)), bool(np.isclose(difference[1][0, 0], 0.5))
     (True, True)
     """
     x = np.asarray(x, dtype=complex)
-    small = np.abs(x) < 1
-    safe = np.where(small, 1, x)
-    phi0 = np.exp(x)
-    phi1 = (phi0 - 1) / safe
-    phi2 = (phi1 - 1) / safe
-    if small.any():
-        near = np.exp(np.where(small, x, 0)[..., None] * _NODES)
-        phi1 = np.where(small, near @ _WEIGHTS, phi1)
-        phi2 = np.where(small, near @ (_WEIGHTS * (1 - _NODES)), phi2)
-
+    size = np.abs(x)
     a, b = x[..., :, None], x[..., None, :]
-    gap, middle = a - b, (a + b) / 2
-    close = np.abs(gap) < 1
-    half = np.where(close, gap / 2, 0)
-    sinhc = _sinhc(half)
-    apart = (phi0[..., :, None] - phi0[..., None, :]) / np.where(close, 1, gap)
-    d0 = np.where(close, np.exp(np.where(close, middle, 0)) * sinhc, apart)
-    # divide by the larger argument: y f[x, y] = g[x, y] − f(x)
-    swap = np.abs(a) > np.abs(b)
-    larger = np.where(swap, a, b)
-    both_small = np.abs(larger) < 1
-    divisor = np.where(both_small, 1, larger)
-    d1 = (d0 - np.where(swap, phi1[..., None, :], phi1[..., :, None])) / divisor
-    d2 = (d1 - np.where(swap, phi2[..., None, :], phi2[..., :, None])) / divisor
-    if both_small.any():
-        s = _NODES
-        angle = np.where(both_small, gap / 2, 0)[..., None] * s
-        kernel = s * np.exp(np.where(both_small, middle, 0)[..., None] * s) * _sinhc(angle)
-        d1 = np.where(both_small, kernel @ _WEIGHTS, d1)
-        d2 = np.where(both_small, kernel @ (_WEIGHTS * (1 - s)), d2)
-    return (phi0, phi1, phi2), (d0, d1, d2)
+    half, middle = (a - b) / 2, (a + b) / 2
+    phi0 = np.exp(x)
+    if np.abs(x.real).max(initial=0) < 300:
+        d0 = np.exp(middle) * _sinhc(half)
+    else:
+        close = np.abs(half) < 0.5
+        near = np.exp(np.where(close, middle, 0)) * _sinhc(np.where(close, half, 0))
+        gap = np.where(close, 1, 2 * half)
+        d0 = np.where(close, near, (phi0[..., :, None] - phi0[..., None, :]) / gap)
+    small = size < 1
+    if small.all():
+        value = _summed(x, second)
+        difference = _summed_differences(half, middle, second)
+    else:
+        value, difference = _recurred(x, phi0, d0, size, second)
+        if small.any():
+            inside = _summed(np.where(small, x, 0), second)
+            value = tuple(np.where(small, i, v) for i, v in zip(inside, value, strict=True))
+            value, difference = _recurred(x, phi0, d0, size, second, value)
+            both = small[..., :, None] & small[..., None, :]
+            inside = _summed_differences(np.where(both, half, 0), np.where(both, middle, 0), second)
+            difference = tuple(
+                np.where(both, i, d) for i, d in zip(inside, difference, strict=True)
+            )
+    return (phi0, *value), (d0, *difference)
+
+
+def _summed(x: ComplexArray, second: bool) -> tuple[ComplexArray, ...]:
+    """φ1 and φ2 by Gauss-Legendre sums, for |x| < 1."""
+    near = np.exp(x[..., None] * _NODES)
+    return near @ _WEIGHTS, near @ (_WEIGHTS * (1 - _NODES)) if second else x
+
+
+def _summed_differences(
+    half: ComplexArray, middle: ComplexArray, second: bool
+) -> tuple[ComplexArray, ...]:
+    """φ1[a, b] = ∫ s e^{s(a+b)/2} sinhc(s(a−b)/2) ds, and the same with s(1−s) for φ2."""
+    kernel = np.exp(middle[..., None] * _NODES) * _sinhc(half[..., None] * _NODES)
+    first = kernel @ (_WEIGHTS * _NODES)
+    return first, kernel @ (_WEIGHTS * _NODES * (1 - _NODES)) if second else first
+
+
+def _recurred(
+    x: ComplexArray,
+    phi0: ComplexArray,
+    d0: ComplexArray,
+    size: FloatArray,
+    second: bool,
+    value: tuple[ComplexArray, ...] | None = None,
+) -> tuple[tuple[ComplexArray, ...], tuple[ComplexArray, ...]]:
+    """φ1, φ2 and differences by recurrence; y f[x, y] = g[x, y] − f(x) with y the larger."""
+    if value is None:
+        safe = np.where(size < 1, 1, x)
+        phi1 = (phi0 - 1) / safe
+        value = phi1, (phi1 - 1) / safe if second else phi1
+    swap = size[..., :, None] > size[..., None, :]
+    larger = np.where(swap, x[..., :, None], x[..., None, :])
+    larger = np.where(np.abs(larger) < 1, 1, larger)
+    differences, previous = [], d0
+    for f in value if second else value[:1]:
+        previous = (previous - np.where(swap, f[..., None, :], f[..., :, None])) / larger
+        differences.append(previous)
+    return value, (*differences,) if second else (differences[0], differences[0])
 
 
 def _sinhc(x: ComplexArray) -> ComplexArray:
     """sinh(x)/x, 1 at zero."""
-    tiny = np.abs(x) < 1e-9
-    return np.where(tiny, 1, np.sinh(x) / np.where(tiny, 1, x))
+    # added where x vanishes, and below rounding anywhere else
+    x = x + 1e-30
+    return np.sinh(x) / x
 
 
 def as_hold(hold: Hold | str | None, dt: float, remembered: Hold | None = None) -> Hold:

@@ -309,10 +309,12 @@ class GreyBox:
 
     def _complex_batch(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
         count = len(names)
-        batch: dict[str, Any] = {name: np.full(count + 1, v, complex) for name, v in values.items()}
+        columns = np.empty((len(values), count + 1), complex)
+        columns[:] = np.array(list(values.values()))[:, None]
+        row = {name: i for i, name in enumerate(values)}
         for i, name in enumerate(names):
-            batch[name][i + 1] += _COMPLEX_STEP * 1j
-        stacked = self.matrices(**self._ties.resolve(batch))
+            columns[row[name], i + 1] += _COMPLEX_STEP * 1j
+        stacked = self.matrices(**self._ties.resolve(dict(zip(values, columns, strict=True))))
         return Linearisation(
             StateSpace(*(M[0].real for M in stacked)),
             StateSpace(*(M[1:].imag / _COMPLEX_STEP for M in stacked)),

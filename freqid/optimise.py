@@ -112,13 +112,11 @@ class Objective:
             for experiment in self.experiments:
                 evaluation = experiment.at(realisation)
                 r, T, delta = evaluation.residual, evaluation.transient, None
+                Q = None
                 if T is not None:
                     Q, delta = _eliminate(T, r)
-                    r = r - Q @ (Q.T @ r)
-                J = evaluation.jacobian(delta)
-                if T is not None:
-                    J = J - Q @ (Q.T @ J)
-                blocks.append(np.column_stack([J, r]))
+                    r = r - (Q @ r) @ Q
+                blocks.append((evaluation.jacobian(delta), r, Q))
                 initial.append(delta)
                 parts.append(float(r @ r))
         except (np.linalg.LinAlgError, ValueError) as error:
@@ -126,13 +124,13 @@ class Objective:
             return None
         if self.prior is not None:
             known = self.prior.rows(x)
-            blocks.append(known)
+            blocks.append((known[:, :-1].T, known[:, -1], None))
             parts.append(float(known[:, -1] @ known[:, -1]))
-        stacked = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        if not np.isfinite(stacked).all():
+        triangle = _triangle_of(blocks)
+        if not np.isfinite(triangle).all():
             self.failure = ArithmeticError("the response is not finite")
             return None
-        return Point(triangle(stacked), initial, parts)
+        return Point(triangle, initial, parts)
 
 
 def triangle(matrix: FloatArray) -> FloatArray:
@@ -140,24 +138,79 @@ def triangle(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
+# least pivot of the scaled Gram matrix below which half of the digits are gone
+_LEAST_PIVOT = 1e-4
+
+
+def _triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None]]) -> FloatArray:
+    """R of the QR decomposition of stacked [P J, r], from J (P, rows), r and the rows Q of I − P.
+
+    The Cholesky factor of the Gram matrix is R at a fraction of the work, as long as the columns
+    of J, scaled alike, are far from dependent; when they are not, Householder's QR.
+    """
+    P = len(blocks[0][0])
+    G, g, rr = np.zeros((P, P)), np.zeros(P), 0.0
+    size = np.zeros(P)
+    for J, r, Q in blocks:
+        full = J @ J.T
+        size += np.diag(full)
+        G, g, rr = G + full, g + J @ r, rr + float(r @ r)
+        if Q is not None:
+            seen = J @ Q.T
+            G = G - seen @ seen.T
+    size = np.sqrt(size)
+    if np.isfinite(G).all() and np.isfinite(rr) and (size > 0).all():
+        try:
+            L = np.linalg.cholesky(G / np.outer(size, size))
+        except np.linalg.LinAlgError:
+            L = np.zeros_like(G)
+        if np.diag(L).min(initial=1.0) > _LEAST_PIVOT:
+            R = np.zeros((P + 1, P + 1))
+            R[:P, :P] = L.T * size
+            R[:P, P] = np.linalg.solve(L, g / size)
+            R[P, P] = np.sqrt(max(rr - float(R[:P, P] @ R[:P, P]), 0.0))
+            return R
+    columns = []
+    for J, r, Q in blocks:
+        projected = J if Q is None else J - (J @ Q.T) @ Q
+        columns.append(np.concatenate([projected, r[None]]))
+    stacked = np.concatenate(columns, axis=1)
+    if not np.isfinite(stacked).all():
+        return np.full((1, P + 1), np.nan)
+    return triangle(stacked.T)
+
+
 def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal basis of the columns of T, and the δ that makes |r + T δ| least."""
-    size = np.linalg.norm(T, axis=0)
+    """Orthonormal rows that span those of T (q, rows), and the δ that makes |r + δ T| least."""
+    size = np.sqrt(np.einsum("ij,ij->i", T, T))
+    delta = np.zeros(len(T))
     used = size > 1e-200
-    delta = np.zeros(T.shape[1])
     if not used.any() or not np.isfinite(size).all():
-        return np.zeros((len(r), 0)), delta
-    Q, R = np.linalg.qr(T[:, used] / size[used])
-    diagonal = np.abs(np.diag(R))
-    if diagonal.min() > 1e-11 * diagonal.max():
-        delta[used] = -np.linalg.solve(R, Q.T @ r) / size[used]
+        return np.zeros((0, len(r))), delta
+    if not used.all():
+        T, size = T[used], size[used]
+    gram = (T @ T.T) / np.outer(size, size)
+    try:
+        L = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        L = np.zeros_like(gram)
+    least = np.diag(L).min()
+    if least > _LEAST_PIVOT:
+        first = np.linalg.inv(L) / size
+        Q = first @ T
+        if least < 0.03:
+            # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
+            second = np.linalg.inv(np.linalg.cholesky(Q @ Q.T))
+            Q, first = second @ Q, second @ first
+        delta[used] = -first.T @ (Q @ r)
         return Q, delta
+    unit = T / size[:, None]
     # modes that the output hardly shows: keep the directions that it does
-    U, s, Vt = np.linalg.svd(T[:, used] / size[used], full_matrices=False)
+    U, s, Vt = np.linalg.svd(unit.T, full_matrices=False)
     strong = s > 1e-11 * s[0]
     U, s, Vt = U[:, strong], s[strong], Vt[strong]
-    delta[used] = -(Vt.T @ ((U.T @ r) / s)) / size[used]
-    return U, delta
+    delta[used] = -(Vt.T @ ((U.T @ r) / s)) / size
+    return U.T, delta
 
 
 @dataclass(frozen=True)

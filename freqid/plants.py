@@ -153,19 +153,17 @@ def _first_order(b: Any, a: Any) -> tuple[Any, ...]:
 
 
 def _two_mass(Jm: Any, k: Any, Ja: Any, fm: Any, d: Any, gear: Any) -> tuple[Any, ...]:
-    zero, one, r = 0 * k, 1 + 0 * k, gear
-    return (
-        _stack(
-            [
-                [zero, r, -one],
-                [-r * k / Jm, -(fm + r**2 * d) / Jm, r * d / Jm],
-                [k / Ja, d * r / Ja, -d / Ja],
-            ]
-        ),
-        _stack([[zero], [one / Jm], [zero]]),
-        _stack([[zero, one, zero]]),
-        _stack([[zero]]),
-    )
+    r = gear
+    shape, kind = np.shape(k), np.result_type(Jm, k, Ja, fm, d, gear)
+    A, B = np.zeros((*shape, 3, 3), kind), np.zeros((*shape, 3, 1), kind)
+    A[..., 0, 1], A[..., 0, 2] = r, -1
+    A[..., 1, 0], A[..., 1, 1] = -r * k / Jm, -(fm + r**2 * d) / Jm
+    A[..., 1, 2], A[..., 2, 0] = r * d / Jm, k / Ja
+    A[..., 2, 1], A[..., 2, 2] = d * r / Ja, -d / Ja
+    B[..., 1, 0] = 1 / Jm
+    C = np.zeros((*shape, 1, 3))
+    C[..., 0, 1] = 1
+    return A, B, C, np.zeros((*shape, 1, 1))
 
 
 def _stack(rows: list[list[Any]]) -> Any:

@@ -15,6 +15,7 @@ Axes: (…, states, channels, lines). Leading axes are a batch of plants; only e
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -74,20 +75,28 @@ class SampledPlant:
     dD: Array
     triangular: bool
 
-    def solve(self, z: ComplexArray, right: ComplexArray) -> ComplexArray:
+    def resolvent(self, z: ComplexArray) -> ComplexArray | None:
+        """1/(z − λ), (…, n, lines), in the eigenbasis: what ``solve`` and ``output_rows`` share."""
+        return None if self.triangular else 1 / (z - self.phi[..., :, None])
+
+    def solve(
+        self, z: ComplexArray, right: ComplexArray, known: ComplexArray | None = None
+    ) -> ComplexArray:
         """R(z) times ``right``, (…, n, channels, lines); z (lines,)."""
         if not self.triangular:
-            return right / (z - self.phi[..., :, None])[..., :, None, :]
+            inverse = self.resolvent(z) if known is None else known
+            return right * inverse[..., :, None, :]  # type: ignore[index]
         x = np.empty_like(right)
         for i in reversed(range(len(self.phi))):
             rest = right[i] + np.tensordot(self.phi[i, i + 1 :], x[i + 1 :], 1)
             x[i] = rest / (z - self.phi[i, i])
         return x
 
-    def output_rows(self, z: ComplexArray) -> ComplexArray:
+    def output_rows(self, z: ComplexArray, known: ComplexArray | None = None) -> ComplexArray:
         """C R(z), (…, outputs, n, lines)."""
         if not self.triangular:
-            return self.C[..., :, :, None] / (z - self.phi[..., :, None])[..., None, :, :]
+            inverse = self.resolvent(z) if known is None else known
+            return self.C[..., :, :, None] * inverse[..., None, :, :]  # type: ignore[index]
         w = np.empty((*self.C.shape, len(z)), complex)
         for i in range(len(self.phi)):
             rest = self.C[:, i, None] + np.einsum("pjl,j->pl", w[:, :i], self.phi[:i, i])
@@ -131,27 +140,34 @@ class SampledPlant:
             push = _times(self.dgamma, U)
             if self.dgamma_next is not None:
                 push = push + _times(self.dgamma_next, z * U)
+        driven_by_U = U is not None and push is None
+        m = len(U) if U is not None else 0
+        foh = self.dgamma_next is not None
+        n_rows = n * n + (n * m * (1 + foh) if driven_by_U else 0)
+        n_rows += (n if moving_C else 0) + (m if moving_D else 0)
         rows = []
         for o in range(p):
             wo = w[..., o, :, None, :]
-            factors = [(wo[..., None, :] * x[..., None, :, :, :]).reshape(*lead, n * n, E, lines)]
-            weights = [self.dphi.reshape(*lead, P, n * n)]
-            if U is not None and push is None:
-                m = len(U)
-                wu = (wo[..., None, :] * U).reshape(*lead, n * m, E, lines)
-                factors.append(wu)
+            F = np.empty((*lead, n_rows, E, lines), complex)
+            products = F[..., : n * n, :, :].reshape(*lead, n, n, E, lines)
+            np.multiply(wo[..., None, :], x[..., None, :, :, :], out=products)
+            weights, at = [self.dphi.reshape(*lead, P, n * n)], n * n
+            if driven_by_U:
+                wu = F[..., at : at + n * m, :, :]
+                wu[...] = (wo[..., None, :] * U).reshape(*lead, n * m, E, lines)
                 weights.append(self.dgamma.reshape(*lead, P, n * m))
+                at += n * m
                 if self.dgamma_next is not None:
-                    factors.append(z * wu)
+                    F[..., at : at + n * m, :, :] = z * wu
                     weights.append(self.dgamma_next.reshape(*lead, P, n * m))
+                    at += n * m
             if moving_C:
-                factors.append(x)
+                F[..., at : at + n, :, :] = x
                 weights.append(self.dC[..., o, :])
+                at += n
             if moving_D:
-                straight = np.asarray(U if direct is None else direct)
-                factors.append(np.broadcast_to(straight, (*lead, *np.shape(straight))))
+                F[..., at:, :, :] = U if direct is None else direct
                 weights.append(self.dD[..., o, :])
-            F = np.concatenate(factors, axis=-3)
             F = sum_runs(F, aliases)
             flat = F.reshape(*lead, F.shape[-3], -1)
             row = (np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, lines // aliases)
@@ -162,7 +178,7 @@ class SampledPlant:
                 # d(zI − Φ)⁻¹ = −R (dz I − dΦ) R
                 row[..., -1, :, :] -= sum_runs((wo * x).sum(axis=-3) * dz, aliases)
             rows.append(row)
-        return np.stack(rows, axis=-3)
+        return rows[0][..., None, :, :] if p == 1 else np.stack(rows, axis=-3)
 
 
 def _times(M: Array, x: ComplexArray) -> ComplexArray:
@@ -219,10 +235,17 @@ class EigenBasis:
             phi, gamma, following, self.C, D, dphi, dgamma, dfollowing, self.dC, dD, False
         )
 
+    def scaled(self, factor: FloatArray) -> EigenBasis:
+        """The same with each derivative multiplied, (P, 1, 1)."""
+        other = copy.copy(self)
+        other.dA, other.dB = self.dA * factor, self.dB * factor
+        other.dC, other.dD = self.dC * factor, self.dD * factor
+        return other
+
     def _powers(self, period: float, lift: int) -> tuple[ComplexArray, ComplexArray]:
         """Φ^k and its derivatives for k = 0 … lift, from exp(A k·period) at once."""
         times = period * np.arange(lift + 1)
-        value, difference = phi_functions(self.eigenvalues * times[:, None])
+        value, difference = phi_functions(self.eigenvalues * times[:, None], second=False)
         change = (times[:, None, None] * difference[0])[:, None] * self.dA
         return value[0], change
 
@@ -331,6 +354,12 @@ class SchurBasis:
             dD,
             True,
         )
+
+    def scaled(self, factor: FloatArray) -> SchurBasis:
+        """The same with each derivative multiplied, (P, 1, 1)."""
+        other = copy.copy(self)
+        other.derivative = StateSpace(*(M * factor for M in self.derivative))
+        return other
 
     def _powers(self, period: float, lift: int) -> tuple[Array, Array]:
         """Φ^k and its derivatives for k = 0 … lift, each from its own exponential."""

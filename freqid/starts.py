@@ -74,7 +74,7 @@ class _LogEvaluation:
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         relative = self.dG / self.G
-        return relative.reshape(len(relative), -1).view(float).T
+        return relative.reshape(len(relative), -1).view(float)
 
 
 class LogStructure:
@@ -334,7 +334,7 @@ def _local_noise(e: Experiment) -> float:
         axis=-1,
     )
     Q = np.linalg.qr(basis).Q
-    Y = (e.Y * e.scale)[:, 0][:, at][..., None]
+    Y = (e.Y if e.line_scale is not None else e.Y * e.scale)[:, 0][:, at][..., None]
     left = Y - Q @ (Q.conj().swapaxes(-1, -2) @ Y)
     variance = (np.abs(left[..., 0]) ** 2).sum(axis=-1) / (width - 6)
     return float(np.median(variance, axis=-1).sum() * K)

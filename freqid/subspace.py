@@ -67,11 +67,13 @@ def _columns(
         power = np.abs(e.U).reshape(len(e.U), channels, K, e.aliases).sum(axis=(0, 1))
         base = power.argmax(axis=1)
     pick = np.arange(K) * e.aliases + base
-    weight = e.scale
     w = np.tile(e.z[pick], channels)
-    Y = (e.Y * weight).reshape(len(e.Y), -1)
-    common = weight.mean(axis=0).reshape(1, -1)
-    V = (e.U[:, :, pick]).reshape(len(e.U), -1) * common
+    common = e.scale.mean(axis=0).reshape(1, -1)
+    if e.line_scale is not None:
+        Y, V = e.Y.reshape(len(e.Y), -1), e.U[:, :, pick].reshape(len(e.U), -1)
+    else:
+        Y = (e.Y * e.scale).reshape(len(e.Y), -1)
+        V = e.U[:, :, pick].reshape(len(e.U), -1) * common
     free = np.zeros((len(experiments), V.shape[1]), complex)
     if e.transient_dt is not None:
         free[index] = common
