@@ -12,6 +12,7 @@ Inverse Problems 19, 2003).
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -157,9 +158,9 @@ class SpectralExperiment:
         self.shared = False
         self.free_aliases = 1
         if transient_dt is not None:
-            z_free = np.exp(1j * omega * transient_dt)
             ratio = 0.0 if period is None else transient_dt / period
             self.shared = self.aliases == 1 and abs(ratio - 1) < 1e-9
+            z_free = z if self.shared else np.exp(1j * omega * transient_dt)
             if discrete and not self.shared and isinstance(hold, PeriodicHold):
                 # (z^M I − Φ^M)⁻¹ z^M is the mean of (zI − Φ)⁻¹ z over the M aliases
                 self.free_aliases = round(transient_dt / hold.period)
@@ -215,6 +216,23 @@ class SpectralExperiment:
     def energy(self) -> float:
         """Weighted energy of the data, the cost of a model that is zero."""
         return float(np.sum(self.rows(self.Y) ** 2))
+
+    def thinned(self, step: int) -> SpectralExperiment:
+        """Every ``step``-th line, weighted so that costs stay comparable."""
+        few = copy.copy(self)
+        lines = np.arange(0, len(self.omega), step)
+        inputs = (lines[:, None] * self.aliases + np.arange(self.aliases)).ravel()
+        more = np.sqrt(step)
+        few.omega, few.omega_input = self.omega[lines], self.omega_input[lines]
+        few.U, few.U_state = self.U[..., inputs] * more, self.U_state[..., inputs] * more
+        few.z, few.Y, few.scale = self.z[inputs], self.Y[..., lines] * more, self.scale[..., lines]
+        if self.line_scale is not None:
+            few.line_scale = self.line_scale[lines]
+        if self.transient_dt is not None:
+            n = self.free_aliases
+            frees = (lines[:, None] * n + np.arange(n)).ravel()
+            few.z_free, few.free_factor = self.z_free[frees], self.free_factor[frees] * more
+        return few
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""

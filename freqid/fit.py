@@ -16,7 +16,7 @@ from freqid.frequency_response import FrequencyResponse
 from freqid.hold_tests import decimation_warning, rejected_hold
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
-from freqid.optimise import Objective, minimise, noise_variance
+from freqid.optimise import Objective, minimise, noise_variance, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.priors import Prior
 from freqid.rational import OutputError
@@ -24,6 +24,9 @@ from freqid.record import Record
 from freqid.starts import Found, log_targets, noise_floor, search
 from freqid.structures import GreyStructure
 from freqid.trust import physical_warnings, uncertainty
+
+# lines on which the minimum is looked for
+_LINES = 600
 
 
 def fit(
@@ -102,8 +105,7 @@ def fit(
     structure = GreyStructure(model, _common_dt(sets, domain, initial_state) if estimated else None)
     if not structure.physical_names:
         raise ValueError("model has no free parameter; free one with model.free(name)")
-    at = model.state_space()
-    shape = (at.C.shape[0], at.B.shape[1])
+    shape = (model.n_outputs, model.n_inputs)
     pairs = [prepare(d, shape, w, options) for d, w in zip(sets, all_weights, strict=True)]
     experiments = [experiment for experiment, _ in pairs]
     enough_rows(experiments, len(structure.names))
@@ -128,21 +130,30 @@ def _search(
 ) -> Found:
     """The best minimum; a fit in time looks for it at the lines of the same data, then polishes."""
     start = structure.start
-    at = structure.model.state_space()
-    order, direct = len(at.A), bool(at.D.any())
     resting = "estimate" if options.initial_state == "zero" else options.initial_state
     at_lines = dataclasses.replace(options, initial_state=resting, domain="frequency")
 
     def reference() -> float | None:
-        return reference_cost(order, direct, sets, weights, at_lines)
+        at = structure.model.state_space()
+        return reference_cost(len(at.A), bool(at.D.any()), sets, weights, at_lines)
 
-    if all(isinstance(e, SpectralExperiment) for e in objective.experiments):
-        targets, floor = log_targets(objective.experiments), noise_floor(objective.experiments)
-        return search(objective, start, targets, n_starts, seed, floor, reference)
+    spectral = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+    if len(spectral) == len(objective.experiments):
+        # a long record has more lines than it takes to find the minimum: refine on all of them last
+        step = sum(len(e.omega) for e in spectral) // _LINES
+        few = [e.thinned(step) for e in spectral] if step > 1 else spectral
+        scout = Objective(structure, few) if step > 1 else objective
+        found = search(
+            scout, start, log_targets(few), n_starts, seed, lambda: noise_floor(few), reference
+        )
+        if scout is objective:
+            return found
+        objective.n_evaluations = scout.n_evaluations
+        return dataclasses.replace(found, solution=polish(objective, found.solution.x))
     twins = [prepare(d, shape, w, at_lines)[0] for d, w in zip(sets, weights, strict=True)]
     twin = Objective(structure, twins)
-    targets, floor = log_targets(twins), noise_floor(twins)
-    found = search(twin, start, targets, n_starts, seed, floor, reference)
+    targets = log_targets(twins)
+    found = search(twin, start, targets, n_starts, seed, lambda: noise_floor(twins), reference)
     objective.n_evaluations = twin.n_evaluations
     # a twin with an unstable estimate has no counterpart from rest: the start may be nearer
     points = [(x, objective.point(x)) for x in (found.solution.x, start)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -144,12 +145,12 @@ class GreyBox:
     @property
     def n_inputs(self) -> int:
         """Number of inputs."""
-        return self.state_space().B.shape[1]
+        return len(self.inputs or ())
 
     @property
     def n_outputs(self) -> int:
         """Number of outputs."""
-        return self.state_space().C.shape[0]
+        return len(self.outputs or ())
 
     def __getitem__(self, name: str) -> float:
         self.parameter(name)
@@ -209,8 +210,14 @@ class GreyBox:
                 raise ValueError(
                     f"parameter {name} is tied to {self.ties[name]!r}; set the parameters it is of"
                 )
-        new = tuple(dataclasses.replace(p, **changes.get(p.name, {})) for p in self.parameters)
-        return dataclasses.replace(self, parameters=new)
+        new = tuple(
+            dataclasses.replace(p, **changes[p.name]) if p.name in changes else p
+            for p in self.parameters
+        )
+        # shapes and names are as they were checked already
+        other = copy.copy(self)
+        object.__setattr__(other, "parameters", new)
+        return other
 
     def state_space(self, **values: float) -> StateSpace:
         """A, B, C, D at the parameter values, or at ``values`` where given.

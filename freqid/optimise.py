@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import scipy.linalg
 import scipy.optimize
 
 from freqid.checks import FloatArray
@@ -88,6 +89,8 @@ class Objective:
         self.structure, self.experiments, self.prior = structure, experiments, prior
         self.n_evaluations = 0
         self.failure: Exception | None = None
+        # a cost this small is nothing but the rounding of the data's own sums
+        self.rounding = 1e-20 * sum(e.energy for e in experiments)
         self._points: dict[bytes, Point | None] = {}
 
     def point(self, x: FloatArray) -> Point | None:
@@ -277,6 +280,41 @@ def minimise(
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
     return Solution(result.x, point, result.status > 0, result.message)
+
+
+# a Gauss-Newton step of this relative size needs no second look: the next one is its square
+_LAST_STEP = 1e-7
+
+
+def polish(
+    objective: Objective, x: FloatArray, last_step: float = _LAST_STEP, limit: int | None = None
+) -> Solution:
+    """A few Gauss-Newton steps from a point close to the minimum; a full search where they fail.
+
+    The unknowns are of order one. A step below ``last_step`` is taken without a second look.
+    """
+    point = objective.point(x)
+    P = len(x)
+    for _ in range(6):
+        if point is None or len(point.triangle) <= P:
+            break
+        if point.cost <= objective.rounding:
+            return Solution(x, point, True, "The cost is down to rounding.")
+        R, c = point.triangle[:P, :P], point.triangle[:P, P]
+        if np.abs(np.diag(R)).min() <= 1e-8 * np.abs(np.diag(R)).max():
+            break
+        step = -scipy.linalg.solve_triangular(R, c)
+        if np.abs(step).max() <= last_step:
+            left = max(1 - float(c @ c) / max(point.cost, 1e-300), 0.0)
+            triangle = point.triangle.copy()
+            triangle[:P, P] = 0
+            end = Point(triangle, point.initial, [p * left for p in point.parts])
+            return Solution(x + step, end, True, "Gauss-Newton steps became negligible.")
+        trial = objective.point(x + step)
+        if trial is None or trial.cost > point.cost:
+            break
+        x, point = x + step, trial
+    return minimise(objective, x, limit=limit)
 
 
 def _padded(rows: FloatArray, size: int) -> FloatArray:

@@ -17,7 +17,14 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import Experiment, Realisation, SpectralExperiment, sampled_response
 from freqid.holds import PeriodicHold
-from freqid.optimise import Objective, ScannableStructure, Solution, Structure, minimise
+from freqid.optimise import (
+    Objective,
+    ScannableStructure,
+    Solution,
+    Structure,
+    minimise,
+    polish,
+)
 
 # scattered points that are looked at before the best of them are walked from
 _GLANCES = 512
@@ -155,13 +162,14 @@ def search(
     targets: Sequence[LogResponse],
     n_starts: int | None,
     seed: int,
-    floor: float,
+    floor: Callable[[], float],
     reference: Callable[[], float | None],
 ) -> Found:
     """The best minimum from ``start`` and, unless it explains the data, from scattered starts.
 
     ``n_starts`` None stops once two starts agree on the best minimum, or at the budget. ``floor``
-    is the cost that the data's own noise explains: a minimum at that level needs no second start.
+    gives, when it is asked, the cost that the data's own noise explains: a minimum at that level
+    needs no second start.
     ``reference`` gives, when it is asked, the cost of a black box of the same order: a minimum far
     above it must be found more often to be believed.
     """
@@ -171,11 +179,15 @@ def search(
     limit = BUDGET if n_starts is None else n_starts
     scattered: FloatArray | None = None
     black_box: float | None = None
+    explained = 0.0
     while tried < limit:
-        if n_starts is None and runs.best_cost <= max(_EXPLAINED * floor, runs.rounding):
+        if n_starts is None and tried == 1:
+            if runs.best_cost <= runs.rounding or runs.best_cost <= _EXPLAINED * floor():
+                break
+            black_box = reference()
+            explained = _EXPLAINED * floor()
+        if n_starts is None and runs.best_cost <= max(explained, runs.rounding):
             break
-        if tried == 1:
-            black_box = reference() if n_starts is None else None
         if n_starts is None and runs.agreed >= _wanted(runs, black_box):
             break
         if scattered is None:
@@ -197,7 +209,7 @@ class _Runs:
 
     def __init__(self, objective: Objective, targets: Sequence[LogResponse]) -> None:
         self.objective, self.targets = objective, targets
-        self.rounding = 1e-20 * sum(e.energy for e in objective.experiments)
+        self.rounding = objective.rounding
         self.best: Solution | None = None
         self.agreed = 0
         self.best_log_cost = np.inf
@@ -215,7 +227,11 @@ class _Runs:
                 return
             x = start if walked is None else walked
         try:
-            solution = minimise(self.objective, x, limit=None if first else 120)
+            limit = None if first else 120
+            if x is start:
+                solution = minimise(self.objective, x, limit=limit)
+            else:
+                solution = polish(self.objective, x, limit=limit)
         except ValueError:
             if first:
                 raise
@@ -226,9 +242,7 @@ class _Runs:
         structure = LogStructure(self.objective.structure, start)
         first_stage = Objective(structure, self.targets)
         try:
-            walked = minimise(
-                first_stage, np.where(structure.log, 0.0, start), tolerance=1e-6, limit=80
-            )
+            walked = self._walk(first_stage, np.where(structure.log, 0.0, start))
         except ValueError:
             return None
         finally:
@@ -238,6 +252,14 @@ class _Runs:
             return None
         self.best_log_cost = min(cost, self.best_log_cost)
         return structure.value(walked.x)
+
+    @staticmethod
+    def _walk(first_stage: Objective, xi: FloatArray) -> Solution:
+        """To the minimum of the first stage, which need only be near that of the second."""
+        near = polish(first_stage, xi, last_step=0.02, limit=80)
+        if near.converged:
+            return near
+        return minimise(first_stage, near.x, tolerance=1e-6, limit=80)
 
     def _keep(self, solution: Solution) -> None:
         cost = solution.point.cost

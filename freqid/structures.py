@@ -49,8 +49,6 @@ class GreyStructure:
         theta = (x * self.scale).tolist()
         values = self._fixed | dict(zip(self.physical_names, theta[:count], strict=True))
         at, d = self.model.linearise(values, self.physical_names)
-        if not all(np.isfinite(M).all() for M in (*at, *d)):
-            raise ArithmeticError("the matrices are not finite")
         by = self.scale[:count, None, None]
         scaled = StateSpace(*(M * by for M in d))
         if self.dt is None:
