@@ -14,6 +14,7 @@ from freqid.plots import bode, nyquist, plot_coherence, plot_record
 from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.simulation import simulate
+from freqid.transfer_functions import TransferFunction
 
 __version__ = "0.1.0"
 
@@ -26,6 +27,7 @@ __all__ = [
     "OutputError",
     "Parameter",
     "Record",
+    "TransferFunction",
     "ZeroOrderHold",
     "bode",
     "chirp",

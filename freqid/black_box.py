@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,20 @@ from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import FirstOrderHold, PeriodicHold
+from freqid.models import GreyBox
 from freqid.optimise import Objective, Solution, minimise, noise_variance
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
-from freqid.responses import Plane, StateSpace
+from freqid.responses import Plane
+from freqid.structures import GreyStructure
 from freqid.subspace import identify, plane_for
+from freqid.transfer_functions import (
+    ContinuousModel,
+    TransferFunction,
+    chained,
+    coefficients,
+    rational_model,
+)
 
 # a chart is left for one around its own optimum this often at most
 _CHARTS = 8
@@ -123,24 +132,43 @@ def _estimate(
     names: tuple[Sequence[str], Sequence[str]],
 ) -> Estimate:
     def at(x: FloatArray) -> DiscreteModel:
-        matrices: StateSpace = chart.in_z(x)
-        return DiscreteModel(matrices, dt, hold, *names)
+        return DiscreteModel(chart.in_z(x), dt, hold, *names)
 
-    model, point = at(solution.x), solution.point
-    coefficients, values = model.coefficients()
-    steps = 1e-6 * np.eye(chart.size)
+    return _coefficient_estimate(
+        at(solution.x),
+        lambda x: at(x).coefficients(),
+        np.ones(chart.size),
+        solution,
+        objective,
+        hold,
+        dt,
+    )
+
+
+def _coefficient_estimate(
+    model: Any,
+    coefficients: Callable[[FloatArray], tuple[list[str], FloatArray]],
+    scale: FloatArray,
+    solution: Solution,
+    objective: Objective,
+    hold: Any,
+    dt: float,
+) -> Estimate:
+    """An Estimate whose parameters are coefficients: smooth functions of the unknowns x."""
+    point = solution.point
+    names, values = coefficients(solution.x)
     change = np.array(
         [
-            (at(solution.x + s).coefficients()[1] - at(solution.x - s).coefficients()[1]) / 2e-6
-            for s in steps
+            (coefficients(solution.x + s)[1] - coefficients(solution.x - s)[1]) / 2e-6
+            for s in 1e-6 * np.eye(len(scale))
         ]
     ).T
-    noise = noise_variance(objective, point, chart.size)
+    noise = noise_variance(objective, point, len(scale))
     half = change @ np.linalg.pinv(point.jacobian)
     energy = sum(e.energy for e in objective.experiments)
     return Estimate(
         model=model,
-        names=coefficients,
+        names=names,
         values=values,
         nominal=np.full(len(values), np.nan),
         units=[""] * len(values),
@@ -155,3 +183,102 @@ def _estimate(
         n_rows=sum(e.n_rows for e in objective.experiments),
         warnings=[] if solution.converged else [f"not converged: {solution.message}"],
     )
+
+
+def fit_transfer_function(
+    spec: TransferFunction, sets: Sequence[Any], weights: Sequence[Any], options: Options
+) -> Estimate:
+    """The work of ``fit`` for TransferFunction: poles of a sampled black box, then least squares."""
+    names = sets[0].input_names, sets[0].output_names
+    shape = len(names[1]), len(names[0])
+    pairs = [prepare(d, shape, w, options) for d, w in zip(sets, weights, strict=True)]
+    experiments = [e for e, _ in pairs]
+    enough_rows(experiments, spec.poles + (spec.zeros + 1) * shape[0] * shape[1])
+    hold = pairs[0][1]
+    omega = 2 * np.pi * np.geomspace(*_edges(sets[0], options))
+    scale = float(np.exp(np.log(omega).mean()))
+    best: tuple[Solution, Objective, GreyBox] | None = None
+    for poles in _starting_poles(spec, sets, weights, options, omega):
+        model = _with_gains(chained(spec, poles, scale, names), sets, weights, options, shape)
+        structure = GreyStructure(model)
+        objective = Objective(structure, experiments)
+        if objective.point(structure.start) is None:
+            continue
+        solution = minimise(objective, structure.start)
+        if best is None or solution.point.cost < best[0].point.cost:
+            best = solution, objective, model
+    if best is None:
+        raise ValueError("no start for the transfer function could be computed; change its order")
+    solution, objective, model = best
+    structure = GreyStructure(model)
+
+    def at(x: FloatArray) -> ContinuousModel:
+        values = dict(zip(structure.names, x * structure.scale, strict=True))
+        return rational_model(model.with_values(**values), spec.zeros)
+
+    return _coefficient_estimate(
+        at(solution.x),
+        lambda x: coefficients(at(x)),
+        structure.scale,
+        solution,
+        objective,
+        hold,
+        _input_dt(sets[0]),
+    )
+
+
+def _edges(data: Any, options: Options) -> tuple[float, float, int]:
+    """Lowest and highest frequency in Hz of what is fitted, and a number of points between."""
+    if options.band is not None and options.band[0] > 0:
+        return options.band[0], options.band[1], 20
+    if isinstance(data, FrequencyResponse):
+        f = data.frequency[data.frequency > 0]
+        return float(f[0]), float(f[-1]), 20
+    high = data.nyquist if options.band is None else options.band[1]
+    return high / 100, high, 20
+
+
+def _starting_poles(
+    spec: TransferFunction,
+    sets: Sequence[Any],
+    weights: Sequence[Any],
+    options: Options,
+    omega: FloatArray,
+) -> list[ComplexArray]:
+    """Poles to begin from: those of a sampled black box taken to s, and spread ones behind them."""
+    starts = []
+    try:
+        sampled = fit_black_box(OutputError(spec.poles, True), sets, weights, options).model
+        z = sampled.poles
+        z = np.where(np.abs(z) < 1e-6, 1e-6, z)
+        s = np.log(np.abs(z)) / sampled.dt + 1j * np.angle(z) / sampled.dt
+        # a pole on the negative axis has no partner in s: half the Nyquist frequency, well damped
+        lonely = (np.abs(z.imag) < 1e-9 * np.abs(z)) & (z.real < 0)
+        starts.append(np.where(lonely, -np.abs(s), s))
+    except (ValueError, np.linalg.LinAlgError):
+        pass
+    pairs = spec.poles // 2
+    w = np.exp(np.interp(np.arange(pairs) + 0.5, [0, max(pairs, 1)], np.log(omega[[0, -1]])))
+    spread = np.concatenate([-0.05 * w + 1j * w, -0.05 * w - 1j * w])
+    if spec.poles % 2:
+        spread = np.append(spread, -omega.mean())
+    return [*starts, spread]
+
+
+def _with_gains(
+    model: GreyBox,
+    sets: Sequence[Any],
+    weights: Sequence[Any],
+    options: Options,
+    shape: tuple[int, int],
+) -> GreyBox:
+    """The chain with its output gains, which enter linearly, set by least squares."""
+    gains = [p.name for p in model.parameters if p.name.startswith("c")]
+    held = model.fix(*(p.name for p in model.parameters if p.name not in gains))
+    experiments = [prepare(d, shape, w, options)[0] for d, w in zip(sets, weights, strict=True)]
+    structure = GreyStructure(held)
+    point = Objective(structure, experiments).point(structure.start)
+    if point is None:
+        return model
+    step = -np.linalg.lstsq(point.jacobian, point.residual)[0]
+    return model.with_values(**dict(zip(gains, step * structure.scale, strict=True)))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.black_box import fit_black_box, reference_cost
+from freqid.black_box import fit_black_box, fit_transfer_function, reference_cost
 from freqid.checks import choice, unknown, whole
 from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
@@ -23,6 +23,7 @@ from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.starts import Found, log_targets, noise_floor, search
 from freqid.structures import GreyStructure
+from freqid.transfer_functions import TransferFunction
 from freqid.trust import physical_warnings, uncertainty
 
 # lines on which the minimum is looked for
@@ -47,7 +48,8 @@ def fit(
     Minimises Σ w |Y − G U − transient|² (the bias integral, paper eq. 2, for w = 1).
 
     Args:
-        model: a GreyBox, or OutputError(order) for a black box.
+        model: a GreyBox, or OutputError(order) or TransferFunction(zeros, poles), black boxes in
+            discrete and in continuous time.
         data: a Record, a FrequencyResponse, or several; each record has its own initial state.
         hold: what the input did between its samples; None is what each record remembers, a name
             means that hold at the record's own sample time, as other tools assume;
@@ -92,13 +94,18 @@ def fit(
     options = Options(
         "zoh" if hold == "estimate" else hold, band, initial_state, domain, integrates
     )
-    if isinstance(model, OutputError):
+    if isinstance(model, (OutputError, TransferFunction)):
         if start is not None:
             raise ValueError("start has no meaning for a black box, which needs none; leave it out")
-        return fit_black_box(model, sets, all_weights, options)
+        if hold == "estimate":
+            raise ValueError("hold='estimate' needs a GreyBox; a black box can imitate any delay")
+        if isinstance(model, OutputError):
+            return fit_black_box(model, sets, all_weights, options)
+        return fit_transfer_function(model, sets, all_weights, options)
     if not isinstance(model, GreyBox):
         raise ValueError(
-            f"model={type(model).__name__} is not a model; expected a GreyBox or OutputError"
+            f"model={type(model).__name__} is not a model; expected a GreyBox, OutputError or "
+            "TransferFunction"
         )
     model = _started(model, start)
     estimated = isinstance(hold, str) and hold == "estimate"
