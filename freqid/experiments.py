@@ -48,6 +48,9 @@ class Realisation:
     # s; where the hold is estimated, its period, by which the last parameter counts
     period: float | None = None
     period_scale: float = 1.0
+    # s; and where it is estimated, the size of its unknown, which then is the last parameter
+    delay: float = 0.0
+    delay_scale: float | None = None
 
     @classmethod
     def of(
@@ -64,12 +67,29 @@ class Realisation:
         lin = Linearisation(at, StateSpace(*(M * factor for M in d)))
         return Realisation(lin, self.basis.scaled(factor), self.period, scale)
 
+    def delayed(
+        self, hold: Hold, omega: FloatArray, z: ComplexArray
+    ) -> tuple[SampledPlant, ComplexArray]:
+        """The plant behind a late zero-order hold, and the whole samples of delay as a factor."""
+        if isinstance(hold, BandLimited):
+            return self.basis.through(hold), np.exp(-1j * omega * self.delay)
+        if not isinstance(hold, ZeroOrderHold):
+            raise ValueError(f"delay={self.delay:g} s needs a zero-order hold, not {hold!r}")
+        steps = np.floor(self.delay / hold.period)
+        plant, moved = self.basis.delayed(hold.period, self.delay / hold.period - steps)
+        if self.delay_scale is not None:
+            dgamma, dnext = plant.dgamma.copy(), np.array(plant.dgamma_next)
+            dgamma[-1], dnext[-1] = moved * self.delay_scale, -moved * self.delay_scale
+            plant = replace(plant, dgamma=dgamma, dgamma_next=dnext)
+        return plant, z ** -(steps + 1)
+
     def seen_through(
         self, hold: Hold, lift: int, omega: FloatArray, z: ComplexArray
     ) -> tuple[SampledPlant, ComplexArray, ComplexArray | None]:
         """The sampled plant, z at ``omega`` and the derivative of z by an estimated period."""
         if self.period is None:
             return self.basis.through(hold, lift), z, None
+        # (a delay belongs to black boxes, whose hold is known)
         hold = ZeroOrderHold(self.period)
         z = points(omega, hold)
         plant = self.basis.by_period(self.basis.through(hold))
@@ -248,13 +268,21 @@ class _SpectralEvaluation:
     def __init__(self, experiment: SpectralExperiment, realisation: Realisation) -> None:
         e, basis = experiment, realisation.basis
         self.experiment, self.basis = e, basis
-        self.plant, self.z, self.dz = realisation.seen_through(
-            e.hold, e.lift, e.omega_input.ravel(), e.z
-        )
+        self.U, self.U_state = e.U, e.U_state
+        self.delay_scale = realisation.delay_scale
+        if realisation.delay or realisation.delay_scale is not None:
+            self.plant, late = realisation.delayed(e.hold, e.omega_input.ravel(), e.z)
+            self.z, self.dz = e.z, None
+            self.U, self.U_state = e.U * late, e.U_state * late
+        else:
+            self.plant, self.z, self.dz = realisation.seen_through(
+                e.hold, e.lift, e.omega_input.ravel(), e.z
+            )
         self.inverse = self.plant.resolvent(self.z)
-        drive = self.plant.drive(self.z, e.U_state)
+        drive = self.plant.drive(self.z, self.U_state)
         self.x = self.plant.solve(self.z, drive, self.inverse)
-        y = sum_runs(self.plant.output(self.x, e.U), e.aliases)
+        self.forced = self.plant.output(self.x, self.U)
+        y = sum_runs(self.forced, e.aliases)
         self.residual = e.rows(y - e.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
@@ -272,18 +300,25 @@ class _SpectralEvaluation:
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         e, plant = self.experiment, self.plant
         if initial is None or self._w is None:
-            w = plant.output_rows(self.z, self.inverse)
-            return e.rows(plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz))
+            return e.rows(self._forced_change(plant.output_rows(self.z, self.inverse), self.x))
         delta = (self.basis.to_basis @ initial)[:, None, None]
         x_free = self.free.solve(e.z_free, delta * e.free_factor, self.free_inverse)
         if self.shared:
-            x = self.x + x_free
-            return e.rows(plant.sensitivity(e.z, self._w, x, e.U_state, direct=e.U))
-        w = plant.output_rows(self.z, self.inverse)
-        forced = plant.sensitivity(self.z, w, self.x, e.U_state, e.aliases, e.U, self.dz)
+            return e.rows(self._forced_change(self._w, self.x + x_free))
+        forced = self._forced_change(plant.output_rows(self.z, self.inverse), self.x)
         return e.rows(
             forced + self.free.sensitivity(e.z_free, self._w, x_free, None, e.free_aliases)
         )
+
+    def _forced_change(self, w: ComplexArray, x: ComplexArray) -> ComplexArray:
+        e = self.experiment
+        dy = self.plant.sensitivity(
+            self.z, w, x, self.U_state, e.aliases, direct=self.U, dz=self.dz
+        )
+        if self.delay_scale is not None and isinstance(e.hold, BandLimited):
+            turned = -1j * e.omega_input.ravel() * self.delay_scale * self.forced
+            dy[-1] += sum_runs(turned, e.aliases)
+        return dy
 
 
 class TimeExperiment:

@@ -19,9 +19,10 @@ from freqid.spectra import spectra
 
 @dataclass(frozen=True)
 class Options:
-    """How the data are to be read: arguments of ``fit``, and whether to leave out the zero line.
+    """How the data are to be read: arguments of ``fit``, and two consequences of the model.
 
-    A plant that integrates answers at zero frequency with anything at all.
+    ``skip_zero`` leaves out the line at zero, where a plant that integrates answers with anything
+    at all; ``delayed`` keeps a fast input as its alias frequencies, which a delay merely turns.
     """
 
     hold: Hold | str | None = None
@@ -29,6 +30,7 @@ class Options:
     initial_state: str = "estimate"
     domain: str = "frequency"
     skip_zero: bool = False
+    delayed: bool = False
 
 
 def prepare(
@@ -64,7 +66,7 @@ def prepare(
     at_input = isinstance(assumed, PeriodicHold) and np.isclose(
         assumed.period, data.input_dt, rtol=1e-9
     )
-    s = spectra(data, options.band, lifted=bool(at_input) and plane is None)
+    s = spectra(data, options.band, lifted=bool(at_input) and plane is None and not options.delayed)
     if options.skip_zero:
         s = s.without_zero()
     w = _weights(weights, s.Y.shape)

@@ -254,6 +254,27 @@ class EigenBasis:
         moved = plant.phi[:, None] * self.B
         return _last_row(plant, np.diag(self.eigenvalues * plant.phi), moved)
 
+    def delayed(self, period: float, fraction: float) -> tuple[SampledPlant, Array]:
+        """The plant behind a zero-order hold whose steps come ``fraction`` of a period late.
+
+        x(k+1) = Φ x(k) + Γ0 u(k) + Γ1 u(k−1), Γ0 being the integral over the rest after
+        the step and Γ1 = exp(A rest) times that before it. Returned with Γ0 as Γ⁺ and Γ1 as Γ (so
+        that inputs are to be multiplied by 1/z), and exp(A rest) B, by which Γ1 gains and Γ0 loses.
+        """
+        before, rest = fraction * period, (1 - fraction) * period
+        whole = self.through(ZeroOrderHold(period))
+        value, difference = phi_functions(self.eigenvalues * rest, second=False)
+        early, dearly = phi_functions(self.eigenvalues * before, second=False)
+        gamma0, dgamma0 = self._input(rest * value[1], rest**2 * difference[1])
+        shift, dshift = value[0], rest * difference[0]
+        g, dg = before * early[1], before**2 * dearly[1]
+        product = dshift * g[None, :] + shift[:, None] * dg
+        gamma1, dgamma1 = self._input(shift * g, product)
+        plant = dataclasses.replace(
+            whole, gamma=gamma1, gamma_next=gamma0, dgamma=dgamma1, dgamma_next=dgamma0
+        )
+        return plant, shift[:, None] * self.B
+
     def _input(self, f: ComplexArray, df: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """f(A) B in the basis, and its derivative by Fréchet's product rule."""
         change = (df[..., None, :, :] * self.dA) @ self.B[..., None, :, :]
@@ -372,6 +393,23 @@ class SchurBasis:
             powers.append(value.phi)
             dpowers.append(change.phi)
         return np.array(powers), np.array(dpowers)
+
+    def delayed(self, period: float, fraction: float) -> tuple[SampledPlant, Array]:
+        """As in EigenBasis: a zero-order hold whose steps come late."""
+        at, d, Q = self.at, self.derivative, self.basis
+        Qh = Q.conj().T
+        # an exponential needs a positive time: the limits are harmless
+        before, rest = max(fraction, 1e-14) * period, max(1 - fraction, 1e-14) * period
+        zero, dzero = ZeroOrderHold(rest).sampled_derivatives(at.A, at.B, d.A, d.B)
+        early, dearly = ZeroOrderHold(before).sampled_derivatives(at.A, at.B, d.A, d.B)
+        plant = dataclasses.replace(
+            self.through(ZeroOrderHold(period)),
+            gamma=Qh @ zero.phi @ early.gamma,
+            gamma_next=Qh @ zero.gamma,
+            dgamma=Qh @ (dzero.phi @ early.gamma + zero.phi @ dearly.gamma),
+            dgamma_next=Qh @ dzero.gamma,
+        )
+        return plant, Qh @ zero.phi @ at.B
 
     def by_period(self, plant: SampledPlant) -> SampledPlant:
         """The last parameter made the period of a zero-order hold: dΦ = AΦ dh, dΓ = ΦB dh."""

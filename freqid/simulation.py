@@ -107,6 +107,8 @@ def simulate(
         raise ValueError(
             f"hold={between!r} must have the period dt={dt:g} s of the input's samples"
         )
+    if getattr(getattr(model, "model", model), "delay", 0):
+        raise ValueError("model has a delay; simulate it without and shift the input by hand")
     system, discrete_dt = _state_space(model)
     inputs = u.reshape(len(u), -1)
     n, m = system.B.shape

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from freqid.checks import FloatArray
@@ -14,7 +16,7 @@ from freqid.responses import Linearisation, StateSpace, many_responses
 SPREAD = 10.0
 # scattered periods of the hold, as parts of the sample time
 PERIODS = (0.02, 1.0)
-HOLD_PERIOD = "hold_period"
+HOLD_PERIOD, DELAY = "hold_period", "delay"
 
 
 class GreyStructure:
@@ -46,7 +48,7 @@ class GreyStructure:
     def realise(self, x: FloatArray) -> Realisation:
         """Matrices at x and their derivatives by x."""
         count = len(self.physical_names)
-        theta = (x * self.scale).tolist()
+        theta = (x * self.scale[: len(x)]).tolist()
         values = self._fixed | dict(zip(self.physical_names, theta[:count], strict=True))
         at, d = self.model.linearise(values, self.physical_names)
         by = self.scale[:count, None, None]
@@ -85,3 +87,28 @@ class GreyStructure:
     def describe(self, x: FloatArray) -> str:
         """The parameter values at x."""
         return ", ".join(f"{n}={v:g}" for n, v in zip(self.names, x * self.scale, strict=True))
+
+
+class DelayedStructure(GreyStructure):
+    """A grey box behind a delay (s): known, or with ``unit`` (s) one more unknown, the last."""
+
+    def __init__(self, model: GreyBox, delay: float, unit: float | None = None) -> None:
+        super().__init__(model)
+        self.delay, self.unit = delay, unit
+        if unit is not None:
+            self.names = [*self.names, DELAY]
+            self.values, self.scale = np.append(self.values, delay), np.append(self.scale, unit)
+            self.lower = np.append(self.lower, -np.inf)
+            self.upper = np.append(self.upper, np.inf)
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """Matrices at x and their derivatives by x, behind the delay at x."""
+        if self.unit is None:
+            return dataclasses.replace(super().realise(x), delay=self.delay)
+        count = len(self.physical_names)
+        inner = GreyStructure.realise(self, x[:count])
+        at, d = inner.linearisation
+        still = StateSpace(*(np.concatenate([M, np.zeros((1, *M.shape[1:]))]) for M in d))
+        delay = float(x[-1] * self.unit)
+        extended = Realisation.of(Linearisation(at, still))
+        return dataclasses.replace(extended, delay=delay, delay_scale=self.unit)

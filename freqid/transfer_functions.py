@@ -10,11 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray, whole
+from freqid.checks import Array, ComplexArray, FloatArray, finite, whole
+from freqid.experiments import Realisation
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import Hold
+from freqid.holds import BandLimited, Hold
 from freqid.models import GreyBox, Parameter
-from freqid.responses import StateSpace, frequency_response
+from freqid.responses import (
+    Linearisation,
+    StateSpace,
+    basis_of,
+    frequency_response,
+    points,
+    transfer,
+)
 
 _ANY = (-np.inf, np.inf)
 
@@ -23,15 +31,17 @@ _ANY = (-np.inf, np.inf)
 class TransferFunction:
     """Black box in continuous time with so many zeros and poles for each pair of channels.
 
-    All pairs share their poles. Raises ValueError for numbers that are not whole, or more zeros
-    than poles.
+    All pairs share their poles and the ``delay`` in s of all inputs, which ``"estimate"`` makes one
+    more unknown; a delay needs a zero-order hold or a band-limited input. Raises ValueError for
+    numbers that are not whole, more zeros than poles, or a delay that is negative.
 
     >>> TransferFunction(zeros=2, poles=3)
-    TransferFunction(zeros=2, poles=3)
+    TransferFunction(zeros=2, poles=3, delay=0.0)
     """
 
     zeros: int
     poles: int
+    delay: float | str = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "poles", whole("poles", self.poles))
@@ -40,6 +50,11 @@ class TransferFunction:
             raise ValueError(
                 f"zeros={self.zeros} is more than poles={self.poles}; no plant has that"
             )
+        if self.delay != "estimate":
+            delay = finite("delay", self.delay)
+            if delay < 0:
+                raise ValueError(f"delay={delay:g} s must not be negative")
+            object.__setattr__(self, "delay", delay)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +66,7 @@ class ContinuousModel:
     numerators: FloatArray
     input_names: Sequence[str]
     output_names: Sequence[str]
+    delay: float = 0.0
 
     def state_space(self) -> StateSpace:
         """A, B, C, D."""
@@ -67,7 +83,16 @@ class ContinuousModel:
 
     def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
         """Response at ``omega`` (rad/s), continuous or through a hold."""
-        return frequency_response(self.matrices, omega, hold, self.input_names, self.output_names)
+        frf = frequency_response(self.matrices, omega, hold, self.input_names, self.output_names)
+        if self.delay == 0:
+            return frf
+        between = BandLimited() if hold is None else hold
+        at = self.matrices
+        still = StateSpace(*(np.zeros((0, *M.shape)) for M in at))
+        realisation = Realisation(Linearisation(at, still), basis_of(at), delay=self.delay)
+        z = points(frf.omega, between)
+        plant, late = realisation.delayed(between, frf.omega, z)
+        return dataclasses.replace(frf, response=transfer(plant, z) * late)
 
     def response_with_variance(
         self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
@@ -85,7 +110,9 @@ class ContinuousModel:
                 J = np.zeros((len(names), K), complex)
                 begin = (o * m + i) * nb
                 for k in range(nb):
-                    J[begin + k] = s ** (nb - 1 - k) / a
+                    J[begin + k] = s ** (nb - 1 - k) / a * np.exp(-s * self.delay)
+                if "delay" in names:
+                    J[list(names).index("delay")] = -s * continuous.response[o, i]
                 for k in range(na):
                     J[p * m * nb + k] = -continuous.response[o, i] * s ** (na - 1 - k) / a
                 variance[o, i] = np.einsum("ak,ab,bk->k", J.conj(), covariance, J).real
@@ -95,6 +122,11 @@ class ContinuousModel:
         """The model as a continuous ``control.StateSpace``."""
         import control
 
+        if self.delay != 0:
+            raise ValueError(
+                f"control systems have no delay and this model has {self.delay:g} s; use "
+                "dataclasses.replace(model, delay=0).to_control() with control.pade(delay, order)"
+            )
         return control.ss(
             *self.matrices, inputs=list(self.input_names), outputs=list(self.output_names)
         )
@@ -196,7 +228,7 @@ def _chain_matrices(
     return A * scale, B * scale, C, D
 
 
-def rational_model(model: GreyBox, zeros: int) -> ContinuousModel:
+def rational_model(model: GreyBox, zeros: int, delay: float = 0.0) -> ContinuousModel:
     """Polynomials in s of a chained grey box: the model that a user sees."""
     at = model.state_space()
     p, m = at.D.shape
@@ -210,7 +242,8 @@ def rational_model(model: GreyBox, zeros: int) -> ContinuousModel:
             # det(sI − A + b c) = a(s) + c adj(sI − A) b
             full = np.real(np.poly(A - np.outer(b, c))) - a + at.D[o, i] * a
             numerators[o, i] = full[n - zeros :]
-    return ContinuousModel(at, a, numerators, tuple(model.inputs or ()), tuple(model.outputs or ()))
+    names = tuple(model.inputs or ()), tuple(model.outputs or ())
+    return ContinuousModel(at, a, numerators, *names, delay)
 
 
 def coefficients(model: ContinuousModel) -> tuple[list[str], FloatArray]:
