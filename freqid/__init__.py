@@ -9,6 +9,7 @@ from freqid.fit import fit
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
 from freqid.models import GreyBox, Parameter
+from freqid.order_selection import plot_orders, select_order
 from freqid.plants import drivetrain, first_order, two_mass
 from freqid.plots import bode, nyquist, plot_coherence, plot_record
 from freqid.rational import OutputError
@@ -38,8 +39,10 @@ __all__ = [
     "nyquist",
     "paper",
     "plot_coherence",
+    "plot_orders",
     "plot_record",
     "read",
+    "select_order",
     "simulate",
     "sine",
     "two_mass",

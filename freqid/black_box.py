@@ -15,7 +15,7 @@ from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import FirstOrderHold, PeriodicHold
 from freqid.models import GreyBox
-from freqid.optimise import Objective, Solution, minimise, noise_variance
+from freqid.optimise import Objective, Solution, minimise, noise_variance, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
 from freqid.responses import Plane
@@ -29,8 +29,14 @@ from freqid.transfer_functions import (
     rational_model,
 )
 
+# an order too many leaves a flat valley of cancelling poles and zeros: a relative gain in cost this
+# small moves no coefficient by a visible part of its standard error
+_TOLERANCE = 1e-9
+_STEPS = 80
+# unknowns of a chart, which are of order one, that have moved so far want a chart of their own
+_FAR = 0.3
 # a chart is left for one around its own optimum this often at most
-_CHARTS = 8
+_CHARTS = 5
 
 
 def fit_black_box(
@@ -87,6 +93,18 @@ def reference_cost(
     return solution.point.cost
 
 
+def cost_of(model: DiscreteModel, data: Any, weights: Any, options: Options) -> float:
+    """Cost of a sampled model on weighted lines, its transient fitted to them."""
+    shape = len(data.output_names), len(data.input_names)
+    spectral = dataclasses.replace(
+        options, initial_state=_without_zero(options.initial_state), domain="frequency"
+    )
+    experiment, _ = prepare(data, shape, weights, spectral, Plane())
+    chart = Chart(model.matrices, bool(model.matrices.D.any()), Plane())
+    point = Objective(chart, [experiment]).point(np.zeros(chart.size))
+    return np.inf if point is None else point.cost
+
+
 def _without_zero(initial_state: str) -> str:
     return "estimate" if initial_state == "zero" else initial_state
 
@@ -108,18 +126,21 @@ def _lines(sets: Sequence[Any], shape: tuple[int, int], options: Options) -> Com
 
 def _descend(chart: Chart, experiments: Sequence[Any]) -> tuple[Chart, Solution, Objective]:
     """Least squares, moving the chart to its own optimum until that gains nothing more."""
-    count = 0
+    objective = Objective(chart, experiments)
+    near = polish(objective, np.zeros(chart.size), limit=_STEPS, tolerance=_TOLERANCE)
+    if near.converged and np.abs(near.x).max() < _FAR:
+        return chart, near, objective
+    chart, count = chart.moved(near.x), objective.n_evaluations
     while True:
         objective = Objective(chart, experiments)
         objective.n_evaluations = count
-        solution = minimise(objective, np.zeros(chart.size))
+        solution = minimise(objective, np.zeros(chart.size), _TOLERANCE, limit=_STEPS)
         count = objective.n_evaluations
         start = objective.point(np.zeros(chart.size))
         assert start is not None
         gained = start.cost - solution.point.cost
         # noise-free data leave a cost of rounding, which has no minimum to follow
-        rounding = 1e-20 * sum(e.energy for e in experiments)
-        if chart.moves >= _CHARTS or gained <= 1e-10 * start.cost + rounding:
+        if chart.moves >= _CHARTS or gained <= 1e-8 * start.cost + objective.rounding:
             return chart, solution, objective
         chart = chart.moved(solution.x)
 
@@ -156,14 +177,10 @@ def _coefficient_estimate(
     dt: float,
 ) -> Estimate:
     """An Estimate whose parameters are coefficients: smooth functions of the unknowns x."""
-    point = solution.point
+    point, step = solution.point, 1e-7
     names, values = coefficients(solution.x)
-    change = np.array(
-        [
-            (coefficients(solution.x + s)[1] - coefficients(solution.x - s)[1]) / 2e-6
-            for s in 1e-6 * np.eye(len(scale))
-        ]
-    ).T
+    moved = [coefficients(solution.x + s)[1] for s in step * np.eye(len(scale))]
+    change = (np.array(moved) - values).T / step
     noise = noise_variance(objective, point, len(scale))
     half = change @ np.linalg.pinv(point.jacobian)
     energy = sum(e.energy for e in objective.experiments)

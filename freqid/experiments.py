@@ -233,6 +233,11 @@ class SpectralExperiment:
         return cls(frf.omega, frf.omega, U, frf.response, scale, hold, None, plane=plane)
 
     @property
+    def n_lines(self) -> int:
+        """Number of DFT lines, whatever their weights."""
+        return len(self.omega)
+
+    @property
     def energy(self) -> float:
         """Weighted energy of the data, the cost of a model that is zero."""
         return float(np.sum(self.rows(self.Y) ** 2))

@@ -287,7 +287,11 @@ _LAST_STEP = 1e-7
 
 
 def polish(
-    objective: Objective, x: FloatArray, last_step: float = _LAST_STEP, limit: int | None = None
+    objective: Objective,
+    x: FloatArray,
+    last_step: float = _LAST_STEP,
+    limit: int | None = None,
+    tolerance: float = 1e-14,
 ) -> Solution:
     """A few Gauss-Newton steps from a point close to the minimum; a full search where they fail.
 
@@ -314,7 +318,7 @@ def polish(
         if trial is None or trial.cost > point.cost:
             break
         x, point = x + step, trial
-    return minimise(objective, x, limit=limit)
+    return minimise(objective, x, tolerance, limit)
 
 
 def _padded(rows: FloatArray, size: int) -> FloatArray:

@@ -65,10 +65,15 @@ class DiscreteModel:
         """a(z), highest power first, (order + 1,)."""
         return np.real(np.poly(self.matrices.A))
 
-    def numerator(self, output: int = 0, input: int = 0) -> FloatArray:
-        """b(z) from one input to one output, highest power first, (order + 1,)."""
+    def numerator(
+        self, output: int = 0, input: int = 0, known: FloatArray | None = None
+    ) -> FloatArray:
+        """b(z) from one input to one output, highest power first, (order + 1,).
+
+        ``known`` is the denominator, where it has been computed.
+        """
         A, B, C, D = self.matrices
-        a = self.denominator()
+        a = self.denominator() if known is None else known
         # det(zI − A + b c) = a(z) + c adj(zI − A) b
         return np.real(np.poly(A - np.outer(B[:, input], C[output]))) - a + D[output, input] * a
 
@@ -89,14 +94,14 @@ class DiscreteModel:
         """Names and values of the coefficients: b of each channel pair, then a."""
         p, m = self.matrices.D.shape
         names, values = [], []
+        a = self.denominator()
         for o in range(p):
             for i in range(m):
                 pair = "" if p * m == 1 else f"[{self.output_names[o]},{self.input_names[i]}]"
-                b = self.numerator(o, i)
+                b = self.numerator(o, i, a)
                 for k in range(0 if self.matrices.D.any() else 1, len(b)):
                     names.append(f"b{k}{pair}")
                     values.append(b[k])
-        a = self.denominator()
         names += [f"a{k}" for k in range(1, len(a))]
         return names, np.array([*values, *a[1:]])
 

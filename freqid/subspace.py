@@ -13,8 +13,9 @@ import scipy.linalg
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import SpectralExperiment
+from freqid.holds import BandLimited
 from freqid.optimise import triangle
-from freqid.responses import Plane, StateSpace
+from freqid.responses import Plane, StateSpace, basis_of
 
 
 def plane_for(z: ComplexArray) -> Plane:
@@ -88,8 +89,7 @@ def _inputs(
     n, m, p = len(A), experiments[0].U.shape[0], len(C)
     rows, right = [], []
     for index, e in enumerate(experiments):
-        R = np.linalg.inv(e.z[:, None, None] * np.eye(n) - A)
-        CR = (C @ R).transpose(1, 2, 0)
+        CR = _output_rows(A, C, e.z)
         blocks = []
         for j in range(m):
             for i in range(n):
@@ -108,8 +108,8 @@ def _inputs(
                 if other != index:
                     blocks.append(np.zeros(2 * e.Y.size))
                     continue
-                F = C @ np.linalg.inv(e.z_free[:, None, None] * np.eye(n) - A)[:, :, i, None]
-                y = (F[:, :, 0].T * e.free_factor).reshape(p, 1, -1, e.free_aliases).sum(axis=-1)
+                F = _output_rows(A, C, e.z_free)[:, i]
+                y = (F * e.free_factor).reshape(p, 1, -1, e.free_aliases).sum(axis=-1)
                 blocks.append(e.rows(y))
         rows.append(np.array(blocks).T)
         right.append(e.rows(e.Y))
@@ -119,3 +119,11 @@ def _inputs(
     if feedthrough:
         D = solution[n * m : n * m + p * m].reshape(m, p).T
     return StateSpace(A, B, C, D)
+
+
+def _output_rows(A: FloatArray, C: FloatArray, w: ComplexArray) -> ComplexArray:
+    """C (wI − A)⁻¹, (outputs, states, lines)."""
+    n, p = len(A), len(C)
+    basis = basis_of(StateSpace(A, np.eye(n), C, np.zeros((p, n))))
+    rows = basis.through(BandLimited()).output_rows(w)
+    return np.moveaxis(np.tensordot(basis.to_basis.T, rows, (1, 1)), 0, 1)
