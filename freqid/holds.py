@@ -201,8 +201,8 @@ def _checked(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
     return A, B
 
 
-# twelve Gauss-Legendre nodes integrate exp(xs) on [0, 1] to rounding for |x| <= 1
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+# eight Gauss-Legendre nodes integrate exp(xs) on [0, 1] to rounding for |x| <= 1
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 
 

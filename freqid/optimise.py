@@ -21,6 +21,7 @@ from freqid.checks import FloatArray
 from freqid.experiments import Experiment, Realisation
 from freqid.holds import Hold
 from freqid.priors import Prior
+from freqid.responses import BLOCK
 
 
 class Structure(Protocol):
@@ -141,6 +142,16 @@ def triangle(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
+def inner(A: FloatArray, B: FloatArray) -> FloatArray:
+    """A Bᵀ for few long rows, block by block (see BLOCK)."""
+    if A.shape[1] <= 2 * BLOCK:
+        return A @ B.T
+    total = np.zeros((len(A), len(B)))
+    for start in range(0, A.shape[1], BLOCK):
+        total += A[:, start : start + BLOCK] @ B[:, start : start + BLOCK].T
+    return total
+
+
 # least pivot of the scaled Gram matrix below which half of the digits are gone
 _LEAST_PIVOT = 1e-4
 
@@ -155,11 +166,11 @@ def _triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | Non
     G, g, rr = np.zeros((P, P)), np.zeros(P), 0.0
     size = np.zeros(P)
     for J, r, Q in blocks:
-        full = J @ J.T
+        full = inner(J, J)
         size += np.diag(full)
         G, g, rr = G + full, g + J @ r, rr + float(r @ r)
         if Q is not None:
-            seen = J @ Q.T
+            seen = inner(J, Q)
             G = G - seen @ seen.T
     size = np.sqrt(size)
     if np.isfinite(G).all() and np.isfinite(rr) and (size > 0).all():
@@ -192,7 +203,7 @@ def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.zeros((0, len(r))), delta
     if not used.all():
         T, size = T[used], size[used]
-    gram = (T @ T.T) / np.outer(size, size)
+    gram = inner(T, T) / np.outer(size, size)
     try:
         L = np.linalg.cholesky(gram)
     except np.linalg.LinAlgError:
@@ -203,7 +214,7 @@ def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         Q = first @ T
         if least < 0.03:
             # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
-            second = np.linalg.inv(np.linalg.cholesky(Q @ Q.T))
+            second = np.linalg.inv(np.linalg.cholesky(inner(Q, Q)))
             Q, first = second @ Q, second @ first
         delta[used] = -first.T @ (Q @ r)
         return Q, delta

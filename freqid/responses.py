@@ -37,6 +37,9 @@ from freqid.holds import (
 
 # beyond this the eigenbasis loses more digits than the fit can spare
 WORST_CONDITION = 1e5
+# lines worked on at once: their products stay in the processor's cache, and one matrix product of
+# them stays below the size at which BLAS wakes its threads, which costs more than it saves
+BLOCK = 4096
 
 
 class StateSpace(NamedTuple):
@@ -133,6 +136,8 @@ class SampledPlant:
         """
         n, p = w.shape[-2], w.shape[-3]
         lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
+        if lines > 2 * BLOCK and aliases == 1:
+            return self._in_blocks(z, w, x, U, direct, dz)
         P = self.dphi.shape[-3]
         moving_C, moving_D = self.dC.any(), U is not None and self.dD.any()
         push = None
@@ -179,6 +184,29 @@ class SampledPlant:
                 row[..., -1, :, :] -= sum_runs((wo * x).sum(axis=-3) * dz, aliases)
             rows.append(row)
         return rows[0][..., None, :, :] if p == 1 else np.stack(rows, axis=-3)
+
+    def _in_blocks(
+        self,
+        z: ComplexArray,
+        w: ComplexArray,
+        x: ComplexArray,
+        U: ComplexArray | None,
+        direct: ComplexArray | None,
+        dz: ComplexArray | None,
+    ) -> ComplexArray:
+        shape = (self.dphi.shape[-3], w.shape[-3], *x.shape[-2:])
+        dy = np.empty((*x.shape[:-3], *shape), complex)
+        for start in range(0, x.shape[-1], BLOCK):
+            part = slice(start, start + BLOCK)
+            dy[..., part] = self.sensitivity(
+                z[part],
+                w[..., part],
+                x[..., part],
+                None if U is None else U[..., part],
+                direct=None if direct is None else direct[..., part],
+                dz=None if dz is None else dz[part],
+            )
+        return dy
 
 
 def _times(M: Array, x: ComplexArray) -> ComplexArray:
