@@ -15,7 +15,8 @@ import numpy as np
 import scipy.linalg
 
 import freqid as fq
-from freqid.responses import basis_of, points
+from freqid.bases import basis_of
+from freqid.responses import points
 
 sys.path.insert(0, str(Path(__file__).parent))
 import baseline
@@ -68,16 +69,22 @@ def starts(count):
     slow = fast.decimate(10)
     for hold in ("zoh", "foh"):
         share, tried = reached(PLANT, slow, 10, count, hold=hold, band=BAND)
-        show(f"starts: two-mass, decimated, {hold}, factor 10, {count} runs",
-             f"{100 * share:.1f} %, {tried:.1f} tried", ">= 99.5 %")  # fmt: skip
+        show(
+            f"starts: two-mass, decimated, {hold}, factor 10, {count} runs",
+            f"{100 * share:.1f} %, {tried:.1f} tried",
+            ">= 99.5 %",
+        )
     for label, record in (("full rate", fast), ("decimated", slow)):
         share, _ = reached(PLANT, record, 1.5, max(count // 5, 20), sides=True, band=BAND)
         show(f"starts: 1.5 up or down, {label}", f"{100 * share:.1f} %", "100 %")
     three = fq.drivetrain(3)
     record = fq.simulate(three, fq.chirp(2, 100, 10, T1), T1)
     share, tried = reached(three, record, 3, max(count // 4, 20), band=(2, 100))
-    show("starts: drivetrain(3), 8 free parameters, full rate, factor 3",
-         f"{100 * share:.1f} %, {tried:.1f} tried", ">= 98 %")  # fmt: skip
+    show(
+        "starts: drivetrain(3), 8 free parameters, full rate, factor 3",
+        f"{100 * share:.1f} %, {tried:.1f} tried",
+        ">= 98 %",
+    )
 
 
 def kernel():
@@ -109,8 +116,11 @@ def kernel():
     a, b = eigenbasis(), block_exponential()
     difference = np.abs(a[1][:, 0, 0] - b[1][:, :, 0, 0]).max() / np.abs(a[1]).max()
     ours, theirs = paired(eigenbasis, block_exponential, 200)
-    show("kernel: response and five derivatives, 701 lines",
-         f"{ours / theirs:.2f} ({1e3 * ours:.2f} ms)", "<= 0.25")  # fmt: skip
+    show(
+        "kernel: response and five derivatives, 701 lines",
+        f"{ours / theirs:.2f} ({1e3 * ours:.2f} ms)",
+        "<= 0.25",
+    )
     show("kernel: largest difference of the two routes, relative", f"{difference:.0e}", "rounding")
 
 
@@ -129,8 +139,11 @@ def speed(quick):
         count = {10: 15, 100: 9, 1000: 5}[duration] if not quick else 3
         mine, other = paired(ours, theirs, count)
         error = np.abs(ours().values / TRUE - 1).max()
-        show(f"grey box from 20 % off, {len(record.u)} samples, times faster",
-             f"{other / mine:.1f} ({1e3 * mine:.1f} ms)", f">= {target}; error {error:.0e}")  # fmt: skip
+        show(
+            f"grey box from 20 % off, {len(record.u)} samples, times faster",
+            f"{other / mine:.1f} ({1e3 * mine:.1f} ms)",
+            f">= {target}; error {error:.0e}",
+        )
 
 
 def hold_estimate(count):
@@ -149,8 +162,11 @@ def hold_estimate(count):
         noisy = fq.fit(PLANT, slow.with_noise(std, seed=seed), hold="estimate", band=BAND)
         row = noisy.parameters.loc["hold_period"]
         inside += row["lower"] <= T1 <= row["upper"]
-    show(f"hold='estimate', 1 % noise: 95 % interval holds, {count} runs",
-         f"{100 * inside / count:.1f} %", "95 +- 2 %")  # fmt: skip
+    show(
+        f"hold='estimate', 1 % noise: 95 % interval holds, {count} runs",
+        f"{100 * inside / count:.1f} %",
+        "95 +- 2 %",
+    )
 
 
 def black_boxes():
@@ -170,18 +186,27 @@ def black_boxes():
             est.to_control().poles() if spec != fq.OutputError(12) else est.to_continuous().poles()
         )
         near = np.array([poles[np.argmin(np.abs(poles - (-damping * w + 1j * w)))] for w in modes])
-        show(f"order 12, 1 % noise, {type(spec).__name__}: worst mode frequency",
-             f"{100 * np.abs(np.abs(near) / modes - 1).max():.4f} %", "0.1 %")  # fmt: skip
-        show(f"order 12, 1 % noise, {type(spec).__name__}: worst damping",
-             f"{100 * np.abs(-near.real / np.abs(near) / damping - 1).max():.2f} %", "10 %")  # fmt: skip
+        show(
+            f"order 12, 1 % noise, {type(spec).__name__}: worst mode frequency",
+            f"{100 * np.abs(np.abs(near) / modes - 1).max():.4f} %",
+            "0.1 %",
+        )
+        show(
+            f"order 12, 1 % noise, {type(spec).__name__}: worst damping",
+            f"{100 * np.abs(-near.real / np.abs(near) / damping - 1).max():.2f} %",
+            "10 %",
+        )
     slow = chirp().decimate(10)
     mine, other = paired(
         lambda: fq.fit(fq.OutputError(3), slow, hold="zoh"),
         lambda: baseline.output_error(slow.u, slow.y),
         15,
     )
-    show("third-order output error against Steiglitz-McBride + LM",
-         f"{mine / other:.1f} times ({1e3 * mine:.1f} ms)", "<= 2")  # fmt: skip
+    show(
+        "third-order output error against Steiglitz-McBride + LM",
+        f"{mine / other:.1f} times ({1e3 * mine:.1f} ms)",
+        "<= 2",
+    )
 
 
 def main():

@@ -13,7 +13,8 @@ import scipy.linalg
 
 from freqid.checks import FloatArray
 from freqid.experiments import Realisation
-from freqid.responses import Linearisation, Plane, StateSpace
+from freqid.responses import Plane
+from freqid.sampled_plant import Linearisation, StateSpace
 
 
 class Chart:

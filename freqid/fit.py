@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.black_box import fit_black_box, fit_transfer_function, reference_cost
+from freqid.black_box import fit_black_box, reference_cost
 from freqid.checks import choice, unknown, whole
 from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
@@ -23,6 +23,7 @@ from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.starts import Found, log_targets, noise_floor, search
 from freqid.structures import GreyStructure
+from freqid.transfer_fit import fit_transfer_function
 from freqid.transfer_functions import TransferFunction
 from freqid.trust import physical_warnings, uncertainty
 

@@ -13,17 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from freqid.bases import basis_of
 from freqid.checks import Array, FloatArray, finite, unknown
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold
-from freqid.responses import (
-    Linearisation,
-    StateSpace,
-    basis_of,
-    frequency_response,
-    points,
-    response_and_derivatives,
-)
+from freqid.responses import frequency_response, points, response_and_derivatives
+from freqid.sampled_plant import Linearisation, StateSpace
 from freqid.ties import Ties
 
 Matrices = Callable[..., Sequence[Any]]

@@ -21,7 +21,7 @@ from freqid.checks import FloatArray
 from freqid.experiments import Experiment, Realisation
 from freqid.holds import Hold
 from freqid.priors import Prior
-from freqid.responses import BLOCK
+from freqid.sampled_plant import BLOCK
 
 
 class Structure(Protocol):

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import FloatArray, choice
-from freqid.experiments import Experiment, SpectralExperiment, TimeExperiment
+from freqid.experiments import Experiment, SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold, PeriodicHold, as_hold
 from freqid.record import Record
 from freqid.responses import Plane
 from freqid.spectra import spectra
+from freqid.time_experiments import TimeExperiment
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+from freqid.bases import basis_of
 from freqid.checks import ComplexArray, FloatArray, whole
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, Hold, PeriodicHold, ZeroOrderHold, as_hold
-from freqid.responses import StateSpace, basis_of, transfer
+from freqid.responses import transfer
+from freqid.sampled_plant import StateSpace
 
 
 @dataclass(frozen=True)

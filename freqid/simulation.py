@@ -8,10 +8,12 @@ import numpy as np
 import scipy.linalg
 import scipy.signal
 
+from freqid.bases import basis_of
 from freqid.checks import Array, FloatArray, positive, samples
 from freqid.holds import Hold, PeriodicHold, Sampled, as_hold
 from freqid.record import Record
-from freqid.responses import StateSpace, basis_of, points, transfer
+from freqid.responses import points, transfer
+from freqid.sampled_plant import StateSpace
 
 
 def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:

@@ -10,7 +10,8 @@ from freqid.checks import FloatArray
 from freqid.experiments import Realisation
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
-from freqid.responses import Linearisation, StateSpace, many_responses
+from freqid.responses import many_responses
+from freqid.sampled_plant import Linearisation, StateSpace
 
 # scattered starts lie within this factor of the start, where there are no bounds
 SPREAD = 10.0

@@ -11,11 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.linalg
 
+from freqid.bases import basis_of
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import SpectralExperiment
 from freqid.holds import BandLimited
 from freqid.optimise import triangle
-from freqid.responses import Plane, StateSpace, basis_of
+from freqid.responses import Plane
+from freqid.sampled_plant import StateSpace
 
 
 def plane_for(z: ComplexArray) -> Plane:

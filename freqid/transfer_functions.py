@@ -10,19 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from freqid.bases import basis_of
 from freqid.checks import Array, ComplexArray, FloatArray, finite, whole
 from freqid.experiments import Realisation
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold
 from freqid.models import GreyBox, Parameter
-from freqid.responses import (
-    Linearisation,
-    StateSpace,
-    basis_of,
-    frequency_response,
-    points,
-    transfer,
-)
+from freqid.responses import frequency_response, points, transfer
+from freqid.sampled_plant import Linearisation, StateSpace
 
 _ANY = (-np.inf, np.inf)
 

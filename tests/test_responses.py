@@ -5,15 +5,9 @@ import numpy as np
 import pytest
 
 import freqid as fq
-from freqid.responses import (
-    EigenBasis,
-    Linearisation,
-    SchurBasis,
-    StateSpace,
-    basis_of,
-    points,
-    response_and_derivatives,
-)
+from freqid.bases import EigenBasis, SchurBasis, basis_of
+from freqid.responses import points, response_and_derivatives
+from freqid.sampled_plant import Linearisation, StateSpace
 
 OMEGA = 2 * np.pi * np.linspace(10, 80, 71)
 HOLDS = [fq.ZeroOrderHold(5e-3), fq.FirstOrderHold(5e-3), fq.BandLimited()]
