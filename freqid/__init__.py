@@ -8,8 +8,9 @@ from freqid.files import read, write
 from freqid.fit import fit
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
-from freqid.models import GreyBox, Parameter
+from freqid.models import GreyBox
 from freqid.order_selection import plot_orders, select_order
+from freqid.parameter import Parameter
 from freqid.plants import drivetrain, first_order, two_mass
 from freqid.plots import bode, nyquist, plot_coherence, plot_record
 from freqid.rational import OutputError

@@ -1,10 +1,9 @@
-"""Physically parameterised plants: Parameter and GreyBox."""
+"""GreyBox: a continuous-time plant whose matrices are functions of physical parameters."""
 
 from __future__ import annotations
 
 import copy
 import dataclasses
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,67 +13,15 @@ from typing import Any
 import numpy as np
 
 from freqid.bases import basis_of
-from freqid.checks import Array, FloatArray, finite, unknown
+from freqid.checks import Array, FloatArray, unknown
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold
+from freqid.parameter import Parameter
 from freqid.responses import frequency_response, points, response_and_derivatives
 from freqid.sampled_plant import Linearisation, StateSpace
 from freqid.ties import Ties
 
 Matrices = Callable[..., Sequence[Any]]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A physical parameter: its name, nominal value, unit and what is known of its range.
-
-    ``lower`` and ``upper`` bound the search of a fit. ``physical`` (low, high) only flags: an
-    estimate outside it is reported in ``est.warnings``, never prevented. ``prior`` (mean, standard
-    deviation) is what was known before the experiment. Raises ValueError for a value that is not
-    finite or outside its bounds, for bounds that cross, and for a fixed parameter with a prior.
-
-    >>> Parameter("k", 1.5e5, unit="N m/rad", lower=0).name
-    'k'
-    """
-
-    name: str
-    value: float
-    unit: str = ""
-    lower: float = -math.inf
-    upper: float = math.inf
-    fixed: bool = False
-    physical: tuple[float, float] = (0, math.inf)
-    prior: tuple[float, float] | None = None
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name:
-            raise ValueError(f"name={self.name!r} must be a non-empty string")
-        object.__setattr__(self, "value", finite(f"parameter {self.name}", self.value))
-        if not self.lower < self.upper:
-            raise ValueError(
-                f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"
-            )
-        if not self.lower <= self.value <= self.upper:
-            raise ValueError(
-                f"parameter {self.name}={self.value:g} lies outside its bounds "
-                f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
-            )
-        if self.prior is not None:
-            try:
-                mean, std = (float(v) for v in self.prior)
-            except (TypeError, ValueError):
-                raise ValueError(
-                    f"parameter {self.name}: prior={self.prior!r} must be (mean, std)"
-                ) from None
-            if not (math.isfinite(mean) and math.isfinite(std) and std > 0):
-                raise ValueError(
-                    f"parameter {self.name}: prior={self.prior!r} must have a finite mean and a "
-                    "positive standard deviation"
-                )
-            if self.fixed:
-                raise ValueError(
-                    f"parameter {self.name} is fixed and has a prior; free it or drop the prior"
-                )
 
 
 @dataclass(frozen=True)

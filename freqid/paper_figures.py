@@ -14,7 +14,7 @@ from freqid.excitation import sine
 from freqid.files import whole_file
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import ZeroOrderHold
-from freqid.paper import BAND, FACTOR, OMEGA, T1, T2, first_order_estimates, study
+from freqid.paper_study import BAND, FACTOR, OMEGA, T1, T2, first_order_estimates, study
 from freqid.plants import first_order, two_mass
 from freqid.plots import bode, nyquist
 from freqid.simulation import simulate

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import choice, whole
-from freqid.models import GreyBox, Parameter
+from freqid.models import GreyBox
+from freqid.parameter import Parameter
 
 
 def first_order(b: float = 100, a: float = 100) -> GreyBox:

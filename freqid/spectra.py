@@ -69,14 +69,31 @@ def spectra(
     Where the input is faster than the output the band is that of the input: a line is kept when
     any frequency that folds onto it lies inside. Raises ValueError for a band outside
     (0, Nyquist), one that holds no line, or an input that is zero over it.
+
+    A record never changes, so it keeps its spectra: each is computed once, however many fits ask.
     """
+    inside = None if limits is None else band(limits, 0.5 / record.input_dt)
+    key = inside, lifted and record.factor > 1
+    known: dict[Any, Spectra] = record.__dict__.setdefault("_spectra", {})
+    if key not in known:
+        computed = _compute(record, inside, key[1])
+        while len(known) >= _REMEMBERED:
+            known.pop(next(iter(known)))
+        known[key] = computed
+    return known[key]
+
+
+# spectra that a record keeps
+_REMEMBERED = 4
+
+
+def _compute(record: Record, limits: tuple[float, float] | None, lifted: bool) -> Spectra:
     M = record.factor
     N = len(record.u) // M
     if N < 2:
         raise ValueError(f"record has {N} whole output samples; a spectrum needs two or more")
     u, y = record.inputs[: N * M], record.outputs[:N]
     lines = _lines(record, N, limits)
-    lifted = lifted and M > 1
     if M == 1:
         both = dft_at([*u.T, *y.T], lines)
         U, Y = both[: u.shape[1], :, None], both[u.shape[1] :]
@@ -155,7 +172,7 @@ def _lines(record: Record, N: int, limits: tuple[float, float] | None) -> npt.ND
     last_line = N // 2
     if limits is None:
         return np.arange(last_line + 1)
-    low, high = band(limits, 0.5 / record.input_dt)
+    low, high = limits
     spacing = 1 / (N * record.dt)
     # a band edge on a line, up to rounding, is inside
     first, last = int(np.ceil(low / spacing - 1e-6)), int(np.floor(high / spacing + 1e-6))

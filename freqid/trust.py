@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.models import Parameter
+from freqid.parameter import Parameter
 
 # columns of the Jacobian that are parallel to this are told apart by rounding alone
 _PARALLEL = 1e-7
