@@ -32,16 +32,21 @@ def show(what, value, target):
 
 
 def paired(ours, theirs, count):
-    """Median times of two functions called in turn."""
-    ours(), theirs()
-    times = []
-    for _ in range(count):
-        a = time.perf_counter()
-        ours()
-        b = time.perf_counter()
-        theirs()
-        times.append((b - a, time.perf_counter() - b))
-    return np.median(times, axis=0)
+    """Median times of two functions, each called ``count`` times running, in turn, twice.
+
+    Not call by call: the threads of BLAS spin for a while after the last product, and would be
+    charged to whatever comes next. The pauses let them go to sleep.
+    """
+    times = {ours: [], theirs: []}
+    for _ in range(2):
+        for function in (ours, theirs):
+            time.sleep(0.5)
+            function()
+            for _ in range(count):
+                start = time.perf_counter()
+                function()
+                times[function].append(time.perf_counter() - start)
+    return np.median(times[ours]), np.median(times[theirs])
 
 
 def chirp(duration=10.0):

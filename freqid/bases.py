@@ -31,9 +31,10 @@ class EigenBasis:
         self.eigenvalues, V, self.to_basis = eigen
         Vi = self.to_basis
         self.B, self.C, self.D = Vi @ at.B, at.C @ V, at.D
-        Vp, Vip = V[..., None, :, :], Vi[..., None, :, :]
-        self.dA = Vip @ derivative.A @ Vp
-        self.dB, self.dC, self.dD = Vip @ derivative.B, derivative.C @ Vp, derivative.D
+        Vp, Vip, n = V[..., None, :, :], Vi[..., None, :, :], V.shape[-1]
+        both = Vip @ np.concatenate([derivative.A, derivative.B], axis=-1)
+        self.dA, self.dB = both[..., :n] @ Vp, both[..., n:]
+        self.dC, self.dD = derivative.C @ Vp, derivative.D
 
     def through(self, hold: Hold, lift: int = 1) -> SampledPlant:
         """The plant as ``hold`` samples it, its output kept at every ``lift``-th sample.

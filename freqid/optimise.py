@@ -119,7 +119,7 @@ class Objective:
                 Q = None
                 if T is not None:
                     Q, delta = _eliminate(T, r)
-                    r = r - (Q @ r) @ Q
+                    r = r - combined(along(Q, r), Q)
                 blocks.append((evaluation.jacobian(delta), r, Q))
                 initial.append(delta)
                 parts.append(float(r @ r))
@@ -147,9 +147,20 @@ def inner(A: FloatArray, B: FloatArray) -> FloatArray:
     if A.shape[1] <= 2 * BLOCK:
         return A @ B.T
     total = np.zeros((len(A), len(B)))
-    for start in range(0, A.shape[1], BLOCK):
-        total += A[:, start : start + BLOCK] @ B[:, start : start + BLOCK].T
+    for start in range(0, A.shape[1], 2 * BLOCK):
+        part = slice(start, start + 2 * BLOCK)
+        total += A[:, part] @ B[:, part].T
     return total
+
+
+def along(A: FloatArray, x: FloatArray) -> FloatArray:
+    """A x for few long rows; einsum, because BLAS would wake its threads for so little."""
+    return np.einsum("ij,j->i", A, x)
+
+
+def combined(c: FloatArray, A: FloatArray) -> FloatArray:
+    """Σ c_i A_i for few long rows."""
+    return np.einsum("i,ij->j", c, A)
 
 
 # least pivot of the scaled Gram matrix below which half of the digits are gone
@@ -168,7 +179,7 @@ def _triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | Non
     for J, r, Q in blocks:
         full = inner(J, J)
         size += np.diag(full)
-        G, g, rr = G + full, g + J @ r, rr + float(r @ r)
+        G, g, rr = G + full, g + along(J, r), rr + float(r @ r)
         if Q is not None:
             seen = inner(J, Q)
             G = G - seen @ seen.T
@@ -216,7 +227,7 @@ def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
             # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
             second = np.linalg.inv(np.linalg.cholesky(inner(Q, Q)))
             Q, first = second @ Q, second @ first
-        delta[used] = -first.T @ (Q @ r)
+        delta[used] = -first.T @ along(Q, r)
         return Q, delta
     unit = T / size[:, None]
     # modes that the output hardly shows: keep the directions that it does

@@ -19,7 +19,7 @@ from freqid.checks import Array, ComplexArray, FloatArray
 
 # lines worked on at once: their products stay in the processor's cache, and one matrix product of
 # them stays below the size at which BLAS wakes its threads, which costs more than it saves
-BLOCK = 4096
+BLOCK = 2048
 
 
 class StateSpace(NamedTuple):
@@ -116,7 +116,7 @@ class SampledPlant:
         """
         n, p = w.shape[-2], w.shape[-3]
         lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
-        if lines > 2 * BLOCK and aliases == 1:
+        if lines > BLOCK and aliases == 1:
             return self._in_blocks(z, w, x, U, direct, dz)
         P = self.dphi.shape[-3]
         moving_C, moving_D = self.dC.any(), U is not None and self.dD.any()
@@ -191,8 +191,8 @@ class SampledPlant:
 
 def _times(M: Array, x: ComplexArray) -> ComplexArray:
     """M (…, a, b) times x (…, b, channels, lines)."""
-    flat = x.reshape(*x.shape[:-2], -1)
-    return (M @ flat).reshape(*(M @ flat[..., :1]).shape[:-1], *x.shape[-2:])
+    product = M @ x.reshape(*x.shape[:-2], -1)
+    return product.reshape(*product.shape[:-1], *x.shape[-2:])
 
 
 def sum_runs(F: ComplexArray, aliases: int) -> ComplexArray:
