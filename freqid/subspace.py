@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
 
 from freqid.bases import basis_of
 from freqid.checks import ComplexArray, FloatArray
@@ -115,7 +114,8 @@ def _inputs(
                 blocks.append(e.rows(y))
         rows.append(np.array(blocks).T)
         right.append(e.rows(e.Y))
-    solution = scipy.linalg.lstsq(np.concatenate(rows), np.concatenate(right))[0]
+    R = triangle(np.column_stack([np.concatenate(rows), np.concatenate(right)]))
+    solution = np.linalg.lstsq(R[:, :-1], R[:, -1])[0]
     B = solution[: n * m].reshape(m, n).T
     D = np.zeros((p, m))
     if feedthrough:
