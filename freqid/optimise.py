@@ -333,7 +333,7 @@ def polish(
     """
     point = objective.point(x)
     P = len(x)
-    for _ in range(6):
+    for _ in range(12):
         if point is None or len(point.triangle) <= P:
             break
         if point.cost <= objective.rounding:
@@ -342,7 +342,8 @@ def polish(
         if np.abs(np.diag(R)).min() <= 1e-8 * np.abs(np.diag(R)).max():
             break
         step = -scipy.linalg.solve_triangular(R, c)
-        if np.abs(step).max() <= last_step:
+        # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain
+        if np.abs(step).max() <= last_step or float(c @ c) <= tolerance * point.cost:
             left = max(1 - float(c @ c) / max(point.cost, 1e-300), 0.0)
             triangle = point.triangle.copy()
             triangle[:P, P] = 0
