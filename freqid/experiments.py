@@ -77,7 +77,6 @@ class Realisation:
         """The sampled plant, z at ``omega`` and the derivative of z by an estimated period."""
         if self.period is None:
             return self.basis.through(hold, lift), z, None
-        # (a delay belongs to black boxes, whose hold is known)
         hold = ZeroOrderHold(self.period)
         z = points(omega, hold)
         plant = self.basis.by_period(self.basis.through(hold))

@@ -60,7 +60,8 @@ def fit(
             time domain (Parseval), but for the line at zero of a plant that integrates. Where the
             input is faster than the output this is the input's band.
         weights: None for ones (for a response its input spectrum, where known), ``"noise"`` for
-            1/variance, or an array, (lines,) or (outputs, lines).
+            1/variance, or an array, (lines,) or (outputs, lines); a list of these, one for each of
+            several experiments.
         initial_state: ``"estimate"`` (free), ``"zero"`` (the sampled model starts at rest) or
             ``"steady"`` (no transient).
         start: parameter values to begin from; the model's own where not given.
@@ -88,7 +89,8 @@ def fit(
     sets = [data] if isinstance(data, (Record, FrequencyResponse)) else list(data)
     if not sets:
         raise ValueError("data=[] holds no experiment; give at least one record or response")
-    all_weights = weights if isinstance(weights, (list, tuple)) else [weights] * len(sets)
+    each = isinstance(weights, (list, tuple)) and not isinstance(data, (Record, FrequencyResponse))
+    all_weights = list(weights) if each else [weights] * len(sets)
     if len(all_weights) != len(sets):
         raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
     integrates = isinstance(model, GreyBox) and _integrates(model)

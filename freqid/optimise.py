@@ -327,12 +327,14 @@ def polish(
     limit: int | None = None,
     tolerance: float = 1e-14,
 ) -> Solution:
-    """A few Gauss-Newton steps from a point close to the minimum; a full search where they fail.
+    """A few Gauss-Newton steps from a point close to the minimum; a full search where they fail
+    or would leave the bounds.
 
     The unknowns are of order one. A step below ``last_step`` is taken without a second look.
     """
     point = objective.point(x)
     P = len(x)
+    lower, upper = objective.structure.lower, objective.structure.upper
     for _ in range(12):
         if point is None or len(point.triangle) <= P:
             break
@@ -342,6 +344,8 @@ def polish(
         if np.abs(np.diag(R)).min() <= 1e-8 * np.abs(np.diag(R)).max():
             break
         step = -scipy.linalg.solve_triangular(R, c)
+        if (x + step < lower).any() or (x + step > upper).any():
+            break
         # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain
         if np.abs(step).max() <= last_step or float(c @ c) <= tolerance * point.cost:
             left = max(1 - float(c @ c) / max(point.cost, 1e-300), 0.0)

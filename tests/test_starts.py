@@ -69,6 +69,19 @@ def test_scattered_starts_stay_inside_bounds(slow):
         fq.fit(inside, slow, start={"k": 5e6})
 
 
+def test_no_step_leaves_the_bounds(plant, slow):
+    """Also where the cost outside is lower and a Gauss-Newton step would go there."""
+    free = fq.fit(plant, slow, hold="foh", band=BAND)
+    for name in free.names:
+        value = free[name]
+        limit = value + 0.02 * abs(value)
+        bounds = {name: (limit, limit + 100 * abs(value))}
+        bounded = plant.with_values(**{name: limit * 1.5 if limit > 0 else 1e-3})
+        est = fq.fit(bounded.with_bounds(**bounds), slow, hold="foh", band=BAND)
+        assert est[name] >= limit
+        assert est.cost > free.cost
+
+
 def test_long_records_are_refined_on_all_lines(plant, relative_error):
     record = fq.simulate(plant, fq.chirp(10, 80, 60, 1e-3), 1e-3)
     assert relative_error(fq.fit(plant, record, band=BAND, start={"k": 1.9e5}), plant) < 1e-8
