@@ -14,7 +14,7 @@ from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import FirstOrderHold, PeriodicHold
-from freqid.optimise import Objective, Solution, minimise, noise_variance, polish
+from freqid.optimise import Objective, Solution, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
 from freqid.responses import Plane
@@ -174,7 +174,6 @@ def coefficient_estimate(
     change = (np.array(moved) - values).T / step
     noise = noise_variance(objective, point, len(scale))
     half = change @ np.linalg.pinv(point.jacobian)
-    energy = sum(e.energy for e in objective.experiments)
     return Estimate(
         model=model,
         names=names,
@@ -182,13 +181,8 @@ def coefficient_estimate(
         nominal=np.full(len(values), np.nan),
         units=[""] * len(values),
         covariance_matrix=noise * half @ half.T,
-        cost=point.cost,
-        fit_percent=100 * (1 - np.sqrt(point.cost / energy)),
-        converged=solution.converged,
-        message=solution.message,
-        n_evaluations=objective.n_evaluations,
         hold=hold,
         dt=dt,
-        n_rows=sum(e.n_rows for e in objective.experiments),
         warnings=[] if solution.converged else [f"not converged: {solution.message}"],
+        **outcome(objective, solution),
     )

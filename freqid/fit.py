@@ -16,7 +16,7 @@ from freqid.frequency_response import FrequencyResponse
 from freqid.hold_tests import decimation_warning, rejected_hold
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
-from freqid.optimise import Objective, minimise, noise_variance, polish
+from freqid.optimise import Objective, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.priors import Prior
 from freqid.rational import OutputError
@@ -238,7 +238,6 @@ def _estimate(
     point = solution.point
     values = solution.x * scale
     energy = sum(e.energy for e in objective.experiments)
-    n_rows = sum(e.n_rows for e in objective.experiments)
     noise = noise_variance(objective, point, len(values))
     u = uncertainty(point.jacobian / scale, values, structure.names, noise, np.sqrt(energy))
     warnings = [] if solution.converged else [f"not converged: {solution.message}"]
@@ -255,15 +254,10 @@ def _estimate(
         nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),
         units=[*(p.unit for p in structure.parameters), "s"][: len(values)],
         covariance_matrix=u.covariance,
-        cost=point.cost,
-        fit_percent=100 * (1 - np.sqrt(point.cost / energy)),
-        converged=solution.converged,
-        message=solution.message,
-        n_evaluations=objective.n_evaluations,
         hold=hold,
         dt=dt,
-        n_rows=n_rows,
         n_starts=found.n_starts,
         n_agreed=found.n_agreed,
         warnings=warnings,
+        **outcome(objective, solution),
     )

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import scipy.linalg
@@ -266,6 +266,20 @@ def noise_variance(objective: Objective, point: Point, n_parameters: int) -> flo
     unknowns = n_parameters + sum(len(d) for d in point.initial if d is not None)
     data = sum(point.parts[: len(objective.experiments)])
     return data / max(rows - unknowns, 1)
+
+
+def outcome(objective: Objective, solution: Solution) -> dict[str, Any]:
+    """What an Estimate says of the descent, whatever its parameters are."""
+    cost = solution.point.cost
+    energy = sum(e.energy for e in objective.experiments)
+    return {
+        "cost": cost,
+        "fit_percent": 100 * (1 - np.sqrt(cost / energy)),
+        "converged": solution.converged,
+        "message": solution.message,
+        "n_evaluations": objective.n_evaluations,
+        "n_rows": sum(e.n_rows for e in objective.experiments),
+    }
 
 
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
