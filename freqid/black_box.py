@@ -17,8 +17,9 @@ from freqid.holds import FirstOrderHold, PeriodicHold
 from freqid.optimise import Objective, Solution, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
+from freqid.refinement import first_model
 from freqid.responses import Plane
-from freqid.subspace import identify, plane_for
+from freqid.subspace import plane_for
 
 # an order too many leaves a flat valley of cancelling poles and zeros: a relative gain in cost this
 # small moves no coefficient by a visible part of its standard error
@@ -44,8 +45,8 @@ def fit_black_box(
     lines = [e for e, _ in pairs if isinstance(e, SpectralExperiment)]
     n_parameters = spec.order * sum(shape) + spec.feedthrough * shape[0] * shape[1]
     enough_rows(lines, n_parameters)
-    first = identify(lines, spec.order, spec.feedthrough)
-    chart, solution, objective = _descend(Chart(first, spec.feedthrough, plane), lines)
+    first = Chart(first_model(lines, spec.order, spec.feedthrough), spec.feedthrough, plane)
+    chart, solution, objective = _descend(first, lines)
     if options.domain == "time" or options.initial_state == "zero":
         # the same model in the z plane, against the samples themselves
         pairs = [prepare(d, shape, w, options, Plane()) for d, w in zip(sets, weights, strict=True)]
@@ -77,7 +78,7 @@ def reference_cost(
         pairs = [prepare(d, shape, w, options, plane) for d, w in zip(sets, weights, strict=True)]
         lines = [e for e, _ in pairs if isinstance(e, SpectralExperiment)]
         direct = feedthrough or isinstance(pairs[0][1], FirstOrderHold)
-        chart = Chart(identify(lines, order, direct), direct, plane)
+        chart = Chart(first_model(lines, order, direct), direct, plane)
         solution = minimise(Objective(chart, lines), np.zeros(chart.size), limit=12)
     except (ValueError, np.linalg.LinAlgError):
         return None

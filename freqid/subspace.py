@@ -34,6 +34,13 @@ def identify(
     experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
 ) -> StateSpace:
     """Φ̃, Γ, C, D in the experiments' plane from their lines; ValueError where those are too few."""
+    return inputs_of(experiments, *observed(experiments, order), feedthrough)
+
+
+def observed(
+    experiments: Sequence[SpectralExperiment], order: int
+) -> tuple[FloatArray, FloatArray]:
+    """Φ̃ and C, which the outputs' span alone tells; ValueError where the lines are too few."""
     p, m = experiments[0].Y.shape[0], experiments[0].U.shape[0]
     columns = [_columns(e, i, experiments) for i, e in enumerate(experiments)]
     w = np.concatenate([c[0] for c in columns])
@@ -54,8 +61,7 @@ def identify(
     left = R[len(Vq) :, len(Vq) :]
     U = np.linalg.svd(left)[0][:, :order]
     A = np.linalg.lstsq(U[:-p], U[p:])[0]
-    C = U[:p]
-    return _inputs(experiments, A, C, feedthrough)
+    return A, U[:p]
 
 
 def _columns(
@@ -83,7 +89,7 @@ def _columns(
     return w, Y, np.concatenate([V, free[used]])
 
 
-def _inputs(
+def inputs_of(
     experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
 ) -> StateSpace:
     """Γ and D (and the transients, which are dropped) by linear least squares."""

@@ -19,8 +19,9 @@ from freqid.models import GreyBox
 from freqid.optimise import Objective, Solution, minimise
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
+from freqid.refinement import first_model
 from freqid.structures import DelayedStructure
-from freqid.subspace import identify, plane_for
+from freqid.subspace import plane_for
 from freqid.transfer_functions import (
     ContinuousModel,
     TransferFunction,
@@ -144,7 +145,7 @@ def _first_guess(
         late = np.exp(-1j * experiment.omega_input.ravel() * delay)
         experiment.U, experiment.U_state = experiment.U * late, experiment.U_state * late
         lines.append(experiment)
-    chart = Chart(identify(lines, order, True), True, plane)
+    chart = Chart(first_model(lines, order, True), True, plane)
     hold = pairs[0][1]
     dt = hold.period if isinstance(hold, PeriodicHold) else input_dt(sets[0])
     return DiscreteModel(chart.in_z(np.zeros(chart.size)), dt, hold, *names)
