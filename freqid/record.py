@@ -9,9 +9,9 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.signal
 
 from freqid.checks import FloatArray, finite, positive, samples, unknown, whole
+from freqid.folding import low_pass
 from freqid.frames import record_fields
 from freqid.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 
@@ -162,9 +162,9 @@ class Record:
             )
         u, y, reference = self.u, self.y, self.reference
         if antialias and factor > 1:
-            u = _low_pass(u, factor * self.factor)
-            y = _low_pass(y, factor)
-            reference = None if reference is None else _low_pass(reference, factor)
+            u = low_pass(u, factor * self.factor)
+            y = low_pass(y, factor)
+            reference = None if reference is None else low_pass(reference, factor)
         return self._with(
             u=u if keep_input else u[::factor],
             y=y[::factor],
@@ -310,11 +310,6 @@ def _names(argument: str, given: Any, letter: str, array: FloatArray) -> tuple[s
 def _index(position: float) -> int:
     """The first sample at or after a position; a sample time off by rounding is that sample."""
     return int(np.ceil(position - 1e-6))
-
-
-def _low_pass(x: FloatArray, factor: int) -> FloatArray:
-    sos = scipy.signal.cheby1(8, 0.05, 0.8 / factor, output="sos")
-    return scipy.signal.sosfiltfilt(sos, x, axis=0)
 
 
 def _less_trend(x: FloatArray, order: int) -> FloatArray:

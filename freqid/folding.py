@@ -1,0 +1,74 @@
+"""Aliasing: which frequencies fold onto which when only every M-th sample is kept."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.signal
+
+from freqid.checks import FloatArray, positive, whole
+
+
+def unfold(frequency: Any, dt: float, factor: int) -> FloatArray:
+    """The signed frequencies in Hz that fold onto ``frequency`` (Hz), (…, factor).
+
+    f + m/(factor·dt) within the Nyquist limits ±1/(2 dt), for f from zero to the slow limit.
+
+    >>> unfold(20.0, dt=0.005, factor=2).tolist()
+    [-80.0, 20.0]
+    """
+    M = whole("factor", factor)
+    shift = (np.arange(M) - M // 2) / (M * positive("dt", dt, "s"))
+    return np.asarray(frequency, dtype=float)[..., None] + shift
+
+
+def fold(frequency: Any, dt: float, factor: int) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Where frequencies (Hz) land between zero and the slow Nyquist limit, and whether mirrored.
+
+    >>> at, mirrored = fold([20.0, 80.0], dt=0.005, factor=2)
+    >>> at.tolist(), mirrored.tolist()
+    ([20.0, 20.0], [False, True])
+    """
+    rate = 1 / (positive("dt", dt, "s") * whole("factor", factor))
+    rest = np.mod(np.asarray(frequency, dtype=float), rate)
+    # a multiple of the rate, up to rounding, lands on zero and not next to the rate
+    rest = np.where(rate - rest < 1e-9 * rate, 0.0, rest)
+    mirrored = rest > rate / 2 * (1 + 1e-9)
+    return np.where(mirrored, rate - rest, rest), mirrored
+
+
+def merged_lines(
+    frequency: FloatArray, dt: float, factor: int
+) -> tuple[FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
+    """Slow lines (Hz) onto which lines fold, whether each was mirrored, and the slow line of each.
+
+    Lines that land within 1e-9 of the slow rate of one another are the same.
+    """
+    at, mirrored = fold(frequency, dt, factor)
+    order = np.argsort(at, kind="stable")
+    gap = 1e-9 / (dt * factor)
+    new = np.concatenate([[True], np.diff(at[order]) > gap])[: len(at)]
+    number = np.cumsum(new) - 1
+    groups = np.empty(len(at), dtype=np.int64)
+    groups[order] = number
+    return at[order][new], mirrored, groups
+
+
+def low_pass(x: FloatArray, factor: int) -> FloatArray:
+    """The anti-alias filter of ``Record.decimate``: forwards and backwards, so of zero phase."""
+    return scipy.signal.sosfiltfilt(_anti_alias(factor), x, axis=0)
+
+
+def low_pass_gain(frequency: Any, dt: float, factor: int) -> FloatArray:
+    """What ``low_pass`` multiplies a sinusoid at ``frequency`` (Hz) by, sampled at ``dt`` (s)."""
+    f = np.asarray(frequency, dtype=float)
+    if factor == 1:
+        return np.ones(f.shape)
+    H = scipy.signal.sosfreqz(_anti_alias(factor), 2 * np.pi * np.abs(f.ravel()) * dt)[1]
+    return np.abs(H.reshape(f.shape)) ** 2
+
+
+def _anti_alias(factor: int) -> FloatArray:
+    return scipy.signal.cheby1(8, 0.05, 0.8 / factor, output="sos")
