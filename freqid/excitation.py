@@ -1,11 +1,11 @@
-"""Input signals: chirp and sine."""
+"""Input signals: chirp, sine, binary sequences and noise."""
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.signal
 
-from freqid.checks import FloatArray, choice, finite, positive
+from freqid.checks import FloatArray, choice, finite, positive, whole
 
 
 def _times(duration: float, dt: float) -> FloatArray:
@@ -57,3 +57,32 @@ def sine(
         raise ValueError(f"frequency={frequency:g} Hz must be in (0, {0.5 / dt:g}] Hz")
     angle = 2 * np.pi * frequency * t + np.deg2rad(finite("phase", phase))
     return finite("amplitude", amplitude) * np.sin(angle)
+
+
+def prbs(n_bits: int, dt: float, clock: int = 1, periods: int = 1) -> FloatArray:
+    """A maximum-length binary sequence of ±1: (2ⁿ − 1)·clock samples a period, (N,).
+
+    Each bit lasts ``clock`` samples of ``dt`` (s); the spectrum is PRBSSpectrum's. Raises
+    ValueError for ``n_bits`` outside 2 to 24.
+
+    >>> u = prbs(5, dt=1e-3)
+    >>> len(u), float(u.sum())
+    (31, 1.0)
+    """
+    positive("dt", dt, "s")
+    if whole("n_bits", n_bits, least=2) > 24:
+        raise ValueError(f"n_bits={n_bits} must be at most 24: a period has 2**n_bits - 1 bits")
+    bits = 2.0 * scipy.signal.max_len_seq(n_bits)[0] - 1
+    return np.tile(np.repeat(bits, whole("clock", clock)), whole("periods", periods))
+
+
+def white_noise(n: int, seed: int = 0) -> FloatArray:
+    """``n`` independent Gaussian samples of mean 0 and variance 1, (n,).
+
+    Raises ValueError for ``n`` or ``seed`` that is not a whole number.
+
+    >>> white_noise(3).shape
+    (3,)
+    """
+    rng = np.random.default_rng(whole("seed", seed, least=0))
+    return rng.standard_normal(whole("n", n))

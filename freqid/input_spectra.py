@@ -15,6 +15,7 @@ import numpy as np
 
 from freqid.checks import Array, FloatArray, choice, positive, whole
 from freqid.folding import merged_lines, unfold
+from freqid.quadrature import panel_nodes, resolved
 from freqid.record import Record
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ class InputSpectrum:
     """Base of the spectra; they can be added to one another and multiplied by a number."""
 
     def density(self, frequency: Any, dt: float) -> FloatArray:
-        """One-sided density in u²/Hz at ``frequency`` (Hz) of the sequence sampled at ``dt`` (s)."""
+        """One-sided density in u²/Hz at ``frequency`` (Hz) of the sequence at ``dt`` (s)."""
         return np.zeros(np.shape(frequency))
 
     def lines(self, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -63,10 +64,11 @@ class InputSpectrum:
         """Mean square of the sequence in u²."""
         total = float(self.lines(dt)[1].sum())
         edges = self.edges(dt)
-        nodes, weights = np.polynomial.legendre.leggauss(64)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
-            half = (high - low) / 2
-            total += half * float(weights @ self.density(low + half * (nodes + 1), dt))
+        if len(edges):
+            panels = np.column_stack([edges[:-1], edges[1:]])
+            panels = resolved(panels, lambda f: self.density(f, dt)[None])
+            f, weights = panel_nodes(panels)
+            total += float(weights @ self.density(f, dt))
         return total
 
     def to_frame(self, dt: float, factor: int = 1, points: int = 401) -> pd.DataFrame:
@@ -282,7 +284,7 @@ class FilteredSpectrum(InputSpectrum):
 
 
 class MeasuredSpectrum(LineSpectrum):
-    """The lines of a record's input: |U(k)|²/N² at the multiples of 1/(N·dt), two-sided ones joined.
+    """The lines of a record's input: 2|U(k)|²/N² at the multiples of 1/(N·dt).
 
     Lines below 1e-9 of the strongest are left out. ``channel`` picks one of several inputs.
 

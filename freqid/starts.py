@@ -184,6 +184,7 @@ def search(
         if n_starts is None and tried == 1:
             if runs.best_cost <= runs.rounding or runs.best_cost <= _EXPLAINED * floor():
                 break
+            runs.straight(start)
             black_box = reference()
             explained = _EXPLAINED * floor()
         if n_starts is None and runs.best_cost <= max(explained, runs.rounding):
@@ -237,6 +238,17 @@ class _Runs:
                 raise
             return
         self._keep(solution)
+
+    def straight(self, start: FloatArray) -> None:
+        """The true cost from the start itself: a first stage may lead away from what is near."""
+        if not self.targets:
+            return
+        try:
+            solution = minimise(self.objective, start, limit=120)
+        except ValueError:
+            return
+        if solution.point.cost < self.best_cost * (1 - _SAME):
+            self._keep(solution)
 
     def _first_stage(self, start: FloatArray) -> FloatArray | None:
         structure = LogStructure(self.objective.structure, start)

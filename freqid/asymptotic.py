@@ -1,0 +1,347 @@
+"""What an estimate will be, without data: the bias integral of eq. 2 over a spectrum.
+
+θ* = argmin ∫ |G_a(ω) − G(ω, θ)|² Φ_a(ω) dω is where the estimate goes as the record grows (Ljung,
+System Identification, 1999, section 8.5), with the response and the spectrum that decimation left.
+Densities become sums over the nodes of Gauss's rule, as many as the functions under the integral
+need, so that the fit itself is the one of measured responses.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from freqid.apparent import (
+    Sampling,
+    apparent_density,
+    apparent_lines,
+    slow_edges,
+    state_space_of,
+    weight_of,
+)
+from freqid.black_box import fit_black_box
+from freqid.checks import Array, ComplexArray, FloatArray, band, positive, whole
+from freqid.estimate import Estimate
+from freqid.experiments import sampled_response
+from freqid.frequency_response import FrequencyResponse
+from freqid.grey_fit import fit_grey_box, started
+from freqid.holds import Hold, as_hold
+from freqid.input_spectra import InputSpectrum
+from freqid.models import GreyBox
+from freqid.optimise import Objective, settled, triangle
+from freqid.preparation import Options
+from freqid.quadrature import panel_nodes, resolved
+from freqid.rational import OutputError
+from freqid.sampled_plant import StateSpace
+from freqid.structures import GreyStructure
+from freqid.transfer_fit import fit_transfer_function
+from freqid.transfer_functions import TransferFunction
+from freqid.trust import uncertainty
+
+# times that the nodes are chosen anew for the estimate that they led to
+_ROUNDS = 6
+
+Responses = Callable[[FloatArray], Array]
+
+
+@dataclass(frozen=True)
+class Expected:
+    """All that decimated data will say, at K frequencies that stand for all of them.
+
+    ``weight`` (K,) is the power of the input at each node times the prefilter's; ``error_power``
+    (outputs, inputs, K) the power per sample, at each node, of what is not a response to the input
+    as it was kept, as a part of the input's own density there.
+    """
+
+    frequency: FloatArray
+    weight: FloatArray
+    gain: FloatArray
+    response: ComplexArray
+    error_power: FloatArray
+    panels: FloatArray
+
+    def as_response(self, sampling: Sampling, plant: Any) -> FrequencyResponse:
+        """The same as a FrequencyResponse at the slow rate."""
+        return FrequencyResponse(
+            self.frequency,
+            self.response,
+            dt=sampling.dt,
+            hold=sampling.hold,
+            input_names=getattr(plant, "inputs", None),
+            output_names=getattr(plant, "outputs", None),
+        )
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Everything but the model: spectrum, sampling, band and weights."""
+
+    spectrum: InputSpectrum
+    sampling: Sampling
+    band: tuple[float, float] | None = None
+    prefilter: Any = None
+    noise_model: Any = None
+
+    def expected(self, at: StateSpace, responses: Responses | None = None) -> Expected:
+        """The data, at nodes that resolve them and the ``responses`` (any, K) of frequencies in Hz.
+
+        Raises ValueError where the spectrum has no energy below the slow Nyquist limit.
+        """
+        s = self.sampling
+        nyquist = 0.5 / s.dt
+        low, high = (0.0, nyquist) if self.band is None else band(self.band, nyquist)
+        edges = slow_edges(self.spectrum, s)
+        edges = np.unique(np.clip(edges, low, high)) if len(edges) else edges
+        panels = np.column_stack([edges[:-1], edges[1:]])
+        frequency, weights = np.zeros(0), np.zeros(0)
+        if len(panels):
+            middle = panels.mean(axis=1)
+            panels = panels[apparent_density(at, self.spectrum, s, middle).power > 0]
+        if len(panels):
+            panels = resolved(panels, lambda f: self._columns(at, f, responses))
+            frequency, weights = panel_nodes(panels)
+        dense = apparent_density(at, self.spectrum, s, frequency)
+        lines = apparent_lines(at, self.spectrum, s)
+        inside = (lines.frequency >= low - 1e-9 * nyquist) & (lines.power > 0)
+        inside &= lines.frequency <= high + 1e-9 * nyquist
+        power = np.concatenate([dense.power * weights, lines.power[inside]])
+        if not power.any():
+            raise ValueError(
+                f"spectrum has no energy between {low:g} and {high:g} Hz at dt={s.dt:g} s; it "
+                "identifies nothing there"
+            )
+        where = np.concatenate([frequency, lines.frequency[inside]])
+        order = np.argsort(where, kind="stable")
+        gain = weight_of(where, s.dt, self.prefilter, self.noise_model)
+        G = np.concatenate([dense.response, lines.response[..., inside]], axis=-1)
+        # lines are sure of their phase: they leak nothing into one another
+        sure = np.ones((*dense.coherence.shape[:2], int(inside.sum())))
+        coherence = np.concatenate([dense.coherence, sure], axis=-1)
+        error = np.abs(G) ** 2 * (1 / np.maximum(coherence, 1e-300) - 1)
+        density = np.concatenate([dense.power, np.zeros(inside.sum())]) / (2 * s.dt)
+        return Expected(
+            where[order],
+            (power * gain)[order],
+            gain[order],
+            G[..., order],
+            (error * density)[..., order],
+            panels,
+        )
+
+    def _columns(self, at: StateSpace, f: FloatArray, responses: Responses | None) -> Array:
+        seen = apparent_density(at, self.spectrum, self.sampling, f)
+        weight = seen.power * weight_of(f, self.sampling.dt, self.prefilter, self.noise_model)
+        rows = [weight[None], seen.response.reshape(-1, len(f))]
+        if responses is not None:
+            rows.append(responses(f))
+        return np.concatenate(rows)
+
+
+def asymptotic_fit(
+    plant: Any,
+    spectrum: InputSpectrum,
+    dt: float,
+    hold: Hold | str | None = None,
+    true_hold: Hold | None = None,
+    *,
+    model: Any = None,
+    base_dt: float | None = None,
+    band: tuple[float, float] | None = None,
+    antialias: bool = False,
+    prefilter: Any = None,
+    noise_model: Any = None,
+    noise_std: float = 0.0,
+    duration: float | None = None,
+    start: Mapping[str, float] | None = None,
+    n_starts: int | str = "auto",
+    seed: int = 0,
+) -> Estimate:
+    """The estimate that ever longer records lead to, computed without data.
+
+    Args:
+        plant: the true plant, a GreyBox at its values or a continuous control.StateSpace.
+        spectrum: of the input as the converter holds it, every ``true_hold.period``.
+        dt: sample time in s of the data that are kept.
+        hold: what the fit assumes; a name means that hold at ``dt``, None the true one.
+        true_hold: what the converter does; None for a zero-order hold at ``dt``.
+        model: what is fitted, a GreyBox (the plant itself where not given), an OutputError or a
+            TransferFunction.
+        base_dt: sample time in s of the input, where it is not the period of ``true_hold``.
+        band: (low, high) in Hz of the lines that are used.
+        antialias: whether ``Record.decimate(antialias=True)`` made the data.
+        prefilter, noise_model: L and H, filters of the error as in ``FilteredSpectrum`` at ``dt``
+            or functions of ω (rad/s): the weight is multiplied by |L|²/|H|².
+        noise_std, duration: standard deviation of white output noise and length of the record in s:
+            they, and the aliasing of an input with a density, make the standard errors. Without
+            ``duration`` these are zero.
+        start, n_starts, seed: as in ``fit``.
+
+    Returns an Estimate; its cost is the mean square of the (filtered) error. Raises ValueError
+    where the rates do not fit, the spectrum has no energy below Nyquist, or has fewer lines than
+    the parameters need.
+
+    Source: paper, eq. 2; Ljung, 1999, section 8.5.
+
+    >>> import freqid as fq
+    >>> est = asymptotic_fit(fq.two_mass(), fq.ChirpSpectrum(10, 80), dt=5e-3, hold="zoh",
+    ...                      true_hold=fq.ZeroOrderHold(0.5e-3))
+    >>> round(est["d"], 1)
+    -230.9
+    """
+    if not isinstance(spectrum, InputSpectrum):
+        raise ValueError(f"spectrum={type(spectrum).__name__} is not a spectrum of an input")
+    at = state_space_of(plant)
+    sampling = Sampling.of(dt, true_hold, base_dt, antialias)
+    conditions = Conditions(spectrum, sampling, band, prefilter, noise_model)
+    count = None if n_starts == "auto" else whole("n_starts", n_starts)
+    whole("seed", seed, least=0)
+    if duration is not None:
+        positive("duration", duration, "s")
+    if not np.isfinite(noise_std) or noise_std < 0:
+        raise ValueError(f"noise_std={noise_std!r} must be finite and not negative")
+    fitted = plant if model is None else model
+    if isinstance(fitted, GreyBox):
+        est, expected, structure = _grey(fitted, at, conditions, hold, start, count, seed)
+        return _with_errors(est, structure, expected, sampling, noise_std, duration)
+    if isinstance(fitted, (OutputError, TransferFunction)):
+        return _black(fitted, plant, at, conditions, hold)
+    raise ValueError(
+        f"model={type(fitted).__name__} is not a model; expected a GreyBox, OutputError or "
+        "TransferFunction"
+    )
+
+
+def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Responses:
+    """Response and derivatives of a grey box at x, (rows, K), at frequencies in Hz."""
+    realisation = structure.realise(x)
+
+    def at(f: FloatArray) -> Array:
+        G, dG = sampled_response(realisation, 2 * np.pi * f, hold)
+        return np.concatenate([G.reshape(-1, len(f)), dG.reshape(-1, len(f))])
+
+    return at
+
+
+def _grey(
+    model: GreyBox,
+    at: StateSpace,
+    conditions: Conditions,
+    hold: Hold | str | None,
+    start: Mapping[str, float] | None,
+    count: int | None,
+    seed: int,
+) -> tuple[Estimate, Expected, GreyStructure]:
+    sampling = conditions.sampling
+    estimated = isinstance(hold, str) and hold == "estimate"
+    assumed = as_hold("zoh" if estimated else hold, sampling.dt, sampling.hold)
+    plain = GreyStructure(model)
+    if not plain.physical_names:
+        raise ValueError("model has no free parameter; free one with model.free(name)")
+    count_physical = len(plain.physical_names)
+    known = [model_responses(plain, plain.start, assumed)]
+
+    def responses(f: FloatArray) -> Array:
+        return np.concatenate([r(f) for r in known])
+
+    def solve(
+        expected: Expected, begin: GreyBox, n: int | None
+    ) -> tuple[Estimate, Objective, GreyStructure]:
+        data = expected.as_response(sampling, model)
+        return fit_grey_box(begin, [data], [expected.weight], Options(assumed), n, seed, estimated)
+
+    expected = conditions.expected(at, responses)
+    first, objective, structure = solve(expected, started(model, start), count)
+    est = first
+    for _ in range(_ROUNDS):
+        found = est.values[:count_physical] / plain.scale
+        known = [known[0], model_responses(plain, found, est.hold)]
+        finer = conditions.expected(at, responses)
+        if len(finer.panels) == len(expected.panels):
+            break
+        expected = finer
+        est, objective, structure = solve(expected, est.model, 1)
+    values = settled(objective, est.values / structure.scale) * structure.scale
+    est = dataclasses.replace(
+        est,
+        values=values,
+        model=est.model.with_values(**dict(zip(plain.physical_names, values, strict=False))),
+        nominal=first.nominal,
+        n_starts=first.n_starts,
+        n_agreed=first.n_agreed,
+    )
+    return est, expected, structure
+
+
+def _black(
+    spec: OutputError | TransferFunction,
+    plant: Any,
+    at: StateSpace,
+    conditions: Conditions,
+    hold: Hold | str | None,
+) -> Estimate:
+    sampling = conditions.sampling
+    assumed = as_hold(hold, sampling.dt, sampling.hold)
+    work = fit_black_box if isinstance(spec, OutputError) else fit_transfer_function
+
+    def solve(expected: Expected) -> Estimate:
+        data = expected.as_response(sampling, plant)
+        return work(spec, [data], [expected.weight], Options(assumed))  # type: ignore[arg-type]
+
+    expected = conditions.expected(at)
+    est = solve(expected)
+    for _ in range(_ROUNDS):
+        finer = conditions.expected(at, _responses_of(est.model, assumed))
+        if len(finer.panels) == len(expected.panels):
+            break
+        expected = finer
+        est = solve(expected)
+    return dataclasses.replace(est, covariance_matrix=np.zeros_like(est.covariance_matrix))
+
+
+def _responses_of(model: Any, hold: Hold) -> Responses:
+    """The response of a fitted black box, (rows, K), at frequencies in Hz in any order."""
+
+    def at(f: FloatArray) -> Array:
+        order = np.argsort(f)
+        G: Array = model.frequency_response(2 * np.pi * f[order], hold).response
+        return G[..., np.argsort(order)].reshape(-1, len(f))
+
+    return at
+
+
+def _with_errors(
+    est: Estimate,
+    structure: GreyStructure,
+    expected: Expected,
+    sampling: Sampling,
+    noise_std: float,
+    duration: float | None,
+) -> Estimate:
+    """Standard errors from the noise and from what aliasing adds to it: H⁻¹ M H⁻¹."""
+    names, values = est.names, est.values
+    J, error = _jacobian(est, structure, expected), expected.error_power
+    plain = uncertainty(
+        triangle(J.T), values, names, 1.0, float(np.linalg.norm(J * values[:, None]))
+    )
+    if duration is None:
+        covariance = np.where(np.isfinite(plain.covariance), 0.0, np.inf)
+    else:
+        N = duration / sampling.dt
+        each = expected.gain * (noise_std**2 + error)
+        M = (J * np.repeat(each.ravel(), 2)) @ J.T
+        inverse = np.where(np.isfinite(plain.covariance), plain.covariance, 0)
+        covariance = inverse @ M @ inverse / N
+        covariance[~np.isfinite(plain.covariance)] = np.inf
+    return dataclasses.replace(est, covariance_matrix=covariance)
+
+
+def _jacobian(est: Estimate, structure: GreyStructure, expected: Expected) -> FloatArray:
+    """√weight dG/dθ as real rows (P, 2·outputs·inputs·K)."""
+    realisation = structure.realise(est.values / structure.scale)
+    _, dG = sampled_response(realisation, 2 * np.pi * expected.frequency, est.hold)
+    rows = dG * np.sqrt(expected.weight) / structure.scale[:, None, None, None]
+    return np.ascontiguousarray(rows.reshape(len(rows), -1)).view(float)
