@@ -1,14 +1,28 @@
 """freqid: physical parameters from chirp experiments, whatever the input did between samples."""
 
 from freqid import paper
+from freqid.apparent import apparent_response
+from freqid.asymptotic import asymptotic_fit
+from freqid.bias_map import bias_map
 from freqid.estimate import Estimate
 from freqid.estimators import etfe
-from freqid.excitation import chirp, sine
+from freqid.excitation import chirp, prbs, sine, white_noise
 from freqid.files import read, write
 from freqid.fit import fit
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, FirstOrderHold, ZeroOrderHold
+from freqid.input_spectra import (
+    ChirpSpectrum,
+    FilteredSpectrum,
+    InputSpectrum,
+    LineSpectrum,
+    MeasuredSpectrum,
+    MultisineSpectrum,
+    PRBSSpectrum,
+    WhiteSpectrum,
+)
 from freqid.models import GreyBox
+from freqid.multisines import multisine
 from freqid.order_selection import plot_orders, select_order
 from freqid.parameter import Parameter
 from freqid.plants import drivetrain, first_order, two_mass
@@ -22,30 +36,44 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BandLimited",
+    "ChirpSpectrum",
     "Estimate",
+    "FilteredSpectrum",
     "FirstOrderHold",
     "FrequencyResponse",
     "GreyBox",
+    "InputSpectrum",
+    "LineSpectrum",
+    "MeasuredSpectrum",
+    "MultisineSpectrum",
     "OutputError",
+    "PRBSSpectrum",
     "Parameter",
     "Record",
     "TransferFunction",
+    "WhiteSpectrum",
     "ZeroOrderHold",
+    "apparent_response",
+    "asymptotic_fit",
+    "bias_map",
     "bode",
     "chirp",
     "drivetrain",
     "etfe",
     "first_order",
     "fit",
+    "multisine",
     "nyquist",
     "paper",
     "plot_coherence",
     "plot_orders",
     "plot_record",
+    "prbs",
     "read",
     "select_order",
     "simulate",
     "sine",
     "two_mass",
+    "white_noise",
     "write",
 ]

@@ -101,29 +101,35 @@ def state_space_of(plant: Any) -> StateSpace:
     )
 
 
-def held_response(at: StateSpace, hold: Hold) -> Callable[[FloatArray], ComplexArray]:
+# a response through a hold, (outputs, inputs, K), at signed frequencies in Hz
+Held = Callable[[FloatArray], ComplexArray]
+
+
+def held_response(at: StateSpace, hold: Hold) -> Held:
     """The plant's response through ``hold`` at signed frequencies (Hz): (outputs, inputs, K)."""
     plant = basis_of(at).through(hold)
     return lambda f: transfer(plant, points(2 * np.pi * f, hold))
 
 
 def apparent_density(
-    at: StateSpace, spectrum: InputSpectrum, sampling: Sampling, frequency: FloatArray
+    held: Held, spectrum: InputSpectrum, sampling: Sampling, frequency: FloatArray
 ) -> Apparent:
     """The continuous part of the spectrum, at frequencies (Hz) up to the slow Nyquist limit."""
     folds = unfold(frequency, sampling.base_dt, sampling.factor)
     density = spectrum.density(np.abs(folds), sampling.base_dt) * sampling.filter_power(folds)
-    G = held_response(at, sampling.hold)(folds.ravel())
+    G = held(folds.ravel())
     G = G.reshape(*G.shape[:2], *folds.shape)
     return _mixed(frequency, density, G, lambda x: x.sum(axis=-1))
 
 
-def apparent_lines(at: StateSpace, spectrum: InputSpectrum, sampling: Sampling) -> Apparent:
+def apparent_lines(held: Held, spectrum: InputSpectrum, sampling: Sampling) -> Apparent:
     """The lines of the spectrum, where they are after decimation."""
     f, power = spectrum.lines(sampling.base_dt)
     power = power * sampling.filter_power(f)
     slow, mirrored, groups = merged_lines(f, sampling.base_dt, sampling.factor)
-    G = held_response(at, sampling.hold)(np.where(mirrored, -f, f))
+    G = held(np.where(mirrored, -f, f))
+    if len(f) == 0:
+        return Apparent(slow, power, G, np.abs(G))
     order = np.argsort(groups, kind="stable")
     first = np.searchsorted(groups[order], np.arange(len(slow)))
     return _mixed(slow, power, G, lambda x: np.add.reduceat(x[..., order], first, axis=-1))
@@ -186,12 +192,13 @@ def apparent_response(
     """
     at = state_space_of(plant)
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
+    held = held_response(at, sampling.hold)
     if frequency is None and len(spectrum.edges(sampling.base_dt)) == 0:
-        seen = apparent_lines(at, spectrum, sampling)
+        seen = apparent_lines(held, spectrum, sampling)
     else:
         if frequency is None:
             frequency = 0.5 / dt * (np.arange(400) + 0.5) / 400
-        seen = apparent_density(at, spectrum, sampling, np.asarray(frequency, dtype=float))
+        seen = apparent_density(held, spectrum, sampling, np.asarray(frequency, dtype=float))
     keep = seen.power > 1e-12 * seen.power.max(initial=0)
     if not keep.any():
         raise ValueError("spectrum has no energy at these frequencies; it identifies nothing there")

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from freqid.apparent import (
+    Held,
     Sampling,
     apparent_density,
     apparent_lines,
+    held_response,
     slow_edges,
     state_space_of,
     weight_of,
@@ -36,6 +38,7 @@ from freqid.optimise import Objective, settled, triangle
 from freqid.preparation import Options
 from freqid.quadrature import panel_nodes, resolved
 from freqid.rational import OutputError
+from freqid.responses import points, response_and_derivatives
 from freqid.sampled_plant import StateSpace
 from freqid.structures import GreyStructure
 from freqid.transfer_fit import fit_transfer_function
@@ -91,7 +94,7 @@ class Conditions:
 
         Raises ValueError where the spectrum has no energy below the slow Nyquist limit.
         """
-        s = self.sampling
+        s, held = self.sampling, held_response(at, self.sampling.hold)
         nyquist = 0.5 / s.dt
         low, high = (0.0, nyquist) if self.band is None else band(self.band, nyquist)
         edges = slow_edges(self.spectrum, s)
@@ -100,12 +103,12 @@ class Conditions:
         frequency, weights = np.zeros(0), np.zeros(0)
         if len(panels):
             middle = panels.mean(axis=1)
-            panels = panels[apparent_density(at, self.spectrum, s, middle).power > 0]
+            panels = panels[apparent_density(held, self.spectrum, s, middle).power > 0]
         if len(panels):
-            panels = resolved(panels, lambda f: self._columns(at, f, responses))
+            panels = resolved(panels, lambda f: self._columns(held, f, responses))
             frequency, weights = panel_nodes(panels)
-        dense = apparent_density(at, self.spectrum, s, frequency)
-        lines = apparent_lines(at, self.spectrum, s)
+        dense = apparent_density(held, self.spectrum, s, frequency)
+        lines = apparent_lines(held, self.spectrum, s)
         inside = (lines.frequency >= low - 1e-9 * nyquist) & (lines.power > 0)
         inside &= lines.frequency <= high + 1e-9 * nyquist
         power = np.concatenate([dense.power * weights, lines.power[inside]])
@@ -132,8 +135,8 @@ class Conditions:
             panels,
         )
 
-    def _columns(self, at: StateSpace, f: FloatArray, responses: Responses | None) -> Array:
-        seen = apparent_density(at, self.spectrum, self.sampling, f)
+    def _columns(self, held: Held, f: FloatArray, responses: Responses | None) -> Array:
+        seen = apparent_density(held, self.spectrum, self.sampling, f)
         weight = seen.power * weight_of(f, self.sampling.dt, self.prefilter, self.noise_model)
         rows = [weight[None], seen.response.reshape(-1, len(f))]
         if responses is not None:
@@ -217,10 +220,10 @@ def asymptotic_fit(
 
 def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Responses:
     """Response and derivatives of a grey box at x, (rows, K), at frequencies in Hz."""
-    realisation = structure.realise(x)
+    plant = structure.realise(x[: len(structure.names)]).basis.through(hold)
 
     def at(f: FloatArray) -> Array:
-        G, dG = sampled_response(realisation, 2 * np.pi * f, hold)
+        G, dG = response_and_derivatives(plant, points(2 * np.pi * f, hold))
         return np.concatenate([G.reshape(-1, len(f)), dG.reshape(-1, len(f))])
 
     return at
@@ -321,27 +324,32 @@ def _with_errors(
     noise_std: float,
     duration: float | None,
 ) -> Estimate:
-    """Standard errors from the noise and from what aliasing adds to it: H⁻¹ M H⁻¹."""
-    names, values = est.names, est.values
-    J, error = _jacobian(est, structure, expected), expected.error_power
-    plain = uncertainty(
-        triangle(J.T), values, names, 1.0, float(np.linalg.norm(J * values[:, None]))
-    )
-    if duration is None:
-        covariance = np.where(np.isfinite(plain.covariance), 0.0, np.inf)
-    else:
-        N = duration / sampling.dt
-        each = expected.gain * (noise_std**2 + error)
-        M = (J * np.repeat(each.ravel(), 2)) @ J.T
-        inverse = np.where(np.isfinite(plain.covariance), plain.covariance, 0)
-        covariance = inverse @ M @ inverse / N
-        covariance[~np.isfinite(plain.covariance)] = np.inf
+    N = None if duration is None else duration / sampling.dt
+    covariance = error_covariance(est.values, structure, expected, est.hold, noise_std, N)
     return dataclasses.replace(est, covariance_matrix=covariance)
 
 
-def _jacobian(est: Estimate, structure: GreyStructure, expected: Expected) -> FloatArray:
-    """√weight dG/dθ as real rows (P, 2·outputs·inputs·K)."""
-    realisation = structure.realise(est.values / structure.scale)
-    _, dG = sampled_response(realisation, 2 * np.pi * expected.frequency, est.hold)
+def error_covariance(
+    values: FloatArray,
+    structure: GreyStructure,
+    expected: Expected,
+    hold: Hold,
+    noise_std: float,
+    n_samples: float | None,
+) -> FloatArray:
+    """H⁻¹ M H⁻¹ / N at ``values`` (P,): what noise and aliasing scatter, (P, P).
+
+    Zero without ``n_samples``; infinite for what the spectrum does not determine.
+    """
+    realisation = structure.realise(values / structure.scale)
+    _, dG = sampled_response(realisation, 2 * np.pi * expected.frequency, hold)
     rows = dG * np.sqrt(expected.weight) / structure.scale[:, None, None, None]
-    return np.ascontiguousarray(rows.reshape(len(rows), -1)).view(float)
+    J = np.ascontiguousarray(rows.reshape(len(rows), -1)).view(float)
+    size = float(np.linalg.norm(J * values[:, None]))
+    inverse = uncertainty(triangle(J.T), values, structure.names, 1.0, size).covariance
+    known = np.isfinite(inverse)
+    if n_samples is None:
+        return np.where(known, 0.0, np.inf)
+    each = expected.gain * (noise_std**2 + expected.error_power)
+    half = np.where(known, inverse, 0) @ (J * np.sqrt(np.repeat(each.ravel(), 2)))
+    return np.where(known, half @ half.T / n_samples, np.inf)

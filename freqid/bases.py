@@ -265,12 +265,7 @@ def eigenvectors(at: StateSpace) -> tuple[ComplexArray, ComplexArray, ComplexArr
     balanced with it, or scaling would hide a near-double integrator.
     """
     n = len(at.A)
-    bordered = np.zeros((n + 1, n + 1))
-    bordered[:n, :n] = at.A
-    bordered[:n, n] = np.abs(at.B).sum(axis=1)
-    bordered[n, :n] = np.abs(at.C).sum(axis=0)
-    _, _, _, scale, _ = scipy.linalg.lapack.dgebal(bordered, scale=1, permute=0)
-    scale = scale[:n]
+    scale = _state_scale(at)
     eigenvalues, V = np.linalg.eig(at.A * scale / scale[:, None])
     V = V.astype(complex, copy=False)
     try:
@@ -283,9 +278,42 @@ def eigenvectors(at: StateSpace) -> tuple[ComplexArray, ComplexArray, ComplexArr
     return eigenvalues.astype(complex, copy=False), V * scale[:, None], inverse / scale
 
 
+def _state_scale(at: StateSpace) -> FloatArray:
+    """Powers of two, (n,), by which LAPACK balances A bordered by the sizes of B and C."""
+    n = len(at.A)
+    bordered = np.zeros((n + 1, n + 1))
+    bordered[:n, :n] = at.A
+    bordered[:n, n] = np.abs(at.B).sum(axis=1)
+    bordered[n, :n] = np.abs(at.C).sum(axis=0)
+    _, _, _, scale, _ = scipy.linalg.lapack.dgebal(bordered, scale=1, permute=0)
+    return scale[:n]
+
+
 def basis_of(at: StateSpace, derivative: StateSpace | None = None) -> Basis:
     """Eigenvectors where they are good, Schur coordinates where they are not."""
     if derivative is None:
         derivative = StateSpace(*(np.zeros((0, *M.shape)) for M in at))
     eigen = eigenvectors(at)
     return SchurBasis(at, derivative) if eigen is None else EigenBasis(at, derivative, eigen)
+
+
+def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> EigenBasis:
+    """A batch of plants (S, …) in their eigenvectors; not finite where those are badly conditioned.
+
+    The states are balanced as those of the first plant are, which the others resemble.
+    """
+    if derivative is None:
+        derivative = StateSpace(*(np.zeros((len(M), 0, *M.shape[1:])) for M in at))
+    scale = _state_scale(StateSpace(*(M[0] for M in at)))
+    finite = np.isfinite(at.A).all(axis=(1, 2))
+    A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1])) * scale / scale[:, None]
+    eigenvalues, V = np.linalg.eig(A)
+    V = V.astype(complex, copy=False)
+    # a defective matrix has eigenvectors that are parallel, and no inverse
+    singular = np.atleast_1d(~(np.abs(np.linalg.det(V)) > 1 / WORST_CONDITION**2))
+    V[singular] = np.eye(V.shape[-1])
+    inverse = np.linalg.inv(V)
+    bad = singular | ~finite | ~(np.abs(inverse).max(axis=(1, 2)) * len(scale) < WORST_CONDITION)
+    eigenvalues = eigenvalues.astype(complex)
+    eigenvalues[bad] = np.nan
+    return EigenBasis(at, derivative, (eigenvalues, V * scale[:, None], inverse / scale))

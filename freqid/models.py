@@ -232,7 +232,11 @@ class GreyBox:
                 _shaped(self.matrices(**resolved), resolved), self._by_jacobian(values, names)
             )
         if self.vectorized:
-            return self._complex_batch(values, names)
+            columns = np.array(list(values.values()), dtype=float)[:, None]
+            at, derivative = self._complex_batch(list(values), columns, names)
+            return Linearisation(
+                StateSpace(*(M[0] for M in at)), StateSpace(*(M[0] for M in derivative))
+            )
         resolved = self._ties.resolve(values)
         at = _shaped(self.matrices(**resolved), resolved)
         derivative = self._differentiate(values, names, self._takes_complex)
@@ -256,17 +260,42 @@ class GreyBox:
                     part[i] += slope * np.asarray(0.0 if d is None else d, dtype=float)
         return StateSpace(*total)
 
-    def _complex_batch(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
-        count = len(names)
-        columns = np.empty((len(values), count + 1), complex)
-        columns[:] = np.array(list(values.values()))[:, None]
-        row = {name: i for i, name in enumerate(values)}
-        for i, name in enumerate(names):
-            columns[row[name], i + 1] += _COMPLEX_STEP * 1j
-        stacked = self.matrices(**self._ties.resolve(dict(zip(values, columns, strict=True))))
+    def linearise_many(self, points: FloatArray, names: Sequence[str]) -> Linearisation:
+        """Matrices (S, …) at many points (S, len(names)) and their derivatives (S, P, …)."""
+        values = self.values
+        if self.vectorized and self.jacobian is None:
+            columns = np.tile(np.array(list(values.values()), dtype=float)[:, None], len(points))
+            for name, column in zip(names, points.T, strict=True):
+                columns[list(values).index(name)] = column
+            return Linearisation(*self._complex_batch(list(values), columns, names))
+        each = [
+            self.linearise(values | dict(zip(names, row.tolist(), strict=True)), names)
+            for row in points
+        ]
+        at, derivative = zip(*each, strict=True)
         return Linearisation(
-            StateSpace(*(M[0].real for M in stacked)),
-            StateSpace(*(M[1:].imag / _COMPLEX_STEP for M in stacked)),
+            StateSpace(*(np.stack(M) for M in zip(*at, strict=True))),
+            StateSpace(*(np.stack(M) for M in zip(*derivative, strict=True))),
+        )
+
+    def _complex_batch(
+        self, names: Sequence[str], columns: FloatArray, by: Sequence[str]
+    ) -> tuple[StateSpace, StateSpace]:
+        """Matrices at S points, columns (len(names), S), and derivatives, in one call."""
+        S, count = columns.shape[1], len(by)
+        stacked = np.empty((len(names), S, count + 1), complex)
+        stacked[:] = columns[..., None]
+        row = {name: i for i, name in enumerate(names)}
+        for i, name in enumerate(by):
+            stacked[row[name], :, i + 1] += _COMPLEX_STEP * 1j
+        flat = dict(zip(names, stacked.reshape(len(names), -1), strict=True))
+        matrices = [
+            np.asarray(M).reshape(S, count + 1, *np.shape(M)[1:])
+            for M in self.matrices(**self._ties.resolve(flat))
+        ]
+        return (
+            StateSpace(*(M[:, 0].real for M in matrices)),
+            StateSpace(*(M[:, 1:].imag / _COMPLEX_STEP for M in matrices)),
         )
 
     def _differentiate(

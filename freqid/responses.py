@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.bases import Basis, EigenBasis, basis_of
+from freqid.bases import Basis, basis_of, eigenbasis_of_many
 from freqid.checks import ComplexArray, FloatArray
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold, PeriodicHold, ZeroOrderHold
@@ -60,23 +60,16 @@ def transfer(plant: SampledPlant, z: ComplexArray) -> ComplexArray:
 def response_and_derivatives(
     plant: SampledPlant, z: ComplexArray, dz: ComplexArray | None = None
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response (outputs, inputs, lines) and its exact derivatives, with the parameters first."""
+    """Response (…, outputs, inputs, lines) and exact derivatives (…, P, outputs, inputs, lines)."""
     m = plant.gamma.shape[-1]
-    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, z.shape[-1]))
     x = plant.solve(z, plant.drive(z, U))
     return plant.output(x, U), plant.sensitivity(z, plant.output_rows(z), x, U, dz=dz)
 
 
 def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArray:
     """Responses of a batch of plants, (S, outputs, inputs, lines); NaN where A is defective."""
-    eigenvalues, V = np.linalg.eig(at.A)
-    V = V.astype(complex)
-    try:
-        inverse = np.linalg.inv(V)
-    except np.linalg.LinAlgError:
-        inverse = np.full_like(V, np.nan)
-    none = StateSpace(*(np.zeros((len(M), 0, *M.shape[1:])) for M in at))
-    basis = EigenBasis(at, none, (eigenvalues.astype(complex), V, inverse))
+    basis = eigenbasis_of_many(at)
     plant, z = basis.through(hold), points(omega, hold)
     m = at.B.shape[-1]
     U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))

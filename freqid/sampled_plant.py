@@ -5,7 +5,8 @@ With the resolvent R(z) = (zI − Φ)⁻¹ and the state x = R (Γ u + Γ⁺ z u
     y  = C x + D u
     dy = C R (dΦ x + dΓ u + dΓ⁺ z u) + dC x + dD u.
 
-Axes: (…, states, channels, lines). Leading axes are a batch of plants.
+Axes: (…, states, channels, lines). Leading axes are a batch of plants, each of which may have
+points z of its own, (…, lines).
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class SampledPlant:
 
     def resolvent(self, z: ComplexArray) -> ComplexArray | None:
         """1/(z − λ), (…, n, lines), in the eigenbasis: what ``solve`` and ``output_rows`` share."""
-        return None if self.triangular else 1 / (z - self.phi[..., :, None])
+        return None if self.triangular else 1 / (z[..., None, :] - self.phi[..., :, None])
 
     def solve(
         self, z: ComplexArray, right: ComplexArray, known: ComplexArray | None = None
@@ -89,7 +90,9 @@ class SampledPlant:
     def drive(self, z: ComplexArray, U: ComplexArray) -> ComplexArray:
         """Γ U + Γ⁺ z U, (…, n, channels, lines), for inputs U (m, channels, lines)."""
         right = _times(self.gamma, U)
-        return right if self.gamma_next is None else right + _times(self.gamma_next, z * U)
+        if self.gamma_next is None:
+            return right
+        return right + _times(self.gamma_next, z[..., None, None, :] * U)
 
     def output(self, x: ComplexArray, U: ComplexArray | None = None) -> ComplexArray:
         """C x + D U, (…, outputs, channels, lines)."""
@@ -115,6 +118,7 @@ class SampledPlant:
         is not U; ``dz`` the derivative of z itself by the last parameter.
         """
         n, p = w.shape[-2], w.shape[-3]
+        z_at = z[..., None, None, :]
         lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
         if lines > BLOCK and aliases == 1:
             return self._in_blocks(z, w, x, U, direct, dz)
@@ -124,7 +128,8 @@ class SampledPlant:
         if U is not None and len(U) > 2:
             push = _times(self.dgamma, U)
             if self.dgamma_next is not None:
-                push = push + _times(self.dgamma_next, z * U)
+                following = z_at * U
+                push = push + _times(self.dgamma_next, following[:, None] if lead else following)
         driven_by_U = U is not None and push is None
         m = len(U) if U is not None else 0
         foh = self.dgamma_next is not None
@@ -143,7 +148,7 @@ class SampledPlant:
                 weights.append(self.dgamma.reshape(*lead, P, n * m))
                 at += n * m
                 if self.dgamma_next is not None:
-                    F[..., at : at + n * m, :, :] = z * wu
+                    F[..., at : at + n * m, :, :] = z_at * wu
                     weights.append(self.dgamma_next.reshape(*lead, P, n * m))
                     at += n * m
             if moving_C:
@@ -179,7 +184,7 @@ class SampledPlant:
         for start in range(0, x.shape[-1], BLOCK):
             part = slice(start, start + BLOCK)
             dy[..., part] = self.sensitivity(
-                z[part],
+                z[..., part],
                 w[..., part],
                 x[..., part],
                 None if U is None else U[..., part],
