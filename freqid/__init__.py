@@ -4,6 +4,9 @@ from freqid import paper
 from freqid.apparent import apparent_response
 from freqid.asymptotic import asymptotic_fit
 from freqid.bias_map import bias_map
+from freqid.bias_plots import plot_bias, plot_bias_curves, plot_bias_map
+from freqid.design import d_optimal_spectrum, experiment_design
+from freqid.design_plots import plot_design
 from freqid.estimate import Estimate
 from freqid.estimators import etfe
 from freqid.excitation import chirp, prbs, sine, white_noise
@@ -58,14 +61,20 @@ __all__ = [
     "bias_map",
     "bode",
     "chirp",
+    "d_optimal_spectrum",
     "drivetrain",
     "etfe",
+    "experiment_design",
     "first_order",
     "fit",
     "multisine",
     "nyquist",
     "paper",
+    "plot_bias",
+    "plot_bias_curves",
+    "plot_bias_map",
     "plot_coherence",
+    "plot_design",
     "plot_orders",
     "plot_record",
     "prbs",

@@ -305,12 +305,13 @@ def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> 
     if derivative is None:
         derivative = StateSpace(*(np.zeros((len(M), 0, *M.shape[1:])) for M in at))
     scale = _state_scale(StateSpace(*(M[0] for M in at)))
-    finite = np.isfinite(at.A).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(at.A).all(axis=(1, 2)))
     A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1])) * scale / scale[:, None]
     eigenvalues, V = np.linalg.eig(A)
     V = V.astype(complex, copy=False)
     # a defective matrix has eigenvectors that are parallel, and no inverse
-    singular = np.atleast_1d(~(np.abs(np.linalg.det(V)) > 1 / WORST_CONDITION**2))
+    volume: Array = np.abs(np.linalg.det(V))
+    singular = ~(volume > 1 / WORST_CONDITION**2)
     V[singular] = np.eye(V.shape[-1])
     inverse = np.linalg.inv(V)
     bad = singular | ~finite | ~(np.abs(inverse).max(axis=(1, 2)) * len(scale) < WORST_CONDITION)

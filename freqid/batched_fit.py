@@ -124,6 +124,7 @@ class Batch:
         return flags
 
 
+@np.errstate(all="ignore")
 def descend(batch: Batch, start: FloatArray, known: FloatArray | None = None) -> Answers:
     """Levenberg-Marquardt steps of all problems together from scaled ``start`` (S, P).
 
@@ -151,8 +152,7 @@ def descend(batch: Batch, start: FloatArray, known: FloatArray | None = None) ->
         light = damping[on] < 1e-2
         settling = light & (size < 1e-5) & (size < last[on]) & np.isfinite(trial_cost)
         better = (trial_cost < cost[on]) | settling
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = (cost[on] - trial_cost) / predicted
+        ratio = (cost[on] - trial_cost) / predicted
         taken, refused = on[better], on[~better]
         x[taken], cost[taken] = trial[better], trial_cost[better]
         g[taken], H[taken] = trial_g[better], trial_H[better]
@@ -179,7 +179,7 @@ def descend(batch: Batch, start: FloatArray, known: FloatArray | None = None) ->
 def _steps(g: FloatArray, H: FloatArray, damping: FloatArray) -> FloatArray:
     """−(H + λ diag H)⁻¹ g, in units in which the diagonal of H is one."""
     size = np.sqrt(np.einsum("sii->si", H))
-    size = np.where(size > 0, size, 1)
+    size = np.where((size > 0) & np.isfinite(size), size, 1)
     scaled = H / (size[:, :, None] * size[:, None, :])
     P = g.shape[1]
     # far below the steps that matter, and enough to keep a singular matrix solvable

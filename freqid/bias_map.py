@@ -143,7 +143,7 @@ def _asked(
             raise ValueError("holds contains 'estimate'; a map compares holds that are assumed")
         as_hold(hold, base_dt, true_hold)
     rows = [
-        Row(plant, name, _label(hold), factor, spectrum, hold)
+        Row(plant, name, hold_label(hold), factor, spectrum, hold)
         for plant in plants
         for hold in assumed
         for factor in counts
@@ -152,7 +152,8 @@ def _asked(
     return Setting(true_hold, base_dt), rows
 
 
-def _label(hold: Hold | str | None) -> str:
+def hold_label(hold: Hold | str | None) -> str:
+    """What the table calls an assumed hold."""
     if hold is None:
         return "remembered"
     return hold if isinstance(hold, str) else repr(hold)

@@ -1,4 +1,4 @@
-"""The command line: freqid reproduce, demo, frf and fit."""
+"""The command line: freqid reproduce, demo, frf, fit and bias."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import freqid as fq
+from freqid.checks import choice, whole
 from freqid.files import whole_file
+from freqid.input_spectra import below_nyquist
 from freqid.plants import PLANTS
 
 notes = Console(stderr=True)
@@ -187,6 +189,69 @@ def fit(
     for warning in estimate.warnings:
         print(f"warning: {warning}")
     return 0 if estimate.converged else 1
+
+
+@app.command
+def bias(
+    *,
+    model: Literal["two-mass", "three-mass", "first-order"],
+    chirp: tuple[float, float],
+    factor: Annotated[list[float], Option(consume_multiple=True)],
+    hold: Annotated[list[str] | None, Option(consume_multiple=True)] = None,
+    base_dt: float = 0.5e-3,
+    parameter: str | None = None,
+    out: Path | None = None,
+    plot: Path = Path("bias.png"),
+) -> int:
+    """What a chirp, decimated, makes of a model's parameters: computed, without data.
+
+    Parameters
+    ----------
+    model
+        two-mass (the paper's), three-mass or first-order, at its own values.
+    chirp
+        lowest and highest frequency in Hz.
+    factor
+        decimation factors.
+    hold
+        what the fit assumes: any of zoh, foh, bl and remembered; by default zoh, foh, remembered.
+    base_dt
+        sample time of the converter in s.
+    parameter
+        that the picture shows; by default the one that is most wrong.
+    out
+        CSV file for the table.
+    plot
+        heat map over upper frequency and factor, one panel a hold.
+    """
+    names = ["zoh", "foh", "remembered"] if hold is None else hold
+    for name in names:
+        choice("--hold", name, ("zoh", "foh", "bl", "remembered"))
+    holds = [None if name == "remembered" else name for name in names]
+    factors = [whole("--factor", f) for f in factor]
+    plant = _plant(model)
+    low, high = chirp
+    below_nyquist(high, base_dt)
+    asked = f"{low:g}-{high:g}"
+    table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, holds, base_dt)
+    if out is not None:
+        _write(out, lambda path: table.to_csv(path, index=False))
+    shown = table.drop(columns=["spectrum", "message"])
+    shown["relative_bias"] = [f"{100 * b:+.3g} %" for b in shown["relative_bias"]]
+    _show(f"{model}, chirp {asked} Hz held for {1e3 * base_dt:g} ms", shown)
+    finite = table[np.isfinite(table["relative_bias"])]
+    if parameter is None and len(finite):
+        parameter = finite.loc[finite["relative_bias"].abs().idxmax(), "parameter"]
+    for message in dict.fromkeys(m for m in table["message"] if m):
+        print(f"warning: {message}")
+    nyquist = 0.5 / base_dt
+    uppers = sorted({float(f"{u:.3g}") for u in np.linspace(low, 2 * high - low, 15)[2:]} | {high})
+    around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}
+    picture = fq.bias_map(plant, around, factors, holds, base_dt)
+    axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[asked])
+    _write(plot, lambda path: axes[0].figure.savefig(path))
+    print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")
+    return 0 if table["converged"].all() else 1
 
 
 def _hold(text: str | None) -> Any:

@@ -146,8 +146,8 @@ def _together(
 def _determined(batch: Batch, found: Answers) -> Any:
     """Whether the parameters of each problem are told apart by its spectrum, (S,)."""
     H = batch.normal(found.values, np.arange(len(found.values)))[2]
-    size = np.sqrt(np.einsum("sii->si", H))
     with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.sqrt(np.einsum("sii->si", H))
         scaled = H / (size[:, :, None] * size[:, None, :])
     scaled = np.where(np.isfinite(scaled), scaled, 0)
     return np.linalg.eigvalsh(scaled)[:, 0] > _DETERMINED

@@ -254,8 +254,11 @@ def _aligned(
     phase = frf.phase[pair]
     if pair[0] >= reference.response.shape[0] or pair[1] >= reference.response.shape[1]:
         return phase
-    there = np.interp(frf.omega, reference.omega, reference.phase[pair])
-    return phase - 360 * np.round(np.median(phase - there) / 360)
+    both = (frf.omega >= reference.omega[0]) & (frf.omega <= reference.omega[-1])
+    if not both.any():
+        return phase
+    there = np.interp(frf.omega[both], reference.omega, reference.phase[pair])
+    return phase - 360 * np.round(np.median(phase[both] - there) / 360)
 
 
 def _in_decibel(x: FloatArray) -> FloatArray:

@@ -109,3 +109,22 @@ def test_a_fit_that_does_not_converge_is_exit_code_1(chirp, monkeypatch, capsys)
     with pytest.raises(SystemExit) as end:
         cli.main(["fit", str(chirp / "slow.csv"), "--model", "first-order"])
     assert end.value.code == 1
+
+
+def test_bias_prints_the_table_and_draws_the_map(tmp_path):
+    done = run("bias", "--model", "two-mass", "--chirp", "10", "80", "--factor", "5", "10",
+               "--out", "bias.csv", cwd=tmp_path)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "-231.4" in done.stdout
+    assert "not physical: d" in done.stdout
+    assert (tmp_path / "bias.png").stat().st_size > 10_000
+    assert len((tmp_path / "bias.csv").read_text().splitlines()) == 1 + 2 * 3 * 5
+
+
+def test_bias_refuses_bad_input(tmp_path):
+    for wrong in (["80", "10", "--factor", "2"], ["10", "2000", "--factor", "2"],
+                  ["10", "80", "--factor", "2.5"]):  # fmt: skip
+        done = run("bias", "--model", "two-mass", "--chirp", *wrong, cwd=tmp_path)
+        assert done.returncode == 2
+        assert len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "bias.png").exists()
