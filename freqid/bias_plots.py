@@ -74,7 +74,8 @@ def plot_bias_map(table: pd.DataFrame, parameter: str, ax: Any = None, mark: Any
                     frame = plt.Rectangle((at, 0), 1, len(factors), fill=False, linewidth=2)
                     axis.add_patch(frame)
         ax[0].set_ylabel("decimation factor")
-        bar = ax[0].figure.colorbar(image, ax=list(ax), label=f"relative bias of {parameter} (cells: per cent)")
+        label = f"relative bias of {parameter} (cells: per cent)"
+        bar = ax[0].figure.colorbar(image, ax=list(ax), label=label)
         ticks = [
             t for t in (-100, -10, -1, -0.1, -0.01, 0, 0.01, 0.1, 1, 10, 100) if abs(t) <= limit
         ]
