@@ -3,10 +3,12 @@
 from freqid import paper
 from freqid.apparent import apparent_response
 from freqid.asymptotic import asymptotic_fit
+from freqid.averaged import h1, h2, hv
 from freqid.bias_map import bias_map
 from freqid.bias_plots import plot_bias, plot_bias_curves, plot_bias_map
 from freqid.design import d_optimal_spectrum, experiment_design
 from freqid.design_plots import plot_design
+from freqid.distortion import distortion
 from freqid.estimate import Estimate
 from freqid.estimators import etfe
 from freqid.excitation import chirp, prbs, sine, white_noise
@@ -24,16 +26,27 @@ from freqid.input_spectra import (
     PRBSSpectrum,
     WhiteSpectrum,
 )
+from freqid.local_models import local_polynomial, local_rational
 from freqid.models import GreyBox
 from freqid.multisines import multisine
 from freqid.order_selection import plot_orders, select_order
 from freqid.parameter import Parameter
 from freqid.plants import drivetrain, first_order, two_mass
 from freqid.plots import bode, nyquist, plot_coherence, plot_record
+from freqid.quality import check_record
 from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.simulation import simulate
 from freqid.transfer_functions import TransferFunction
+from freqid.validation import (
+    bootstrap,
+    compare,
+    cost_test,
+    cross_validate,
+    hold_bias,
+    residual_test,
+)
+from freqid.validation_plots import plot_residuals
 
 __version__ = "0.1.0"
 
@@ -60,13 +73,25 @@ __all__ = [
     "asymptotic_fit",
     "bias_map",
     "bode",
+    "bootstrap",
+    "check_record",
     "chirp",
+    "compare",
+    "cost_test",
+    "cross_validate",
     "d_optimal_spectrum",
+    "distortion",
     "drivetrain",
     "etfe",
     "experiment_design",
     "first_order",
     "fit",
+    "h1",
+    "h2",
+    "hold_bias",
+    "hv",
+    "local_polynomial",
+    "local_rational",
     "multisine",
     "nyquist",
     "paper",
@@ -77,8 +102,10 @@ __all__ = [
     "plot_design",
     "plot_orders",
     "plot_record",
+    "plot_residuals",
     "prbs",
     "read",
+    "residual_test",
     "select_order",
     "simulate",
     "sine",

@@ -118,12 +118,38 @@ def frf(
     output: Columns = None,
     dt: Dt = None,
     band: Band = None,
-    method: Literal["etfe"] = "etfe",
+    method: Literal["etfe", "h1", "lpm", "lrm"] = "etfe",
+    segment: int | None = None,
+    reference: str | None = None,
     out: Path | None = None,
     plot: Path | None = None,
 ) -> None:
-    """Frequency response of a record, to the screen, a CSV file or a picture."""
-    response = fq.etfe(fq.read(data, input, output, dt), band)
+    """Frequency response of a record, to the screen, a CSV file or a picture.
+
+    Parameters
+    ----------
+    data
+        file with a column of time and one for each channel (.csv, .parquet, .mat, .npz, .h5, .uff).
+    method
+        etfe, the ratio of DFTs; h1, averaged over segments; lpm and lrm, local polynomials and
+        local rational functions. All but etfe tell their variance.
+    segment
+        samples of each segment of h1.
+    reference
+        column of the commanded signal, for data in closed loop (h1, lpm, lrm).
+    """
+    record = fq.read(data, input, output, dt, reference=reference)
+    if reference is not None and method == "etfe":
+        raise ValueError("--reference needs --method h1, lpm or lrm")
+    if segment is not None and method != "h1":
+        raise ValueError("--segment needs --method h1")
+    loop = None if reference is None else True
+    response = {
+        "etfe": lambda: fq.etfe(record, band),
+        "h1": lambda: fq.h1(record, segment, band=band, reference=loop),
+        "lpm": lambda: fq.local_polynomial(record, band=band, reference=loop),
+        "lrm": lambda: fq.local_rational(record, band=band, reference=loop),
+    }[method]()
     frame = response.to_frame()
     if out is not None:
         _write(out, lambda path: frame.to_csv(path, index=False))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, unknown
+from freqid.checks import FloatArray, choice, unknown
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import Hold
 
@@ -49,6 +49,8 @@ class Estimate:
     n_starts: int = 1
     n_agreed: int = 1
     warnings: list[str] = field(default_factory=list)
+    # the cost that was minimised, for what asks for more than its least point
+    problem: Any = field(default=None, repr=False)
 
     def __getitem__(self, name: str) -> float:
         if name in self.names:
@@ -120,6 +122,47 @@ class Estimate:
         if not hasattr(self.model, "to_continuous"):
             raise ValueError("the model is in continuous time already; use to_control()")
         return self.model.to_continuous(self.hold if hold is None else hold)
+
+    def derived(self, function: Any) -> tuple[Any, Any]:
+        """Value and standard error of ``function(model)``, a number or an array, to first order.
+
+        >>> import freqid as fq
+        >>> record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3).with_noise(0.01)
+        >>> est = fq.fit(fq.first_order(), record)
+        >>> gain, std = est.derived(lambda model: model["b"] / model["a"])
+        >>> bool(abs(gain - 1) < 5 * std)
+        True
+        """
+        from freqid.error_bars import derived
+
+        return derived(self, function)
+
+    def modes(self) -> pd.DataFrame:
+        """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
+        from freqid.error_bars import modes
+
+        return modes(self)
+
+    def intervals(self, method: str = "linear", level: float = 0.95) -> pd.DataFrame:
+        """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.
+
+        Raises ValueError for an unknown method or a level outside (0, 1).
+        """
+        import pandas as pd
+        from scipy.stats import norm
+
+        from freqid.error_bars import profile_intervals
+
+        choice("method", method, ("linear", "profile"))
+        if not 0 < level < 1:
+            raise ValueError(f"level={level!r} must lie between 0 and 1")
+        if method == "profile":
+            return profile_intervals(self, level)
+        half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
+        return pd.DataFrame(
+            {"lower": self.values - half, "upper": self.values + half},
+            index=pd.Index(list(self.names), name="parameter"),
+        )
 
     def bode(self, ax: Any = None, **options: Any) -> Any:
         """Draw amplitude and phase of the estimate; see ``freqid.bode``."""

@@ -55,6 +55,14 @@ class Realisation:
         lin = Linearisation(at, StateSpace(*(M * factor for M in d)))
         return Realisation(lin, self.basis.scaled(factor), self.period, scale)
 
+    def without(self, index: int) -> Realisation:
+        """The same point without the derivative by one unknown, which is held."""
+        if self.period is not None or self.delay_scale is not None:
+            raise ValueError("an estimated hold or delay cannot be held")
+        at, d = self.linearisation
+        fewer = StateSpace(*(np.delete(M, index, axis=0) for M in d))
+        return Realisation(Linearisation(at, fewer), basis_of(at, fewer), delay=self.delay)
+
     def delayed(
         self, hold: Hold, omega: FloatArray, z: ComplexArray
     ) -> tuple[SampledPlant, ComplexArray]:

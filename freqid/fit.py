@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,11 +16,17 @@ from freqid.grey_fit import fit_grey_box, started
 from freqid.hold_tests import rejected_hold
 from freqid.holds import Hold
 from freqid.models import GreyBox
+from freqid.noise_spectrum import noise_weights
 from freqid.preparation import Options
 from freqid.rational import OutputError
 from freqid.record import Record
+from freqid.residuals import line_errors
 from freqid.transfer_fit import fit_transfer_function
 from freqid.transfer_functions import TransferFunction
+
+# fits with the noise of the one before, and the part of a standard error that ends them
+_NOISE_ROUNDS = 4
+_STANDS = 0.01
 
 
 def fit(
@@ -51,8 +58,9 @@ def fit(
             time domain (Parseval), but for the line at zero of a plant that integrates. Where the
             input is faster than the output this is the input's band.
         weights: None for ones (for a response its input spectrum, where known), ``"noise"`` for
-            1/variance, or an array, (lines,) or (outputs, lines); a list of these, one for each of
-            several experiments.
+            1/variance: that of a response, or, for a record, that of what a first fit leaves,
+            smoothed over neighbouring lines and taken anew until the estimate stands; or an array,
+            (lines,) or (outputs, lines); a list of these, one for each of several experiments.
         initial_state: ``"estimate"`` (free), ``"zero"`` (the sampled model starts at rest) or
             ``"steady"`` (no transient).
         start: parameter values to begin from; the model's own where not given.
@@ -84,6 +92,15 @@ def fit(
     all_weights = list(weights) if each else [weights] * len(sets)
     if len(all_weights) != len(sets):
         raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
+    unknown_noise = [
+        isinstance(w, str) and w == "noise" and isinstance(d, Record)
+        for w, d in zip(all_weights, sets, strict=True)
+    ]
+    if any(unknown_noise):
+        rest = {"hold": hold, "band": band, "initial_state": initial_state, "domain": domain}
+        return _noise_weighted(
+            model, sets, all_weights, unknown_noise, {"start": start, "n_starts": n_starts}, rest
+        )
     integrates = isinstance(model, GreyBox) and _integrates(model)
     options = Options(
         "zoh" if hold == "estimate" else hold, band, initial_state, domain, integrates
@@ -108,6 +125,41 @@ def fit(
     if hold is None or estimated:
         return est
     return rejected_hold(est, structure, objective)
+
+
+def _noise_weighted(
+    model: Any,
+    sets: Sequence[Any],
+    weights: Sequence[Any],
+    unknown_noise: Sequence[bool],
+    search: dict[str, Any],
+    options: dict[str, Any],
+) -> Estimate:
+    """Fits in turn with the noise that the one before left; to the maximum of the likelihood."""
+    if options["domain"] == "time":
+        raise ValueError("weights='noise' needs domain='frequency'")
+    known = [None if u else w for u, w in zip(unknown_noise, weights, strict=True)]
+    est = fit(model, sets, weights=known, **search, **options)
+    for _ in range(_NOISE_ROUNDS):
+        used = [
+            noise_weights(
+                line_errors(est, d, est.hold if options["hold"] else None, options["band"],
+                            options["initial_state"]).error
+            )
+            if u
+            else w
+            for u, w, d in zip(unknown_noise, known, sets, strict=True)
+        ]  # fmt: skip
+        if isinstance(model, GreyBox):
+            near = est.model.values
+            search = {"start": {p.name: near[p.name] for p in model.free_parameters}, "n_starts": 1}
+        before = est
+        est = fit(model, sets, weights=used, **search, **options)
+        std = np.sqrt(np.diag(est.covariance_matrix))
+        if (np.abs(est.values - before.values) <= _STANDS * std).all():
+            break
+    nominal = before.nominal if isinstance(model, GreyBox) else est.nominal
+    return dataclasses.replace(est, nominal=nominal)
 
 
 def _integrates(model: GreyBox) -> bool:

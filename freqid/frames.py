@@ -47,6 +47,45 @@ def record_fields(
     }
 
 
+def regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+    """The frame on a regular time, blanks filled, by straight lines; and what was done, in words.
+
+    The step is the median one. Raises ValueError for a frame without a time, or whose times do not
+    increase.
+    """
+    import pandas as pd
+
+    times = _times(frame)
+    if times is None:
+        raise ValueError("resample=True needs a column or index called 'time'")
+    gaps = np.diff(times)
+    if not np.isfinite(times).all() or (gaps <= 0).any():
+        raise ValueError("column 'time' must increase; sort or repair the rows")
+    step = float(f"{np.median(gaps):.6g}")
+    grid = times[0] + step * np.arange(round((times[-1] - times[0]) / step) + 1)
+    notes = []
+    wide = int((gaps > 1.5 * step).sum())
+    if wide:
+        notes.append(f"{wide} gaps in time were filled by straight lines, the widest of "
+                     f"{gaps.max():g} s")  # fmt: skip
+    jitter = np.abs(gaps[gaps <= 1.5 * step] - step).max(initial=0)
+    if jitter > 1e-6 * step:
+        notes.append(f"jitter of up to {jitter:g} s was taken off by straight lines")
+    new: dict[str, Any] = {"time": grid}
+    for name in frame.columns:
+        if name == "time":
+            continue
+        x = frame[name].to_numpy(dtype=float)
+        there = np.isfinite(x)
+        if not there.any():
+            raise ValueError(f"column {name!r} has no samples at all; leave it out")
+        missing = len(x) - int(there.sum())
+        if missing:
+            notes.append(f"{missing} missing samples of {name!r} were filled by straight lines")
+        new[str(name)] = np.interp(grid, times[there], x[there])
+    return pd.DataFrame(new), notes
+
+
 def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
     times = _times(frame)
     if times is None:
@@ -64,7 +103,7 @@ def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
         row = int(np.argmax(np.abs(gaps - step))) + 1
         raise ValueError(
             f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on "
-            "average; resample the data first"
+            "average; resample=True puts them on a regular grid"
         )
     if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
         raise ValueError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")

@@ -15,12 +15,13 @@ from freqid.experiments import SpectralExperiment
 from freqid.hold_tests import decimation_warning
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
+from freqid.noise_spectrum import score_covariance
 from freqid.optimise import Objective, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.priors import Prior
 from freqid.starts import Found, log_targets, noise_floor, search
 from freqid.structures import GreyStructure
-from freqid.trust import physical_warnings, uncertainty
+from freqid.trust import coloured, physical_warnings, uncertainty
 
 # lines on which the minimum is looked for
 _LINES = 600
@@ -157,12 +158,16 @@ def _estimate(
     energy = sum(e.energy for e in objective.experiments)
     noise = noise_variance(objective, point, len(values))
     u = uncertainty(point.jacobian / scale, values, structure.names, noise, np.sqrt(energy))
+    covariance = u.covariance
+    if point.cost > 1e-18 * energy and objective.prior is None:
+        score = score_covariance(objective, solution.x)
+        covariance = coloured(u.covariance / max(noise, 1e-300), score, scale, covariance)
     warnings = [] if solution.converged else [f"not converged: {solution.message}"]
     count = len(structure.parameters)
     warnings += u.warnings + physical_warnings(structure.parameters, values[:count])
     if structure.dt is not None:
         hold = ZeroOrderHold(values[-1])
-        warnings += decimation_warning(values[-1], np.sqrt(u.covariance[-1, -1]), dt)
+        warnings += decimation_warning(values[-1], np.sqrt(covariance[-1, -1]), dt)
     named = dict(zip(structure.physical_names, values[:count], strict=True))
     return Estimate(
         model=structure.model.with_values(**named),
@@ -170,7 +175,8 @@ def _estimate(
         values=values,
         nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),
         units=[*(p.unit for p in structure.parameters), "s"][: len(values)],
-        covariance_matrix=u.covariance,
+        covariance_matrix=covariance,
+        problem=objective,
         hold=hold,
         dt=dt,
         n_starts=found.n_starts,

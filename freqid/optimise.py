@@ -118,7 +118,7 @@ class Objective:
                 r, T, delta = evaluation.residual, evaluation.transient, None
                 Q = None
                 if T is not None:
-                    Q, delta = _eliminate(T, r)
+                    Q, delta = eliminate(T, r)
                     r = r - combined(along(Q, r), Q)
                 blocks.append((evaluation.jacobian(delta), r, Q))
                 initial.append(delta)
@@ -217,7 +217,7 @@ def _triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | Non
     return triangle(stacked.T)
 
 
-def _eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Orthonormal rows that span those of T (q, rows), and the δ that makes |r + δ T| least."""
     size = np.sqrt(np.einsum("ij,ij->i", T, T))
     delta = np.zeros(len(T))

@@ -12,7 +12,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, finite, positive, samples, unknown, whole
 from freqid.folding import low_pass
-from freqid.frames import record_fields
+from freqid.frames import record_fields, regular
 from freqid.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class Record:
         input_names, output_names: channel names.
         units: unit of each channel by name.
         reference: the signal that was commanded, in closed loop; sampled like the output.
+        notes: what was done to the samples before, in sentences.
 
     Raises ValueError for NaN samples, lengths that do not agree, or a sample time that is not
     positive. The arrays are copied and read-only.
@@ -52,6 +53,7 @@ class Record:
     output_names: Sequence[str] = None  # type: ignore[assignment]
     units: Mapping[str, str] | None = None
     reference: FloatArray | None = None
+    notes: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -261,20 +263,30 @@ class Record:
         dt: float | None = None,
         hold: Hold | str | None = None,
         reference: str | None = None,
+        units: Mapping[str, str] | None = None,
+        resample: bool = False,
     ) -> Record:
         """A record from the columns of a DataFrame.
 
         The time is a column ``time`` or an index of numbers (s), times or timedeltas called
         ``time``; it must be uniform. ``dt`` (s) is for frames without one. Where neither inputs
         nor outputs are named, two columns beside the time are input and output in that order.
-        Raises ValueError for unknown columns, missing samples or an irregular time.
+        ``resample`` puts an irregular time, or missing samples, on a regular grid by straight
+        lines and says so in ``notes``. Raises ValueError for unknown columns, and without
+        ``resample`` for missing samples or an irregular time.
 
         >>> import pandas as pd
         >>> frame = pd.DataFrame({"time": [0, 0.1, 0.2], "u": [0.0, 1, 1], "y": [0.0, 0, 1]})
         >>> Record.from_frame(frame).dt
         0.1
         """
-        return cls(**record_fields(frame, inputs, outputs, dt, hold, reference))
+        notes: list[str] = []
+        if resample:
+            frame, notes = regular(frame)
+        fields = record_fields(frame, inputs, outputs, dt, hold, reference)
+        named = {*fields["input_names"], *fields["output_names"], "reference"}
+        known = {k: v for k, v in (units or {}).items() if k in named}
+        return cls(**fields, units=known, notes=tuple(notes))
 
     def __repr__(self) -> str:
         shown = f"{self.n_samples} samples at {self.dt:g} s"
@@ -293,6 +305,8 @@ class Record:
             "duration": f"{self.duration:g} s",
             "hold": repr(self.hold),
         }
+        if self.notes:
+            rows["notes"] = "; ".join(self.notes)
         body = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>Record</caption>{body}</table>"
 

@@ -63,6 +63,17 @@ def uncertainty(
     return Uncertainty(covariance, warnings)
 
 
+def coloured(
+    inverse: FloatArray, score: FloatArray | None, scale: FloatArray, white: FloatArray
+) -> FloatArray:
+    """H⁻¹ M H⁻¹ from H⁻¹ (P, P) and M in scaled unknowns; ``white`` where there is no M."""
+    if score is None:
+        return white
+    known = np.isfinite(inverse)
+    half = np.where(known, inverse, 0)
+    return np.where(known, half @ (score / np.outer(scale, scale)) @ half, np.inf)
+
+
 def _combination(names: list[str], change: FloatArray) -> str:
     """Name what the data leave open, as relative changes that cancel one another."""
     parts = [f"{name} by {c:+.3g} %" for name, c in zip(names, change, strict=True)]
