@@ -193,7 +193,7 @@ def asymptotic_fit(
     >>> est = asymptotic_fit(fq.two_mass(), fq.ChirpSpectrum(10, 80), dt=5e-3, hold="zoh",
     ...                      true_hold=fq.ZeroOrderHold(0.5e-3))
     >>> round(est["d"], 1)
-    -230.9
+    -231.4
     """
     if not isinstance(spectrum, InputSpectrum):
         raise ValueError(f"spectrum={type(spectrum).__name__} is not a spectrum of an input")

@@ -40,7 +40,7 @@ class InputSpectrum:
     def aliased_density(self, frequency: Any, dt: float, factor: int = 1) -> FloatArray:
         """Density in u²/Hz after every ``factor``-th sample has been kept: the sum of its folds.
 
-        >>> float(WhiteSpectrum().aliased_density([10.0], dt=0.5e-3, factor=10)[0])
+        >>> round(float(WhiteSpectrum().aliased_density([10.0], dt=0.5e-3, factor=10)[0]), 9)
         0.01
         """
         folds = np.abs(unfold(frequency, dt, factor))

@@ -31,7 +31,7 @@ def check_record(record: Record) -> pd.DataFrame:
     >>> t = np.arange(1000) * 1e-3
     >>> u = np.sin(20 * t)
     >>> check_record(Record(u, np.clip(u, -0.5, 0.5), 1e-3))["finding"].tolist()
-    ['saturated']
+    ['saturated', 'saturated']
     """
     import pandas as pd
 

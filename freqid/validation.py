@@ -142,7 +142,7 @@ def residual_test(
         for i, name in enumerate(record.input_names):
             cross = _correlation(e[:, o], u[:, i], lags)
             # variance of the cross-correlation of independent signals: Σ R_e(τ) R_u(τ) / N
-            span = min(N // 4, 10 * lags)
+            span = min(N // 4, 2 * lags)
             full = _correlation(e[:, o], e[:, o], span) * _correlation(u[:, i], u[:, i], span)
             spread = np.sqrt(max(float(full.sum()), 1.0) / freedom)
             z = float(np.abs(cross).max() / spread)

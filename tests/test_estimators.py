@@ -1,0 +1,241 @@
+"""Non-parametric estimates: against scipy, the true plant, and their own error bars."""
+
+import control
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+T1 = 0.5e-3
+
+
+@pytest.fixture(scope="module")
+def light():
+    """A mode at 20 Hz with a damping of 0.01, sampled at 2 ms."""
+    w, zeta = 2 * np.pi * 20, 0.01
+    A, B, C = np.array([[0, w], [-w, -2 * zeta * w]]), np.array([[0], [w]]), np.array([[1.0, 0]])
+    return fq.GreyBox(lambda g: (A, g * B, C, None), [fq.Parameter("g", 1.0)])
+
+
+def rms(frf, model, hold):
+    true = model.frequency_response(frf.omega, hold).response
+    return np.sqrt(np.mean(np.abs(frf.response / true - 1) ** 2))
+
+
+@pytest.mark.parametrize("window", ["hann", ("tukey", 0.5), "boxcar"])
+def test_h1_is_that_of_scipy(fast, window):
+    options = {"fs": 2000, "window": window, "nperseg": 4000}
+    noverlap = 0 if window == "boxcar" else 2000
+    f, Puy = scipy.signal.csd(fast.u, fast.y, noverlap=noverlap, **options)
+    _, Puu = scipy.signal.welch(fast.u, noverlap=noverlap, **options)
+    _, gamma = scipy.signal.coherence(fast.u, fast.y, noverlap=noverlap, **options)
+    frf = fq.h1(fast, 4000, window=window)
+    assert np.allclose(frf.frequency, f[1:])
+    assert np.allclose(frf.response[0, 0], (Puy / Puu)[1:], rtol=1e-12)
+    if window != "boxcar":
+        assert np.allclose(frf.coherence[0, 0], gamma[1:], rtol=1e-10)
+    _, Pyy = scipy.signal.welch(fast.y, noverlap=noverlap, **options)
+    assert np.allclose(fq.h2(fast, 4000, window=window).response[0, 0], (Pyy / Puy.conj())[1:])
+    both = fq.hv(fast, 4000, window=window).response[0, 0]
+    assert np.allclose(np.abs(both), np.sqrt(Pyy / Puu)[1:])
+    assert np.allclose(np.angle(both / frf.response[0, 0]), 0, atol=1e-7)
+
+
+def test_noise_on_either_end(light):
+    """Noise on the input biases H1 down and not H2; on the output the other way round."""
+    u = fq.white_noise(200_000, seed=1)
+    clean = fq.simulate(light, u, 2e-3)
+    rng = np.random.default_rng(2)
+    noisy_u = fq.Record(u + 0.5 * rng.standard_normal(len(u)), clean.y, 2e-3)
+    noisy_y = clean.with_noise(clean.y.std(), seed=3)
+    band = (5, 15)
+    true = np.abs(light.frequency_response(2 * np.pi * np.array([10.0]), clean.hold).response)[0, 0]
+
+    def at_ten(estimate, record):
+        frf = estimate(record, 1000, band=band)
+        return np.abs(frf.response[0, 0, np.argmin(np.abs(frf.frequency - 10))]) / true[0]
+
+    assert at_ten(fq.h1, noisy_u) == pytest.approx(0.8, abs=0.02)
+    assert at_ten(fq.h2, noisy_u) == pytest.approx(1, abs=0.02)
+    assert at_ten(fq.h1, noisy_y) == pytest.approx(1, abs=0.1)
+    assert at_ten(fq.h2, noisy_y) > 1.5
+
+
+@pytest.mark.parametrize("estimate", [
+    lambda r: fq.h1(r, 500, band=(30, 80)),
+    lambda r: fq.local_polynomial(r, band=(30, 80)),
+    lambda r: fq.local_rational(r, band=(30, 80)),
+])  # fmt: skip
+def test_variances_are_those_of_the_scatter(estimate):
+    """60 runs of a smooth plant: variance told and variance seen, and 95 % of errors within."""
+    runs, told = [], []
+    for s in range(60):
+        record = fq.simulate(fq.first_order(), fq.white_noise(4000, seed=s), 2e-3)
+        frf = estimate(record.with_noise(0.1, seed=s + 100))
+        runs.append(frf.response[0, 0])
+        told.append(frf.variance[0, 0])
+    seen = np.var(runs, axis=0)
+    assert np.mean(told) == pytest.approx(np.mean(seen), rel=0.2)
+
+
+def test_local_models_on_the_papers_chirp(plant, fast, slow):
+    """Noise-free: the rational model has no leakage and follows the resonance."""
+    for chirp in (fast, fq.simulate(plant, fq.chirp(10, 80, 10, T1, phase=-90), T1)):
+        hold = fq.ZeroOrderHold(T1)
+        assert rms(fq.local_rational(chirp, band=(10, 80)), plant, hold) < 3e-5
+        assert rms(fq.etfe(chirp, band=(10, 80)), plant, hold) > 0.01
+        assert rms(fq.h1(chirp, 4000, band=(10, 80)), plant, hold) > 0.1
+    assert rms(fq.local_rational(slow, band=(10, 80)), plant, hold) < 1e-2
+
+
+def test_local_polynomials_beat_a_window_at_a_resonance(light):
+    errors = {"lpm": [], "h1": []}
+    for s in range(30):
+        record = fq.simulate(light, fq.white_noise(8000, seed=s), 2e-3)
+        record = record.with_noise(0.01 * record.y.std(), seed=s + 1000)
+        for name, frf in (("lpm", fq.local_polynomial(record, band=(15, 25))),
+                          ("h1", fq.h1(record, 4000, band=(15, 25)))):  # fmt: skip
+            near = np.abs(frf.frequency - 20) <= 0.4
+            true = light.frequency_response(frf.omega[near], record.hold).response[0, 0]
+            errors[name].append(np.mean(np.abs(frf.response[0, 0, near] - true) ** 2))
+    assert np.mean(errors["lpm"]) < np.mean(errors["h1"]) / 3
+
+
+def feedback(plant_d, seed, n=100_000):
+    """r + noise in a strong loop: u = r − K y, y = G u + v."""
+    rng = np.random.default_rng(seed)
+    r, v = rng.standard_normal(n), 0.5 * rng.standard_normal(n)
+    x, u, y, K = np.zeros(len(plant_d.A)), np.zeros(n), np.zeros(n), 2.0
+    A, B, C = (np.asarray(M) for M in (plant_d.A, plant_d.B, plant_d.C))
+    B, C = B[:, 0], C[0]
+    for t in range(n):
+        y[t] = C @ x + v[t]
+        u[t] = r[t] - K * y[t]
+        x = A @ x + B * u[t]
+    return fq.Record(u, y, 0.01, reference=r)
+
+
+def test_a_strong_loop_biases_the_direct_estimate_only():
+    system = control.c2d(control.ss([[-3.0]], [[3.0]], [[1.0]], 0), 0.01)
+    record = feedback(system, 4)
+    through = fq.h1(record, 500, reference=True, band=(0.5, 45))
+    direct = fq.h1(record, 500, band=(0.5, 45))
+    true = system(np.exp(1j * through.omega * 0.01))
+    inside = np.abs(through.response[0, 0] - true) < 3 * np.sqrt(through.variance[0, 0])
+    assert inside.mean() >= 0.99
+    outside = np.abs(direct.response[0, 0] - true) > 3 * np.sqrt(direct.variance[0, 0])
+    assert outside.mean() > 0.9
+    local = fq.local_polynomial(record.slice(0, 100), reference=True, band=(0.5, 45))
+    true = system(np.exp(1j * local.omega * 0.01))
+    close = np.abs(local.response[0, 0] - true) < 3 * np.sqrt(local.variance[0, 0])
+    assert close.mean() >= 0.98
+
+
+def test_a_two_by_two_plant_from_two_experiments():
+    """Periodic, noise-free: response and fit are exact."""
+    rng = np.random.default_rng(5)
+    A = np.array([[-2.0, 8, 0], [-8, -2, 1], [0, 0, -5]])
+    B, C = rng.standard_normal((3, 2)), rng.standard_normal((2, 3))
+    model = fq.GreyBox(
+        lambda w, a: (A * np.array([[1, w, 1], [w, 1, 1], [1, 1, a]]), B, C, None),
+        [fq.Parameter("w", 1.0), fq.Parameter("a", 1.0)],
+        inputs=["left", "right"], outputs=["p", "q"],
+    )  # fmt: skip
+    records = []
+    for s in range(2):
+        u = np.stack([fq.multisine((0.1, 5), 20, 0.05, 1, "random", seed=2 * s + i)
+                      for i in range(2)], axis=1)  # fmt: skip
+        run = fq.simulate(model, np.tile(u, (3, 1)), 0.05, input_names=["left", "right"],
+                          output_names=["p", "q"])  # fmt: skip
+        records.append(run.slice(40, 60))
+    frf = fq.etfe(records, band=(0.1, 5))
+    true = model.frequency_response(frf.omega, fq.ZeroOrderHold(0.05)).response
+    assert np.abs(frf.response - true).max() < 1e-8 * np.abs(true).max()
+    assert np.abs(fq.h1(records, window="boxcar", detrend=False).select((0.1, 5)).response
+                  - true).max() < 1e-8 * np.abs(true).max()  # fmt: skip
+    start = {"w": 1.2, "a": 0.8}
+    for data in (frf, records):
+        est = fq.fit(model, data, start=start, band=(0.1, 5))
+        assert np.abs(est.values - 1).max() < 1e-8
+    black = fq.fit(fq.OutputError(3), records, band=(0.1, 5))
+    assert np.allclose(np.sort_complex(black.to_continuous().poles()),
+                       np.sort_complex(np.linalg.eigvals(A)), rtol=1e-8)  # fmt: skip
+    with pytest.raises(ValueError, match="as many experiments as inputs"):
+        fq.etfe(records[:1])
+    with pytest.raises(ValueError, match="averages for 2 inputs"):
+        fq.h1(records[:1], records[0].n_samples)
+    with pytest.raises(ValueError, match=r"alike|together"):
+        fq.h1([records[0], records[0]])
+
+
+def nonlinear(u, cubic, square):
+    lag = scipy.signal.lfilter([0.1], [1, -0.9], u)
+    return lag + cubic * lag**3 + square * lag**2
+
+
+def test_distortion_is_told_from_noise():
+    period, dt = 1.0, 1e-3
+    rng = np.random.default_rng(6)
+    runs = []
+    for s in range(20):
+        u = fq.multisine((1, 100), period, dt, 6, "random", seed=s)
+        y = nonlinear(u, 0.5, 0) + 1e-3 * rng.standard_normal(len(u))
+        runs.append(fq.Record(u, y, dt))
+    robust = fq.distortion(runs, period, skip=1)
+    assert robust.method == "robust"
+    # noise of 1e-3 in five periods of a thousand samples
+    noise = 1e-3 * np.sqrt(2 / 1000 / 5)
+    assert robust.table["noise"].median() == pytest.approx(noise, rel=0.15)
+    assert robust.table["distortion"].median() > 10 * noise
+    linear = [fq.Record(r.u, nonlinear(r.u, 0, 0) + 1e-3 * rng.standard_normal(len(r.u)), dt)
+              for r in runs]  # fmt: skip
+    clean = fq.distortion(linear, period, skip=1)
+    assert clean.table["distortion"].median() < noise
+    f = clean.response.frequency
+    z = np.exp(2j * np.pi * f * dt)
+    error = np.abs(clean.response.response[0, 0] - 0.1 / (1 - 0.9 / z))
+    assert (error < 4 * np.sqrt(clean.response.variance[0, 0])).mean() > 0.95
+
+
+def test_the_fast_method_names_even_and_odd():
+    dt, n = 1e-3, 2000
+    odd = np.array([k for k in range(1, 200, 2) if k % 8 != 5])
+    rng = np.random.default_rng(7)
+    X = np.zeros(n // 2 + 1, complex)
+    X[odd] = np.exp(2j * np.pi * rng.uniform(size=len(odd)))
+    u = np.tile(np.fft.irfft(X) * n / np.sqrt(2 * len(odd)), 6)
+    for cubic, square, loud in ((0.3, 0, "odd"), (0, 0.3, "even")):
+        y = nonlinear(u, cubic, square) + 1e-4 * rng.standard_normal(len(u))
+        found = fq.distortion(fq.Record(u, y, dt), n * dt, skip=1)
+        assert found.method == "fast"
+        by = found.table.groupby("line")["distortion"].median()
+        other = "even" if loud == "odd" else "odd"
+        assert by[loud] > 20 * by[other]
+    with pytest.raises(ValueError, match="no line left out"):
+        fq.distortion(fq.Record(fq.multisine((1, 9), 1, dt, 3), y[:3000], dt), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "match"),
+    [
+        (lambda r: fq.h1(r, 10**6), "longer than the shortest"),
+        (lambda r: fq.h1([r, r.decimate(2)]), "must agree"),
+        (lambda r: fq.h1(r, 100, reference=True), "has none"),
+        (lambda r: fq.h1(r, 100, reference=np.ones(9)), "shape"),
+        (lambda r: fq.h1(r, 100, reference=np.ones(2000)), "constant"),
+        (lambda r: fq.h1(r, 100, reference=fq.white_noise(2000, seed=9)), "no more than chance"),
+        (lambda r: fq.h1(fq.Record(np.ones(2000), r.y, r.dt), 100), "constant"),
+        (lambda r: fq.h1(r, 100, band=(0.001, 0.01)), "holds no frequency"),
+        (lambda r: fq.h1([]), "at least one"),
+        (lambda r: fq.local_polynomial(r, width=4), "odd"),
+        (lambda r: fq.local_polynomial(r, width=5), "unknowns"),
+        (lambda r: fq.local_polynomial([r, r.slice(0, 1)]), "equal"),
+        (lambda r: fq.local_polynomial(r.slice(0, 0.01)), "window"),
+        (lambda r: fq.etfe([r, r.slice(0, 1)]), "one length"),
+    ],
+)
+def test_bad_input(call, match):
+    record = fq.simulate(fq.first_order(), fq.white_noise(2000), 1e-3).with_noise(0.01, seed=1)
+    with pytest.raises(ValueError, match=match):
+        call(record)
