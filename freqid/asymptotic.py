@@ -250,14 +250,12 @@ def _grey(
     def responses(f: FloatArray) -> Array:
         return np.concatenate([r(f) for r in known])
 
-    def solve(
-        expected: Expected, begin: GreyBox, n: int | None
-    ) -> tuple[Estimate, Objective, GreyStructure]:
+    def solve(expected: Expected, begin: GreyBox, n: int | None) -> Estimate:
         data = expected.as_response(sampling, model)
         return fit_grey_box(begin, [data], [expected.weight], Options(assumed), n, seed, estimated)
 
     expected = conditions.expected(at, responses)
-    first, objective, structure = solve(expected, started(model, start), count)
+    first = solve(expected, started(model, start), count)
     est = first
     for _ in range(_ROUNDS):
         found = est.values[:count_physical] / plain.scale
@@ -266,8 +264,10 @@ def _grey(
         if len(finer.panels) == len(expected.panels):
             break
         expected = finer
-        est, objective, structure = solve(expected, est.model, 1)
-    values = settled(objective, est.values / structure.scale) * structure.scale
+        est = solve(expected, est.model, 1)
+    objective: Objective = est.problem.objective
+    structure: Any = objective.structure
+    values = settled(objective, est.problem.x) * structure.scale
     est = dataclasses.replace(
         est,
         values=values,

@@ -152,7 +152,7 @@ def _lifted_inputs(
 def _in_turn(blocks: Array) -> Array:
     """Blocks (M, …, n, m) side by side, (…, n, M m)."""
     moved = np.moveaxis(blocks, 0, -2)
-    return moved.reshape(*moved.shape[:-2], -1)
+    return moved.reshape(*moved.shape[:-2], moved.shape[-2] * moved.shape[-1])
 
 
 def _widened(M: Array, lift: int) -> Array:

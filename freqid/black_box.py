@@ -14,7 +14,7 @@ from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import FirstOrderHold, PeriodicHold
-from freqid.optimise import Objective, Solution, minimise, noise_variance, outcome, polish
+from freqid.optimise import Objective, Problem, Solution, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
 from freqid.refinement import first_model
@@ -185,5 +185,6 @@ def coefficient_estimate(
         hold=hold,
         dt=dt,
         warnings=[] if solution.converged else [f"not converged: {solution.message}"],
+        problem=Problem(objective, solution.x),
         **outcome(objective, solution),
     )

@@ -11,7 +11,7 @@ import scipy.stats
 
 from freqid.checks import Array, FloatArray
 from freqid.models import GreyBox
-from freqid.optimise import Objective, minimise, noise_variance
+from freqid.optimise import Objective, Problem, minimise, noise_variance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,9 +47,9 @@ def modes(est: Estimate) -> pd.DataFrame:
     """
     import pandas as pd
 
-    poles, change = _poles(est)
+    poles, change, scatter = _poles(est)
     rows = []
-    covariance = np.where(np.isfinite(est.covariance_matrix), est.covariance_matrix, np.nan)
+    covariance = np.where(np.isfinite(scatter), scatter, np.nan)
     order = np.argsort(np.abs(poles))
     for k in order:
         pole, d = poles[k], change[k]
@@ -71,30 +71,43 @@ def modes(est: Estimate) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _poles(est: Estimate) -> tuple[Array, Array]:
-    """Continuous-time poles (n,) and their derivatives by the parameters (n, P)."""
+def _poles(est: Estimate) -> tuple[Array, Array, FloatArray]:
+    """Continuous-time poles (n,), their derivatives by some unknowns, and those' covariance.
+
+    For a black box the unknowns are those of its chart: through the coefficients of a polynomial
+    of poles that lie close together nothing would be left of the digits.
+    """
     model = est.model
     if isinstance(model, GreyBox):
         names = [n for n in est.names if n in model.values]
         at, d = model.linearise(model.values, names)
-        poles, V = np.linalg.eig(at.A)
-        W = np.linalg.inv(V)
-        change = np.einsum("ki,pij,jk->kp", W, d.A, V)
+        poles, change = _moved(at.A, d.A)
         missing = len(est.names) - len(names)
-        return poles, np.pad(change, ((0, 0), (0, missing)))
-    a = [1.0, *(est[n] for n in est.names if n[0] == "a" and n[1:].isdigit())]
-    roots = np.roots(a)
-    slope = np.polyval(np.polyder(np.array(a)), roots)
-    n = len(roots)
-    change = np.zeros((n, len(est.names)), complex)
-    for i, name in enumerate(est.names):
-        if name[0] == "a" and name[1:].isdigit():
-            change[:, i] = -(roots ** (n - int(name[1:]))) / slope
-    dt = getattr(model, "dt", 0.0)
-    if dt:
-        # λ = ln z / dt
-        return np.log(roots.astype(complex)) / dt, change / (roots[:, None] * dt)
-    return roots, change
+        return poles, np.pad(change, ((0, 0), (0, missing))), est.covariance_matrix
+    if not isinstance(est.problem, Problem):
+        raise ValueError("the modes of a black box need an estimate from data")
+    objective, x = est.problem.objective, est.problem.x
+    point = objective.point(x)
+    assert point is not None
+    half = np.linalg.pinv(point.jacobian)
+    covariance = noise_variance(objective, point, len(x)) * half @ half.T
+    structure: Any = objective.structure
+    at, d = structure.realise(x).linearisation
+    poles, change = _moved(at.A, d.A)
+    plane = getattr(structure, "plane", None)
+    if plane is None:
+        return poles, change, covariance
+    # z = (w + a)/(1 + a w), λ = ln z / dt
+    z = (poles + plane.a) / (1 + plane.a * poles)
+    slope = (1 - plane.a**2) / (1 + plane.a * poles) ** 2 / z / model.dt
+    return np.log(z.astype(complex)) / model.dt, change * slope[:, None], covariance
+
+
+def _moved(A: FloatArray, dA: FloatArray) -> tuple[Array, Array]:
+    """Eigenvalues (n,) and their derivatives (n, P)."""
+    poles, V = np.linalg.eig(A)
+    change: Array = np.einsum("ki,pij,jk->kp", np.linalg.inv(V), dA, V)
+    return poles.astype(complex), change
 
 
 def profile_intervals(est: Estimate, level: float = 0.95) -> pd.DataFrame:
@@ -110,11 +123,10 @@ def profile_intervals(est: Estimate, level: float = 0.95) -> pd.DataFrame:
     """
     import pandas as pd
 
-    objective = est.problem
-    if not isinstance(objective, Objective):
+    if not isinstance(est.problem, Problem) or not isinstance(est.model, GreyBox):
         raise ValueError("profile intervals need a grey-box estimate from data")
+    objective, x = est.problem.objective, est.problem.x
     structure: Any = objective.structure
-    x = est.values / structure.scale
     least = objective.point(x)
     if least is None:
         raise ValueError("the cost cannot be computed at the estimate")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from freqid.noise_spectrum import noise_weights
 from freqid.preparation import Options
 from freqid.rational import OutputError
 from freqid.record import Record
-from freqid.residuals import line_errors
+from freqid.residuals import experiment_length, line_errors
 from freqid.transfer_fit import fit_transfer_function
 from freqid.transfer_functions import TransferFunction
 
@@ -92,74 +92,68 @@ def fit(
     all_weights = list(weights) if each else [weights] * len(sets)
     if len(all_weights) != len(sets):
         raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
+    integrates = isinstance(model, GreyBox) and _integrates(model)
+    estimated = isinstance(hold, str) and hold == "estimate"
+    options = Options("zoh" if estimated else hold, band, initial_state, domain, integrates)
+    if isinstance(model, (OutputError, TransferFunction)):
+        if start is not None:
+            raise ValueError("start has no meaning for a black box, which needs none; leave it out")
+        if estimated:
+            raise ValueError("hold='estimate' needs a GreyBox; a black box can imitate any delay")
+    elif isinstance(model, GreyBox):
+        model = started(model, start)
+    else:
+        raise ValueError(
+            f"model={type(model).__name__} is not a model; expected a GreyBox, OutputError or "
+            "TransferFunction"
+        )
+
+    def work(at: Any, some_weights: Sequence[Any], n: int | None) -> Estimate:
+        if isinstance(at, OutputError):
+            return fit_black_box(at, sets, some_weights, options)
+        if isinstance(at, TransferFunction):
+            return fit_transfer_function(at, sets, some_weights, options)
+        return fit_grey_box(at, sets, some_weights, options, n, seed, estimated)
+
     unknown_noise = [
         isinstance(w, str) and w == "noise" and isinstance(d, Record)
         for w, d in zip(all_weights, sets, strict=True)
     ]
     if any(unknown_noise):
-        rest = {"hold": hold, "band": band, "initial_state": initial_state, "domain": domain}
-        return _noise_weighted(
-            model, sets, all_weights, unknown_noise, {"start": start, "n_starts": n_starts}, rest
-        )
-    integrates = isinstance(model, GreyBox) and _integrates(model)
-    options = Options(
-        "zoh" if hold == "estimate" else hold, band, initial_state, domain, integrates
-    )
-    if isinstance(model, (OutputError, TransferFunction)):
-        if start is not None:
-            raise ValueError("start has no meaning for a black box, which needs none; leave it out")
-        if hold == "estimate":
-            raise ValueError("hold='estimate' needs a GreyBox; a black box can imitate any delay")
-        if isinstance(model, OutputError):
-            return fit_black_box(model, sets, all_weights, options)
-        return fit_transfer_function(model, sets, all_weights, options)
-    if not isinstance(model, GreyBox):
-        raise ValueError(
-            f"model={type(model).__name__} is not a model; expected a GreyBox, OutputError or "
-            "TransferFunction"
-        )
-    estimated = isinstance(hold, str) and hold == "estimate"
-    est, objective, structure = fit_grey_box(
-        started(model, start), sets, all_weights, options, count, seed, estimated
-    )
-    if hold is None or estimated:
-        return est
-    return rejected_hold(est, structure, objective)
+        est = _noise_weighted(work, model, sets, all_weights, unknown_noise, options, count)
+    else:
+        est = work(model, all_weights, count)
+    return est if hold is None or estimated else rejected_hold(est)
 
 
 def _noise_weighted(
+    work: Callable[[Any, Sequence[Any], int | None], Estimate],
     model: Any,
     sets: Sequence[Any],
     weights: Sequence[Any],
     unknown_noise: Sequence[bool],
-    search: dict[str, Any],
-    options: dict[str, Any],
+    options: Options,
+    count: int | None,
 ) -> Estimate:
     """Fits in turn with the noise that the one before left; to the maximum of the likelihood."""
-    if options["domain"] == "time":
-        raise ValueError("weights='noise' needs domain='frequency'")
-    known = [None if u else w for u, w in zip(unknown_noise, weights, strict=True)]
-    est = fit(model, sets, weights=known, **search, **options)
+    if options.domain == "time" or options.initial_state == "zero":
+        raise ValueError("weights='noise' needs domain='frequency' and no initial state at rest")
+    used = [None if u else w for u, w in zip(unknown_noise, weights, strict=True)]
+    first = est = work(model, used, count)
     for _ in range(_NOISE_ROUNDS):
-        used = [
-            noise_weights(
-                line_errors(est, d, est.hold if options["hold"] else None, options["band"],
-                            options["initial_state"]).error
-            )
-            if u
-            else w
-            for u, w, d in zip(unknown_noise, known, sets, strict=True)
-        ]  # fmt: skip
-        if isinstance(model, GreyBox):
-            near = est.model.values
-            search = {"start": {p.name: near[p.name] for p in model.free_parameters}, "n_starts": 1}
+        hold = None if options.hold is None else est.hold
+        for i, data in enumerate(sets):
+            if unknown_noise[i]:
+                left = line_errors(est, data, hold, options.band, options.initial_state, used[i])
+                used[i] = noise_weights(left.error, experiment_length(data))
         before = est
-        est = fit(model, sets, weights=used, **search, **options)
+        est = work(est.model if isinstance(model, GreyBox) else model, used, 1)
         std = np.sqrt(np.diag(est.covariance_matrix))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
-    nominal = before.nominal if isinstance(model, GreyBox) else est.nominal
-    return dataclasses.replace(est, nominal=nominal)
+    return dataclasses.replace(
+        est, nominal=first.nominal, n_starts=first.n_starts, n_agreed=first.n_agreed
+    )
 
 
 def _integrates(model: GreyBox) -> bool:

@@ -16,7 +16,7 @@ from freqid.hold_tests import decimation_warning
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
 from freqid.noise_spectrum import score_covariance
-from freqid.optimise import Objective, minimise, noise_variance, outcome, polish
+from freqid.optimise import Objective, Problem, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.priors import Prior
 from freqid.starts import Found, log_targets, noise_floor, search
@@ -35,8 +35,8 @@ def fit_grey_box(
     n_starts: int | None,
     seed: int,
     estimated_hold: bool = False,
-) -> tuple[Estimate, Objective, GreyStructure]:
-    """The work of ``fit`` for a GreyBox; the cost and its unknowns are returned for tests of it."""
+) -> Estimate:
+    """The work of ``fit`` for a GreyBox; ``est.problem`` is the cost that was minimised."""
     dt = _common_dt(sets, options.domain, options.initial_state) if estimated_hold else None
     structure = GreyStructure(model, dt)
     if not structure.physical_names:
@@ -48,8 +48,7 @@ def fit_grey_box(
     objective = Objective(structure, experiments)
     found = _search(structure, objective, sets, weights, options, shape, n_starts, seed)
     found, objective = _with_prior(structure, objective, found, weights)
-    est = _estimate(structure, objective, found, pairs[0][1], sets[0].dt)
-    return est, objective, structure
+    return _estimate(structure, objective, found, pairs[0][1], sets[0].dt)
 
 
 def _search(
@@ -176,7 +175,7 @@ def _estimate(
         nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),
         units=[*(p.unit for p in structure.parameters), "s"][: len(values)],
         covariance_matrix=covariance,
-        problem=objective,
+        problem=Problem(objective, solution.x),
         hold=hold,
         dt=dt,
         n_starts=found.n_starts,

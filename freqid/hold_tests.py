@@ -10,7 +10,8 @@ from freqid.checks import FloatArray
 from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.holds import PeriodicHold
-from freqid.optimise import Objective, Solution, minimise
+from freqid.models import GreyBox
+from freqid.optimise import Objective, Problem, Solution, minimise
 from freqid.structures import GreyStructure
 
 # 0.1 % point of chi-square with one degree of freedom
@@ -27,14 +28,16 @@ def decimation_warning(period: float, std: float, dt: float) -> list[str]:
     ]
 
 
-def rejected_hold(est: Estimate, structure: GreyStructure, objective: Objective) -> Estimate:
+def rejected_hold(est: Estimate) -> Estimate:
     """The estimate, with a warning where freeing the hold explains the data much better.
 
     Likelihood ratio: n ln(V/V_free) is chi-square with one degree of freedom when the assumed
     zero-order hold is right (Wilks). For another assumed hold, which is not a special case of the
     free one, the same statistic compares the two as models of equal cost.
     """
-    experiments = objective.experiments
+    if not isinstance(est.problem, Problem) or not isinstance(est.model, GreyBox):
+        return est
+    experiments = est.problem.objective.experiments
     testable = all(
         isinstance(e, SpectralExperiment) and e.aliases == 1 and e.lift == 1 for e in experiments
     )

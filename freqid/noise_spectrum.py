@@ -24,15 +24,15 @@ def smoothed_power(error: Any) -> FloatArray:
     return smooth
 
 
-def noise_weights(error: Any) -> FloatArray:
+def noise_weights(error: Any, n_samples: int) -> FloatArray:
     """1/variance at each line from the errors (outputs, K) that a fit left there.
 
-    Scaled so that each output's mean is one in its geometric sense would lose its units: they stay
-    those of 1/|Y|².
+    In a record's cost, Σ 2|E|²/N, every real value then adds a half, as it does to a response's
+    under weights of 1/variance.
     """
     variance = smoothed_power(error)
     floor = 1e-12 * variance.max(initial=0)
-    return 1 / np.maximum(variance, max(float(floor), 1e-300))
+    return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
 
 
 def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:

@@ -260,6 +260,14 @@ class Solution:
     message: str
 
 
+@dataclass(frozen=True)
+class Problem:
+    """A cost and where it is least, in the structure's own unknowns."""
+
+    objective: Objective
+    x: FloatArray
+
+
 def noise_variance(objective: Objective, point: Point, n_parameters: int) -> float:
     """Variance of the weighted residual: the cost over its degrees of freedom."""
     rows = sum(e.n_rows for e in objective.experiments)

@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 
 # a run of equal values, as a part of the record, that is called stuck
 _STUCK = 0.05
-# samples at an extreme value, at the least, and as a part of the record, that are an overload
-_AT_LIMIT = (5, 2e-3)
+# samples in a row at an extreme value that are an overload, where the last step to it was so many
+# quantisation steps
+_PLATEAU = 3
+_FAST = 3
 # values that a channel takes at the most to be called quantised
 _FEW = 0.2
 
@@ -67,29 +69,25 @@ def _findings(x: FloatArray) -> list[dict[str, Any]]:
     runs = np.diff(edges)
     # a record may rest before and after its excitation
     inner = runs[1:-1]
-    limits = {float(x.max()): "largest", float(x.min()): "smallest"}
-    at_limit = False
-    for value, which in limits.items():
-        count = int((x == value).sum())
-        plateau = max((int(r) for r, at in zip(runs, x[edges[:-1]], strict=True) if at == value),
-                      default=0)  # fmt: skip
-        binary = len(np.unique(x)) <= 3
-        if count >= max(_AT_LIMIT[0], _AT_LIMIT[1] * N) and plateau >= 3 and not binary:
-            at_limit = True
-            add("saturated", value, f"{count} samples stand at the {which} value, up to {plateau} "
-                "in a row: the sensor or the drive was overloaded")  # fmt: skip
-    longest = int(inner.max(initial=0))
     values = np.unique(x)
+    q = float(np.diff(values).min())
+    at_limit = False
+    for value, which in ((x.max(), "largest"), (x.min(), "smallest")):
+        plateaus = np.flatnonzero((x[edges[:-1]] == value) & (runs >= _PLATEAU))
+        arrivals = plateaus[plateaus > 0]
+        # a quantised sine lingers at its top too, but does not arrive there at full speed
+        jumps = np.abs(value - x[edges[:-1][arrivals] - 1])
+        if len(values) > 3 and len(jumps) and np.median(jumps) > _FAST * q:
+            at_limit = True
+            add("saturated", value, f"{int((x == value).sum())} samples stand at the {which} value,"
+                f" up to {int(runs[plateaus].max())} in a row: the sensor or the drive was "
+                "overloaded")  # fmt: skip
+    longest = int(inner.max(initial=0))
     if longest > max(_STUCK * N, 20) and not at_limit and len(values) > 3:
         where = int(edges[1:-2][int(inner.argmax())]) if len(inner) else 0
         add("stuck", longest, f"{longest} samples in a row are equal, from sample {where}")
-    steps = np.diff(values)
-    q = float(steps.min()) if len(steps) else 0.0
-    if (
-        3 < len(values) < _FEW * N
-        and q > 0
-        and np.allclose(steps / q, np.round(steps / q), atol=1e-3)
-    ):
+    steps = np.diff(values) / q
+    if 3 < len(values) < _FEW * N and np.allclose(steps, np.round(steps), atol=1e-3):
         add("quantised", q, f"steps of {q:g} make a noise of {q / np.sqrt(12):.3g} rms, "
             f"{100 * q / np.sqrt(12) / x.std():.2g} % of the signal")  # fmt: skip
     if abs(x.mean()) > 3 * x.std():

@@ -35,18 +35,20 @@ def line_errors(
     hold: Hold | str | None = None,
     band: tuple[float, float] | None = None,
     initial_state: str = "estimate",
+    weights: Any = None,
 ) -> LineErrors:
     """Errors of a model or an Estimate on a record at the lines of a band.
 
-    ``hold`` is what the input is taken to do; None is what the record remembers. Raises ValueError
-    for channels that do not match.
+    ``hold`` is what the input is taken to do; None is what the record remembers. ``weights``, as
+    in ``fit``, say which lines tell the initial state. Raises ValueError for channels that do not
+    match.
     """
     model = getattr(model, "model", model)
     discrete, at, delay = matrices_of(model)
     shape = (at.C.shape[0], at.B.shape[1])
     integrates = not discrete and bool(np.abs(np.linalg.eigvals(at.A)).min(initial=1) < 1e-9)
     options = Options(hold, band, initial_state, skip_zero=integrates, delayed=delay > 0)
-    experiment, _ = prepare(record, shape, None, options, Plane() if discrete else None)
+    experiment, _ = prepare(record, shape, weights, options, Plane() if discrete else None)
     if not isinstance(experiment, SpectralExperiment):
         raise ValueError(f"initial_state={initial_state!r} has no errors at lines; use 'estimate'")
     still = StateSpace(*(np.zeros((0, *M.shape)) for M in at))

@@ -96,14 +96,14 @@ def test_against_time_domain_fits_of_long_noise(plant, noise, factor, hold):
 def test_the_apparent_response_of_long_noise(plant, noise):
     spectrum, record = noise
     slow = record.decimate(20)
-    f, Puy = scipy.signal.csd(slow.u, slow.y, fs=100, nperseg=1000)
-    _, Puu = scipy.signal.welch(slow.u, fs=100, nperseg=1000)
-    _, gamma = scipy.signal.coherence(slow.u, slow.y, fs=100, nperseg=1000)
+    f, Puy = scipy.signal.csd(slow.u, slow.y, fs=100, nperseg=500)
+    _, Puu = scipy.signal.welch(slow.u, fs=100, nperseg=500)
+    _, gamma = scipy.signal.coherence(slow.u, slow.y, fs=100, nperseg=500)
     band = (f > 28) & (f < 48)
     seen = fq.apparent_response(plant, spectrum, 20 * T1, TRUE, frequency=f[band])
     G = (Puy / Puu)[band]
-    assert np.abs(seen.response[0, 0] - G).max() < 0.15 * np.abs(G).max()
-    # forty segments leave each estimate of the coherence a tenth
+    assert np.abs(seen.response[0, 0] - G).mean() < 0.15 * np.abs(G).mean()
+    # eighty segments leave each estimate of the coherence a tenth
     lost = seen.coherence[0, 0] - gamma[band]
     assert np.abs(lost).mean() < 0.1
     assert abs(lost.mean()) < 0.02

@@ -260,7 +260,7 @@ BAD = {
     "start='kk'": {"start": {"kk": 1}},
     "weights has shape": {"weights": np.ones(3)},
     "weights must be finite": {"weights": -np.ones(1001)},
-    "weights='noise' needs": {"weights": "noise"},
+    "weights='noise' needs": {"weights": "noise", "initial_state": "zero"},
     "n_starts=0": {"n_starts": 0},
     "cannot be simulated": {"domain": "time"},
 }

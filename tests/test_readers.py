@@ -1,0 +1,169 @@
+"""Every kind of file gives the same record; what is wrong with samples is named."""
+
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import pyuff
+import scipy.io
+
+import freqid as fq
+
+
+@pytest.fixture
+def record():
+    rng = np.random.default_rng(1)
+    return fq.Record(rng.standard_normal(50), rng.standard_normal(50), 2e-3,
+                     input_names=["motor"], output_names=["angle"])  # fmt: skip
+
+
+def columns(record):
+    return {"time": record.time, "motor": record.u, "angle": record.y}
+
+
+def write_mat(path, data):
+    scipy.io.savemat(path, data)
+
+
+def write_struct(path, data):
+    scipy.io.savemat(path, {"experiment": data})
+
+
+def write_h5(path, data):
+    with h5py.File(path, "w") as file:
+        for name, values in data.items():
+            file[f"run/{name}"] = values
+
+
+def write_mat73(path, data):
+    # MATLAB 7.3: HDF5 behind a header of 512 bytes, row vectors as columns
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in data.items():
+            file[name] = values[:, None]
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+def write_uff(path, data):
+    units = {
+        f"{axis}_{what}": value
+        for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
+        for what, value in {
+            "spec_data_type": 0, "len_unit_exp": 0, "force_unit_exp": 0, "temp_unit_exp": 0,
+            "axis_units_lab": "NONE",
+        }.items()
+    }  # fmt: skip
+    sets = [
+        pyuff.prepare_58(
+            func_type=1, ver_num=0, load_case_id=0, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1,
+            rsp_ent_name="NONE", ref_ent_name="NONE", ord_data_type=4, num_pts=len(data["time"]),
+            data=data[name], x=data["time"], id1=name, id2="NONE", id3="NONE", id4="NONE",
+            id5="NONE", binary=0, abscissa_inc=2e-3, abscissa_spacing=1, abscissa_min=0.0,
+            z_axis_value=0.0, **units,
+        )
+        for name in ("motor", "angle")
+    ]  # fmt: skip
+    pyuff.UFF(str(path)).write_sets(sets, "overwrite")
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("a.csv", lambda p, d: pd.DataFrame(d).to_csv(p, index=False)),
+        ("a.parquet", lambda p, d: pd.DataFrame(d).to_parquet(p)),
+        ("a.npz", lambda p, d: np.savez(p, **d)),
+        ("a.mat", write_mat),
+        ("struct.mat", write_struct),
+        ("new.mat", write_mat73),
+        ("a.h5", write_h5),
+        ("a.uff", write_uff),
+    ],
+)
+def test_every_kind_of_file(record, tmp_path, name, write):
+    write(tmp_path / name, columns(record))
+    back = fq.read(tmp_path / name, inputs="motor", outputs="angle", units={"motor": "N m"})
+    assert np.allclose(back.u, record.u, rtol=1e-6)
+    assert np.allclose(back.y, record.y, rtol=1e-6)
+    assert back.dt == pytest.approx(2e-3)
+    assert back.units == {"motor": "N m"}
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "npz"])
+def test_what_is_written_remembers_its_hold(record, tmp_path, kind):
+    slow = fq.Record(record.u, record.y[::5], 1e-2, input_dt=2e-3, hold=fq.FirstOrderHold(2e-3))
+    fq.write(slow, tmp_path / f"slow.{kind}")
+    back = fq.read(tmp_path / f"slow.{kind}", inputs="u", outputs="y")
+    assert back.hold == slow.hold
+    assert back.factor == 5
+    assert np.array_equal(back.y, slow.y)
+
+
+def test_matrices_become_channels(tmp_path):
+    scipy.io.savemat(tmp_path / "m.mat", {"u": np.ones((9, 2)), "y": np.arange(9.0), "dt": 0.1})
+    back = fq.read(tmp_path / "m.mat", inputs=["u1", "u2"], outputs="y")
+    assert back.n_inputs == 2
+    assert back.dt == pytest.approx(0.1)
+
+
+def test_cut_and_detrended_on_reading(record, tmp_path):
+    fq.write(record, tmp_path / "r.csv")
+    back = fq.read(tmp_path / "r.csv", start=0.02, stop=0.08, detrend=0)
+    assert back.n_samples == 30
+    assert back.y.mean() == pytest.approx(0, abs=1e-12)
+
+
+def test_gaps_jitter_and_blanks_are_errors_unless_resampled(tmp_path):
+    t = 0.01 * np.arange(200)
+    frame = pd.DataFrame({"time": t, "u": np.sin(3 * t), "y": np.cos(3 * t)})
+    jittered = frame.assign(time=t + 1e-4 * np.random.default_rng(0).uniform(-1, 1, 200))
+    cases = {
+        "gap": (frame.drop(index=range(50, 60)), "gaps in time"),
+        "jitter": (jittered, "jitter"),
+        "blank": (frame.assign(y=frame["y"].where(frame.index % 50 != 7)), "4 missing samples"),
+    }
+    for name, (broken, note) in cases.items():
+        path = tmp_path / f"{name}.csv"
+        broken.to_csv(path, index=False)
+        with pytest.raises(ValueError, match=path.name):
+            fq.read(path)
+        record = fq.read(path, resample=True)
+        assert any(note in n for n in record.notes)
+        assert np.abs(record.y - np.cos(3 * record.time)).max() < 5e-3
+        assert note in fq.check_record(record)["meaning"].str.cat()
+    shuffled = frame.iloc[::-1]
+    shuffled.to_csv(tmp_path / "back.csv", index=False)
+    with pytest.raises(ValueError, match="increase"):
+        fq.read(tmp_path / "back.csv", resample=True)
+
+
+def test_pickles_are_not_opened(tmp_path):
+    np.savez(tmp_path / "bad.npz", u=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(ValueError, match="plain arrays"):
+        fq.read(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mat", "npz", "h5", "uff"])
+def test_damaged_files_say_so(tmp_path, suffix):
+    (tmp_path / f"bad.{suffix}").write_bytes(b"this is not what it says it is" * 40)
+    with pytest.raises(ValueError, match="bad"):
+        fq.read(tmp_path / f"bad.{suffix}", inputs="u", outputs="y")
+
+
+def test_check_record_names_bad_channels(rng):
+    t = 1e-3 * np.arange(4000)
+    good = np.sin(30 * t) + 0.1 * rng.standard_normal(4000)
+    stuck = good.copy()
+    stuck[1000:1600] = stuck[1000]
+    record = fq.Record(
+        good, np.stack([np.clip(good, -0.8, 2), stuck, np.round(good, 1), 0 * good, good + 50], 1),
+        1e-3, output_names=["clipped", "stuck", "coarse", "dead", "shifted"],
+        reference=rng.standard_normal(4000),
+    )  # fmt: skip
+    found = fq.check_record(record)
+    pairs = set(zip(found["channel"], found["finding"], strict=True))
+    assert pairs == {
+        ("clipped", "saturated"), ("stuck", "stuck"), ("coarse", "quantised"),
+        ("dead", "constant"), ("shifted", "offset"), ("reference", "unrelated reference"),
+    }  # fmt: skip
+    assert found.set_index("channel").loc["coarse", "value"] == pytest.approx(0.1)
+    assert len(fq.check_record(fq.Record(good, good, 1e-3))) == 0

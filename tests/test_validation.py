@@ -1,0 +1,208 @@
+"""Noise weights, error bars and validation against simulation and closed forms."""
+
+import numpy as np
+import pytest
+import scipy.signal
+import scipy.stats
+
+import freqid as fq
+
+BAND = (10, 80)
+
+
+def coloured(n, seed):
+    """Noise that is strongest below 10 Hz at a rate of 400 Hz."""
+    e = np.random.default_rng(seed).standard_normal(n + 500)
+    return scipy.signal.lfilter([0.3], [1, -0.95], e)[500:]
+
+
+def with_coloured(record, seed, size=0.5):
+    y = record.y + size * coloured(record.n_samples, seed)
+    return fq.Record(record.u, y, record.dt, hold=record.hold, input_dt=record.input_dt)
+
+
+@pytest.fixture(scope="module")
+def short(fast):
+    return fast.decimate(5)
+
+
+@pytest.mark.parametrize("kind", ["white", "coloured", "coloured, weighted"])
+def test_intervals_hold_and_the_scatter_is_what_they_say(plant, short, kind):
+    true = np.array([plant[p.name] for p in plant.free_parameters])
+    inside, values, std = [], [], []
+    for s in range(120):
+        noisy = short.with_noise(0.5, seed=s) if kind == "white" else with_coloured(short, s)
+        est = fq.fit(
+            plant, noisy, band=BAND, n_starts=1, weights="noise" if "weighted" in kind else None
+        )
+        table = est.parameters
+        inside.append((table["lower"] <= true) & (true <= table["upper"]))
+        values.append(est.values)
+        std.append(table["std"])
+    # 600 intervals: 95 % within three standard errors of a share
+    assert abs(np.mean(inside) - 0.95) < 0.03
+    assert np.allclose(np.mean(std, axis=0), np.std(values, axis=0), rtol=0.2)
+
+
+def test_noise_weights_beat_ones_in_coloured_noise(plant, short):
+    errors = {w: [] for w in (None, "noise")}
+    for s in range(40):
+        noisy = with_coloured(short, s, size=2)
+        for w in errors:
+            est = fq.fit(plant, noisy, band=BAND, n_starts=1, weights=w)
+            errors[w].append(est.values / [plant[n] for n in est.names] - 1)
+    plain, weighted = (np.std(errors[w], axis=0) for w in (None, "noise"))
+    assert (weighted < 1.02 * plain).all()
+    assert (weighted < 0.9 * plain).any()
+
+
+def test_noise_weights_of_several_channels_and_of_black_boxes(rng):
+    import control
+
+    system = control.ss([[-5.0, 20], [-20, -5]], [[1.0], [10]], np.eye(2), 0)
+    record = fq.simulate(system, rng.standard_normal(4000), 0.01, output_names=["a", "b"])
+    noise = rng.standard_normal((4000, 2)) * np.array([1e-3, 0.5])
+    noisy = fq.Record(record.u, record.outputs + noise, 0.01, output_names=["a", "b"])
+    est = fq.fit(fq.OutputError(2), noisy, weights="noise")
+    poles = np.sort_complex(est.to_continuous().poles())
+    assert np.allclose(poles, [-5 - 20j, -5 + 20j], rtol=2e-3)
+    # each real value has a variance of about one after weighting
+    assert est.cost / est.n_rows == pytest.approx(0.5, rel=0.1)
+
+
+def test_profile_intervals_are_the_linear_ones_in_little_noise(plant, short):
+    est = fq.fit(plant, short.with_noise(0.05, seed=1), band=BAND)
+    linear, profile = est.intervals(), est.intervals("profile")
+    assert np.allclose(linear, profile, rtol=1e-3)
+    assert (profile["lower"] < est.values).all()
+    with pytest.raises(ValueError, match="level"):
+        est.intervals(level=2)
+
+
+def test_profile_intervals_follow_a_curved_cost():
+    """b/(s + a) with a far above the band: only b/a is well known, and a from one side."""
+    record = fq.simulate(fq.first_order(2000, 2000), fq.chirp(1, 40, 5, 1e-3), 1e-3)
+    est = fq.fit(fq.first_order(2000, 2000), record.with_noise(0.05, seed=4), band=(1, 40))
+    profile = est.intervals("profile")
+    above, below = profile["upper"] - est.values, est.values - profile["lower"]
+    assert (above > 1.1 * below).all()
+
+
+def test_functions_of_parameters_and_modes(plant, short):
+    """Resonance and damping over 60 runs scatter as their standard errors say."""
+    rows = []
+    for s in range(60):
+        est = fq.fit(plant, short.with_noise(0.5, seed=s), band=BAND, n_starts=1)
+        ratio, std = est.derived(lambda m: m["k"] / m["Ja"])
+        mode = est.modes().query("damping < 0.9").iloc[0]
+        rows.append([ratio, std, *mode])
+    values, stds = np.array(rows)[:, ::2], np.array(rows)[:, 1::2]
+    assert np.allclose(np.std(values, axis=0), stds.mean(axis=0), rtol=0.3)
+    poles = plant.to_control().poles()
+    pole = poles[np.argmax(poles.imag)]
+    assert values[:, 1].mean() == pytest.approx(abs(pole) / 2 / np.pi, rel=1e-3)
+    assert values[:, 2].mean() == pytest.approx(-pole.real / abs(pole), rel=0.02)
+
+
+def test_modes_of_black_boxes(plant, fast):
+    record = fast.with_noise(0.05, seed=2)
+    grey = fq.fit(plant, record, band=BAND).modes().query("damping < 0.9").iloc[0]
+    for spec in (fq.OutputError(3), fq.TransferFunction(2, 3)):
+        black = fq.fit(spec, record, band=BAND).modes().query("damping < 0.9").iloc[0]
+        assert black["frequency"] == pytest.approx(grey["frequency"], rel=1e-4)
+        assert black["frequency_std"] == pytest.approx(grey["frequency_std"], rel=0.5)
+        assert black["damping_std"] == pytest.approx(grey["damping_std"], rel=0.5)
+
+
+def test_compare_is_the_simulation(plant, fast):
+    noisy = fast.with_noise(0.5, seed=3)
+    est = fq.fit(plant, noisy, band=BAND)
+    c = fq.compare(est, noisy)
+    by_hand = fq.simulate(est, noisy.u, noisy.dt).y
+    assert np.abs(c.simulated - by_hand).max() < 0.1 * np.abs(by_hand).max()
+    expected = 100 * (1 - np.linalg.norm(c.residuals) / np.linalg.norm(noisy.y - noisy.y.mean()))
+    assert c.fit_percent[0] == pytest.approx(expected)
+    assert np.std(c.residuals) == pytest.approx(0.5, rel=0.02)
+    assert np.allclose(c.simulated + c.residuals, noisy.y)
+    perfect = fq.compare(plant, fast.decimate(10, keep_input=True))
+    assert perfect.fit_percent[0] > 99.9999
+    axes = c.plot()
+    assert len(axes) == 2
+    assert "%" in axes[0].get_legend().get_texts()[1].get_text()
+
+
+def test_compare_uses_the_records_own_hold(plant, slow):
+    """The biased model is judged as the robot would judge it, not as it was fitted."""
+    wrong = fq.fit(plant, slow, hold="zoh", band=BAND)
+    right = fq.fit(plant, slow, band=BAND)
+    assert fq.compare(right, slow).fit_percent[0] > 95
+    assert fq.compare(wrong, slow).fit_percent[0] < 70
+
+
+def test_residual_tests_pass_for_the_truth_and_fail_for_less(plant, short):
+    passed = []
+    for s in range(40):
+        table = fq.residual_test(plant, short.with_noise(0.5, seed=s))
+        passed.append(table["passed"])
+    assert np.mean(passed) > 0.95
+    rigid = fq.fit(fq.TransferFunction(0, 1), short.with_noise(0.5, seed=1), band=BAND)
+    table = fq.residual_test(rigid, short.with_noise(0.5, seed=1))
+    assert not table["passed"].any()
+    axes = fq.plot_residuals(table)
+    assert len(axes) == 2
+    assert table["p_value"].max() < 1e-6
+    white = fq.residual_test(plant, short.with_noise(0.5, seed=2))
+    known = scipy.stats.chi2.sf(white["statistic"][0], 25)
+    assert white["p_value"][0] == pytest.approx(known)
+
+
+def test_coloured_noise_is_not_white_but_still_independent(plant, short):
+    independent = []
+    for s in range(30):
+        table = fq.residual_test(plant, with_coloured(short, s)).set_index("test")
+        assert not table.loc["whiteness", "passed"]
+        independent.append(table.loc["independence", "passed"])
+    assert np.mean(independent) > 0.9
+
+
+def test_the_cost_is_what_the_noise_explains(plant, short):
+    frf = fq.etfe([short.with_noise(0.5, seed=s) for s in range(2)], band=BAND)
+    variance = np.full(frf.response.shape, 0.5**2 * short.n_samples / frf.input_spectrum / 2)
+    known = fq.FrequencyResponse(frf.frequency, frf.response, dt=frf.dt, hold=frf.hold,
+                                 variance=variance)  # fmt: skip
+    rich = fq.cost_test(fq.fit(plant, known, weights="noise"))
+    poor = fq.cost_test(fq.fit(fq.TransferFunction(0, 1), known, weights="noise"))
+    assert rich["ratio"] < 2
+    assert poor["ratio"] > 100 * rich["ratio"]
+    assert poor["p_value"] < 1e-9
+
+
+def test_cross_validation_and_bootstrap(plant, short):
+    runs = [short.with_noise(0.5, seed=s) for s in range(8)]
+    table = fq.cross_validate(plant, runs[:3], band=BAND)
+    assert table["held_out"].tolist() == [0, 1, 2]
+    assert (table["fit velocity"] > 90).all() if "fit velocity" in table else True
+    draws = fq.bootstrap(plant, runs, n=60, seed=1, band=BAND)
+    std = fq.fit(plant, runs, band=BAND).parameters["std"]
+    assert np.allclose(draws.std(), std, rtol=0.6)
+    with pytest.raises(ValueError, match="three or more"):
+        fq.bootstrap(plant, runs[:2])
+    with pytest.raises(ValueError, match="two or more"):
+        fq.cross_validate(plant, runs[:1])
+
+
+def test_the_bias_bar(plant, slow):
+    noisy = slow.with_noise(0.05, seed=5)
+    wrong = fq.fit(plant, noisy, hold="foh", band=BAND)
+    bar = fq.hold_bias(wrong, noisy, band=BAND)
+    expected = fq.asymptotic_fit(
+        plant, fq.ChirpSpectrum(*BAND), 5e-3, "foh", fq.ZeroOrderHold(0.5e-3)
+    )
+    for name in ("Jm", "k", "Ja"):
+        assert bar.loc[name, "bias"] == pytest.approx(expected[name] - plant[name], rel=0.1)
+        assert abs(bar.loc[name, "bias"]) > 3 * bar.loc[name, "std"]
+
+
+def test_short_records_are_named(plant, short):
+    with pytest.raises(ValueError, match="25 lags need 100"):
+        fq.residual_test(plant, short.slice(0, 0.1))
