@@ -30,7 +30,7 @@ from freqid.checks import Array, ComplexArray, FloatArray, band, positive, whole
 from freqid.estimate import Estimate
 from freqid.experiments import sampled_response
 from freqid.frequency_response import FrequencyResponse
-from freqid.grey_fit import fit_grey_box, started
+from freqid.grey_fit import fit_grey_box
 from freqid.holds import Hold, as_hold
 from freqid.input_spectra import InputSpectrum
 from freqid.models import GreyBox
@@ -250,12 +250,12 @@ def _grey(
     def responses(f: FloatArray) -> Array:
         return np.concatenate([r(f) for r in known])
 
-    def solve(expected: Expected, begin: GreyBox, n: int | None) -> Estimate:
-        data = expected.as_response(sampling, model)
-        return fit_grey_box(begin, [data], [expected.weight], Options(assumed), n, seed, estimated)
+    def solve(expected: Expected, begin: Mapping[str, float] | None, n: int | None) -> Estimate:
+        data, options = expected.as_response(sampling, model), Options(assumed)
+        return fit_grey_box(model, [data], [expected.weight], options, n, seed, estimated, begin)
 
     expected = conditions.expected(at, responses)
-    first = solve(expected, started(model, start), count)
+    first = solve(expected, start, count)
     est = first
     for _ in range(_ROUNDS):
         found = est.values[:count_physical] / plain.scale
@@ -264,7 +264,7 @@ def _grey(
         if len(finer.panels) == len(expected.panels):
             break
         expected = finer
-        est = solve(expected, est.model, 1)
+        est = solve(expected, {n: est[n] for n in plain.physical_names}, 1)
     objective: Objective = est.problem.objective
     structure: Any = objective.structure
     values = settled(objective, est.problem.x) * structure.scale

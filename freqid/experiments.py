@@ -13,7 +13,7 @@ Inverse Problems 19, 2003).
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -39,6 +39,8 @@ class Realisation:
     # s; and where it is estimated, the size of its unknown, which then is the last parameter
     delay: float = 0.0
     delay_scale: float | None = None
+    # the plant through each hold, which the experiments share
+    seen: dict[tuple[Hold, int], SampledPlant] = field(default_factory=dict, compare=False)
 
     @classmethod
     def of(
@@ -84,7 +86,10 @@ class Realisation:
     ) -> tuple[SampledPlant, ComplexArray, ComplexArray | None]:
         """The sampled plant, z at ``omega`` and the derivative of z by an estimated period."""
         if self.period is None:
-            return self.basis.through(hold, lift), z, None
+            key = hold, lift
+            if key not in self.seen:
+                self.seen[key] = self.basis.through(hold, lift)
+            return self.seen[key], z, None
         hold = ZeroOrderHold(self.period)
         z = points(omega, hold)
         plant = self.basis.by_period(self.basis.through(hold))

@@ -12,7 +12,7 @@ from freqid.black_box import fit_black_box
 from freqid.checks import choice, whole
 from freqid.estimate import Estimate
 from freqid.frequency_response import FrequencyResponse
-from freqid.grey_fit import fit_grey_box, started
+from freqid.grey_fit import fit_grey_box
 from freqid.hold_tests import rejected_hold
 from freqid.holds import Hold
 from freqid.models import GreyBox
@@ -100,46 +100,46 @@ def fit(
             raise ValueError("start has no meaning for a black box, which needs none; leave it out")
         if estimated:
             raise ValueError("hold='estimate' needs a GreyBox; a black box can imitate any delay")
-    elif isinstance(model, GreyBox):
-        model = started(model, start)
-    else:
+    elif not isinstance(model, GreyBox):
         raise ValueError(
             f"model={type(model).__name__} is not a model; expected a GreyBox, OutputError or "
             "TransferFunction"
         )
 
-    def work(at: Any, some_weights: Sequence[Any], n: int | None) -> Estimate:
-        if isinstance(at, OutputError):
-            return fit_black_box(at, sets, some_weights, options)
-        if isinstance(at, TransferFunction):
-            return fit_transfer_function(at, sets, some_weights, options)
-        return fit_grey_box(at, sets, some_weights, options, n, seed, estimated)
+    def work(
+        some_weights: Sequence[Any], n: int | None, begin: Mapping[str, float] | None
+    ) -> Estimate:
+        if isinstance(model, OutputError):
+            return fit_black_box(model, sets, some_weights, options)
+        if isinstance(model, TransferFunction):
+            return fit_transfer_function(model, sets, some_weights, options)
+        return fit_grey_box(model, sets, some_weights, options, n, seed, estimated, begin)
 
     unknown_noise = [
         isinstance(w, str) and w == "noise" and isinstance(d, Record)
         for w, d in zip(all_weights, sets, strict=True)
     ]
     if any(unknown_noise):
-        est = _noise_weighted(work, model, sets, all_weights, unknown_noise, options, count)
+        est = _noise_weighted(work, sets, all_weights, unknown_noise, options, count, start)
     else:
-        est = work(model, all_weights, count)
+        est = work(all_weights, count, start)
     return est if hold is None or estimated else rejected_hold(est)
 
 
 def _noise_weighted(
-    work: Callable[[Any, Sequence[Any], int | None], Estimate],
-    model: Any,
+    work: Callable[[Sequence[Any], int | None, Mapping[str, float] | None], Estimate],
     sets: Sequence[Any],
     weights: Sequence[Any],
     unknown_noise: Sequence[bool],
     options: Options,
     count: int | None,
+    start: Mapping[str, float] | None,
 ) -> Estimate:
     """Fits in turn with the noise that the one before left; to the maximum of the likelihood."""
     if options.domain == "time" or options.initial_state == "zero":
         raise ValueError("weights='noise' needs domain='frequency' and no initial state at rest")
     used = [None if u else w for u, w in zip(unknown_noise, weights, strict=True)]
-    first = est = work(model, used, count)
+    first = est = work(used, count, start)
     for _ in range(_NOISE_ROUNDS):
         hold = None if options.hold is None else est.hold
         for i, data in enumerate(sets):
@@ -147,7 +147,8 @@ def _noise_weighted(
                 left = line_errors(est, data, hold, options.band, options.initial_state, used[i])
                 used[i] = noise_weights(left.error, experiment_length(data))
         before = est
-        est = work(est.model if isinstance(model, GreyBox) else model, used, 1)
+        near = {n: est[n] for n in getattr(est.model, "values", {})}
+        est = work(used, 1, near)
         std = np.sqrt(np.diag(est.covariance_matrix))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break

@@ -35,10 +35,11 @@ def fit_grey_box(
     n_starts: int | None,
     seed: int,
     estimated_hold: bool = False,
+    start: Mapping[str, float] | None = None,
 ) -> Estimate:
     """The work of ``fit`` for a GreyBox; ``est.problem`` is the cost that was minimised."""
     dt = _common_dt(sets, options.domain, options.initial_state) if estimated_hold else None
-    structure = GreyStructure(model, dt)
+    structure = GreyStructure(model, dt, checked_start(model, start))
     if not structure.physical_names:
         raise ValueError("model has no free parameter; free one with model.free(name)")
     shape = (model.n_outputs, model.n_inputs)
@@ -135,13 +136,16 @@ def _common_dt(sets: Sequence[Any], domain: str, initial_state: str) -> float:
     return times.pop()
 
 
-def started(model: GreyBox, start: Mapping[str, float] | None) -> GreyBox:
+def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[str, float] | None:
+    """The start as a dict; ValueError for a name or a value that the model cannot take."""
     if start is None:
-        return model
-    for name in start:
+        return None
+    values = dict(start)
+    for name in values:
         if name not in model.values:
             raise ValueError(unknown("start", name, model.values))
-    return model.with_values(**start)
+    model.with_values(**values)
+    return values
 
 
 def _estimate(
@@ -156,14 +160,16 @@ def _estimate(
     values = solution.x * scale
     energy = sum(e.energy for e in objective.experiments)
     noise = noise_variance(objective, point, len(values))
-    u = uncertainty(point.jacobian / scale, values, structure.names, noise, np.sqrt(energy))
+    u = uncertainty(point.jacobian / scale, values, structure.names, noise, np.sqrt(energy), scale)
     covariance = u.covariance
     if point.cost > 1e-18 * energy and objective.prior is None:
         score = score_covariance(objective, solution.x)
         covariance = coloured(u.covariance / max(noise, 1e-300), score, scale, covariance)
     warnings = [] if solution.converged else [f"not converged: {solution.message}"]
     count = len(structure.parameters)
-    warnings += u.warnings + physical_warnings(structure.parameters, values[:count])
+    warnings += u.warnings + physical_warnings(
+        structure.parameters, values[:count], np.sqrt(np.diag(covariance))[:count]
+    )
     if structure.dt is not None:
         hold = ZeroOrderHold(values[-1])
         warnings += decimation_warning(values[-1], np.sqrt(covariance[-1, -1]), dt)

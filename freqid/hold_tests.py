@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,9 @@ def rejected_hold(est: Estimate) -> Estimate:
     rounding = 1e-18 * sum(e.energy for e in experiments)
     if not testable or dof < 10 or est.cost <= rounding or est.dt <= 0:
         return est
-    freed = GreyStructure(est.model, est.dt)
+    structure: Any = est.problem.objective.structure
+    names = structure.physical_names
+    freed = GreyStructure(structure.model, est.dt, {n: est[n] for n in names})
     free_objective = Objective(freed, experiments)
     x = freed.start
     solutions = [_freed(free_objective, np.append(x[:-1], h)) for h in _periods(est)]

@@ -290,6 +290,8 @@ def outcome(objective: Objective, solution: Solution) -> dict[str, Any]:
     }
 
 
+# relative gain in cost that ends a search within bounds
+_BOUNDED = 1e-9
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
 _WALL = 1e100
 
@@ -320,6 +322,9 @@ def minimise(
 
     lower, upper = objective.structure.lower, objective.structure.upper
     bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
+    if bounded:
+        # next to a bound the reflective steps gain ever less, for ever
+        tolerance = max(tolerance, _BOUNDED)
     result = scipy.optimize.least_squares(
         residual,
         start,
@@ -330,7 +335,7 @@ def minimise(
         ftol=max(tolerance, 1e-15),
         xtol=max(1e-2 * tolerance, 1e-12),
         gtol=1e-15,
-        max_nfev=limit or 400 * size,
+        max_nfev=limit or 100 * size,
     )
     point = objective.point(result.x)
     if point is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -24,14 +25,19 @@ class GreyStructure:
     """A grey box: free parameters in units of their own size.
 
     With ``dt`` (s) the period of a zero-order hold is one more unknown, the last, in units of it.
+    ``start`` gives values to begin from; one next to zero keeps the size of the model's own.
     """
 
-    def __init__(self, model: GreyBox, dt: float | None = None) -> None:
+    def __init__(
+        self, model: GreyBox, dt: float | None = None, start: Mapping[str, float] | None = None
+    ) -> None:
         self.model, self.dt = model, dt
         self.parameters = model.free_parameters
         self.physical_names = [p.name for p in self.parameters]
-        values = [p.value for p in self.parameters]
-        scale = [abs(v) or 1.0 for v in values]
+        begin = {} if start is None else start
+        values = [float(begin.get(p.name, p.value)) for p in self.parameters]
+        sizes = zip(values, self.parameters, strict=True)
+        scale = [max(abs(v), 1e-3 * abs(p.value)) or 1.0 for v, p in sizes]
         lower, upper = [p.lower for p in self.parameters], [p.upper for p in self.parameters]
         if dt is not None:
             values, scale = [*values, dt / 2], [*scale, dt]

@@ -28,15 +28,19 @@ def uncertainty(
     names: Sequence[str],
     noise_variance: float,
     size: float,
+    sizes: FloatArray | None = None,
 ) -> Uncertainty:
     """σ² (JᵀJ)⁻¹ at the estimate, and the parameters that it cannot separate.
 
-    Args: jacobian (rows, P) by the parameters themselves; ``size`` the norm of the weighted data.
+    Args: jacobian (rows, P) by the parameters themselves; ``size`` the norm of the weighted data;
+    ``sizes`` (P,) what counts as a change of a parameter that is next to zero.
     """
     P = len(values)
     norms = np.linalg.norm(jacobian, axis=0)
     effect = norms * np.where(values == 0, 1, np.abs(values))
-    silent = ~(effect > 1e-10 * size)
+    # a parameter that has come to zero is not silent for that
+    reach = effect if sizes is None else np.maximum(effect, norms * sizes)
+    silent = ~(reach > 1e-10 * size)
     warnings = [
         f"not identifiable: {name} has no effect on the data; fix it or excite it"
         for name, quiet in zip(names, silent, strict=True)
@@ -91,16 +95,21 @@ def _combination(names: list[str], change: FloatArray) -> str:
     return text + " as they are; fix one of them"
 
 
-def physical_warnings(parameters: Sequence[Parameter], values: FloatArray) -> list[str]:
+def physical_warnings(
+    parameters: Sequence[Parameter], values: FloatArray, std: FloatArray | None = None
+) -> list[str]:
     """One sentence for each parameter outside its physical range or at the edge of its bounds."""
     warnings = []
-    for p, value in zip(parameters, values, strict=True):
+    errors = np.zeros(len(values)) if std is None else std
+    for p, value, error in zip(parameters, values, errors, strict=True):
         low, high = p.physical
         if not low <= value <= high:
-            warnings.append(
-                f"not physical: {p.name}={value:.6g} {p.unit} lies outside [{low:g}, {high:g}]; "
-                "check the hold that was assumed and the band".replace("  ", " ")
-            )
+            beyond = low - value if value < low else value - high
+            why = "check the hold that was assumed and the band"
+            if beyond < 2 * error:
+                why = "by less than two standard errors, so that the data allow a physical value"
+            named = f"{p.name}={value:.6g} {p.unit}".rstrip()
+            warnings.append(f"not physical: {named} lies outside [{low:g}, {high:g}]; {why}")
         for bound in (p.lower, p.upper):
             if np.isfinite(bound) and abs(value - bound) <= 1e-6 * max(abs(bound), abs(value)):
                 warnings.append(

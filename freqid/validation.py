@@ -28,11 +28,13 @@ _LEVEL = 0.01
 class Comparison:
     """A model beside a record.
 
-    ``simulated`` and ``residuals`` = measured − simulated are shaped like ``record.y``;
+    ``simulated`` and ``residuals`` = measured − simulated are shaped like ``record.y``, whose part
+    in the band ``measured`` (N, outputs) is;
     ``fit_percent`` (outputs,) is 100·(1 − ‖residual‖/‖y − mean‖), the normalised root mean square.
     """
 
     record: Record
+    measured: FloatArray
     simulated: FloatArray
     residuals: FloatArray
     fit_percent: FloatArray
@@ -58,6 +60,7 @@ def compare(
     *,
     hold: Hold | str | None = None,
     initial_state: str = "estimate",
+    band: tuple[float, float] | None = None,
 ) -> Comparison:
     """Simulate a model with a record's input, and set the two side by side.
 
@@ -67,6 +70,7 @@ def compare(
             discrete black box simulates at the hold that it was fitted with.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
             input to be periodic.
+        band: in Hz; only what lies inside it is compared, of both. None compares everything.
 
     Raises ValueError for channels that do not match.
 
@@ -81,12 +85,15 @@ def compare(
     errors = line_errors(model, record, hold, None, initial_state)
     residual = -time_errors(errors, record)
     y = record.outputs[: len(residual)]
+    if band is not None:
+        y, residual = _inside(y, record.dt, band), _inside(residual, record.dt, band)
     centred = np.linalg.norm(y - y.mean(axis=0), axis=0)
     left = np.linalg.norm(residual, axis=0)
     percent = 100 * (1 - left / np.where(centred > 0, centred, np.inf))
     shape = (len(residual),) if record.y.ndim == 1 else residual.shape
     used = record.hold if hold is None or isinstance(hold, str) else hold
-    return Comparison(record, (y - residual).reshape(shape), residual.reshape(shape), percent, used)
+    simulated = (y - residual).reshape(shape)
+    return Comparison(record, y, simulated, residual.reshape(shape), percent, used)
 
 
 def residual_test(

@@ -34,7 +34,7 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
             unit = (record.units or {}).get(name, "")
             label = f"{name} / {unit}" if unit else name
             above, below = ax[2 * o], ax[2 * o + 1]
-            above.plot(time, record.outputs[: len(time), o], label="measured", **line(0))
+            above.plot(time, comparison.measured[:, o], label="measured", **line(0))
             text = f"simulated, {comparison.fit_percent[o]:.1f} %"
             above.plot(time, simulated[:, o], label=text, **line(2))
             above.set_ylabel(label)

@@ -1,5 +1,8 @@
 """Shared plants, records and switches of the suite."""
 
+import os
+from pathlib import Path
+
 import matplotlib
 import numpy as np
 import pytest
@@ -26,6 +29,16 @@ def fast(plant):
 @pytest.fixture(scope="session")
 def slow(fast):
     return fast.decimate(10)
+
+
+@pytest.fixture(scope="session")
+def measured():
+    """The folder of measured data: ../shared/data beside the checkout, or FREQID_DATA."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("FREQID_DATA", beside))
+    if not (folder / "ruler_robot").is_dir():
+        pytest.skip(f"no measured data: {folder / 'ruler_robot'} is missing; set FREQID_DATA")
+    return folder
 
 
 @pytest.fixture(autouse=True)

@@ -11,7 +11,9 @@ EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
-def test_example(path, tmp_path):
+def test_example(path, tmp_path, request):
+    if path.stem == "ruler_robot":
+        request.getfixturevalue("measured")
     result = subprocess.run(
         [sys.executable, str(path), str(tmp_path)],
         capture_output=True,
