@@ -177,7 +177,9 @@ def fit(
     band: Band = None,
     domain: Literal["frequency", "time"] = "frequency",
     initial_state: Literal["estimate", "zero", "steady"] = "estimate",
+    weights: Literal["noise"] | None = None,
     out: Path | None = None,
+    plot: Path | None = None,
 ) -> int:
     """Estimate a model's parameters from a record.
 
@@ -191,8 +193,12 @@ def fit(
         keep every so many-th sample before the fit; the hold is remembered.
     keep_input
         when decimating, keep the whole input (the lifted model).
+    weights
+        noise: weigh each line by the noise that the fit leaves there.
     out
         JSON file for the estimate.
+    plot
+        picture of the record beside the model's simulation.
     """
     record = fq.read(data, input, output, dt)
     if decimate != 1:
@@ -202,11 +208,21 @@ def fit(
     with _progress() as progress:
         progress.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
         estimate = fq.fit(
-            plant, record, hold=between, band=band, domain=domain, initial_state=initial_state
+            plant,
+            record,
+            hold=between,
+            band=band,
+            domain=domain,
+            initial_state=initial_state,
+            weights=weights,
         )
     if out is not None:
         text = json.dumps(_plain(estimate.to_dict()), indent=2, allow_nan=False)
         _write(out, lambda path: path.write_text(text + "\n"))
+    if plot is not None:
+        comparison = fq.compare(estimate, record, band=band)
+        figure = comparison.plot()[0].figure
+        _write(plot, lambda path: figure.savefig(path))
     _show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
     print(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "

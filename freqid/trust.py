@@ -111,7 +111,9 @@ def physical_warnings(
             named = f"{p.name}={value:.6g} {p.unit}".rstrip()
             warnings.append(f"not physical: {named} lies outside [{low:g}, {high:g}]; {why}")
         for bound in (p.lower, p.upper):
-            if np.isfinite(bound) and abs(value - bound) <= 1e-6 * max(abs(bound), abs(value)):
+            if np.isfinite(bound) and abs(value - bound) <= 1e-6 * max(
+                abs(bound), abs(value), error if np.isfinite(error) else 0.0
+            ):
                 warnings.append(
                     f"edge of a bound: {p.name}={value:.6g} is at its bound {bound:g}; the data "
                     "want it beyond"

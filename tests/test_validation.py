@@ -156,6 +156,15 @@ def test_residual_tests_pass_for_the_truth_and_fail_for_less(plant, short):
     assert white["p_value"][0] == pytest.approx(known)
 
 
+def test_whiteness_of_a_band(plant, short):
+    white = [fq.residual_test(plant, short.with_noise(0.5, seed=s), band=BAND)["passed"]
+             for s in range(40)]  # fmt: skip
+    assert np.mean(white) > 0.95
+    coloured_runs = [fq.residual_test(plant, with_coloured(short, s), band=BAND)["passed"][0]
+                     for s in range(10)]  # fmt: skip
+    assert not any(coloured_runs)
+
+
 def test_coloured_noise_is_not_white_but_still_independent(plant, short):
     independent = []
     for s in range(30):
