@@ -22,8 +22,8 @@ from freqid.sampled_plant import StateSpace
 from freqid.subspace import inputs_of, observed
 
 _STEPS = 6
-# poles that need no subspace to begin from, and the lines that then are enough for each
-_FEW, _LINES_A_POLE = 4, 150
+# poles that need no subspace to begin from
+_FEW = 4
 # a denominator that has changed by less than this, relative, on the lines is the last
 _SETTLED = 1e-2
 
@@ -38,12 +38,10 @@ def first_model(
     single = all(e.Y.shape[:2] == (1, 1) and e.U.shape[:2] == (1, 1) for e in experiments)
     single &= all(e.aliases == 1 and e.free_aliases == 1 for e in experiments)
     if single and order <= _FEW:
-        # so few poles are found from anywhere, and on part of the lines
-        step = max(min(len(e.omega) for e in experiments) // (_LINES_A_POLE * order), 1)
-        few = [e.thinned(step) if step > 1 else e for e in experiments]
+        # so few poles are found from anywhere
         with contextlib.suppress(np.linalg.LinAlgError):
-            A, C = _with_poles(_refined(few, np.zeros(order, complex), feedthrough))
-            return inputs_of(few, A, C, feedthrough)
+            A, C = _with_poles(_refined(experiments, np.zeros(order, complex), feedthrough))
+            return inputs_of(experiments, A, C, feedthrough)
     A, C = observed(experiments, order)
     if single:
         # where the polynomials vanish on all lines the subspace poles stand
