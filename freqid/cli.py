@@ -1,4 +1,4 @@
-"""The command line: freqid reproduce, demo, frf, fit and bias."""
+"""The command line: freqid reproduce, demo, frf, fit, bias and explore."""
 
 from __future__ import annotations
 
@@ -180,6 +180,7 @@ def fit(
     weights: Literal["noise"] | None = None,
     out: Path | None = None,
     plot: Path | None = None,
+    report: Path | None = None,
 ) -> int:
     """Estimate a model's parameters from a record.
 
@@ -199,6 +200,8 @@ def fit(
         JSON file for the estimate.
     plot
         picture of the record beside the model's simulation.
+    report
+        HTML page about the estimate, which works offline (needs the extra "report").
     """
     record = fq.read(data, input, output, dt)
     if decimate != 1:
@@ -219,6 +222,8 @@ def fit(
     if out is not None:
         text = json.dumps(_plain(estimate.to_dict()), indent=2, allow_nan=False)
         _write(out, lambda path: path.write_text(text + "\n"))
+    if report is not None:
+        estimate.report(report, title=f"{model} from {data.name}")
     if plot is not None:
         comparison = fq.compare(estimate, record, band=band)
         figure = comparison.plot()[0].figure
@@ -294,6 +299,34 @@ def bias(
     _write(plot, lambda path: axes[0].figure.savefig(path))
     print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")
     return 0 if table["converged"].all() else 1
+
+
+@app.command
+def explore(
+    data: Path | None = None,
+    *,
+    input: Columns = None,
+    output: Columns = None,
+    dt: Dt = None,
+    host: str = "127.0.0.1",
+    port: int = 8050,
+    allow_remote: bool = False,
+) -> None:
+    """Open the explorer: a page on this machine with the paper's experiment under sliders.
+
+    Parameters
+    ----------
+    data
+        a record to explore instead of the simulated experiment.
+    host
+        other than loopback only with --allow-remote.
+    port
+        the next free one is taken where it is busy.
+    """
+    from freqid.explorer import explore as serve
+
+    record = None if data is None else fq.read(data, input, output, dt)
+    serve(record, host, port, allow_remote)
 
 
 def _hold(text: str | None) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,6 +52,10 @@ class Estimate:
     warnings: list[str] = field(default_factory=list)
     # the cost that was minimised, for what asks for more than its least point
     problem: Any = field(default=None, repr=False)
+    # the data, the band (Hz) and the call that made the estimate, for reports of it
+    data: Sequence[Any] = ()
+    band: tuple[float, float] | None = None
+    call: str = ""
 
     def __getitem__(self, name: str) -> float:
         if name in self.names:
@@ -175,6 +180,17 @@ class Estimate:
         from freqid.plots import nyquist
 
         return nyquist(self, ax=ax, **options)
+
+    def report(self, path: str | Path, title: str | None = None) -> None:
+        """Write one self-contained HTML page about the estimate, which works offline.
+
+        A sentence on whether it may be trusted, the parameters with error and bias bars, response
+        and simulation to zoom into, residual tests, warnings, and the call that made it. Raises
+        ValueError for another suffix than .html, or without the extra ``report``.
+        """
+        from freqid.report import write_report
+
+        write_report(self, path, title)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything that a file needs, in plain numbers and strings."""

@@ -123,7 +123,30 @@ def fit(
         est = _noise_weighted(work, sets, all_weights, unknown_noise, options, count, start)
     else:
         est = work(all_weights, count, start)
-    return est if hold is None or estimated else rejected_hold(est)
+    if hold is not None and not estimated:
+        est = rejected_hold(est)
+    given = {
+        "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
+        "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
+    }  # fmt: skip
+    call = _call(model, len(sets), given)
+    return dataclasses.replace(est, data=tuple(sets), band=band, call=call)
+
+
+def _call(model: Any, count: int, given: Mapping[str, Any]) -> str:
+    """The call of ``fit`` as a user would type it, arguments at their defaults left out."""
+    usual = {"initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency"}
+    shown = []
+    for name, value in given.items():
+        if value is None or (name in usual and isinstance(value, type(usual[name]))
+                             and value == usual[name]):  # fmt: skip
+            continue
+        if name == "start":
+            value = dict(value)
+        text = repr(value) if not hasattr(value, "shape") else f"<array {value.shape}>"
+        shown.append(f"{name}={text}")
+    data = "data" if count == 1 else f"[{count} data sets]"
+    return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"
 
 
 def _noise_weighted(
