@@ -386,5 +386,8 @@ h1 { font-size: 1.3rem; margin: 0.2rem 0; } h2 { font-size: 1.05rem; }
 pre { background: var(--tint); padding: 0.7rem; overflow-x: auto; } .code { position: relative; }
 .code > div { position: absolute; top: 0.5rem; right: 0.7rem; cursor: pointer; }
 a { color: inherit; }
+#hold label, #plant label, .controls [class*=slider] [class*=mark], .controls summary {
+  color: var(--ink) !important; }
+.controls .dash-dropdown, .controls .dash-dropdown * { color: #1a1a1a !important; }
 @media (max-width: 62rem) { .columns, .graphs { grid-template-columns: minmax(0, 1fr); } }
 </style></head><body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}</footer></body></html>"""

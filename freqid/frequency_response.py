@@ -171,6 +171,22 @@ class FrequencyResponse:
                 columns[name] = getattr(self, name).ravel()
         return pd.DataFrame(columns)
 
+    def to_xarray(self) -> Any:
+        """The response as an xarray.DataArray (output, input, frequency / Hz); needs xarray.
+
+        Raises ValueError where xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ValueError("to_xarray needs xarray; pip install xarray") from None
+        coordinates = {
+            "output": list(self.output_names or ()),
+            "input": list(self.input_names or ()),
+            "frequency": self.frequency,
+        }
+        return xarray.DataArray(self.response, coordinates, dims=tuple(coordinates))
+
     def __repr__(self) -> str:
         p, m, K = self.response.shape
         f = self.frequency
