@@ -10,6 +10,12 @@ from freqid.design import d_optimal_spectrum, experiment_design
 from freqid.design_plots import plot_design
 from freqid.distortion import distortion
 from freqid.estimate import Estimate
+from freqid.estimate_plots import (
+    plot_parameters,
+    plot_poles,
+    plot_response,
+    plot_spectrogram,
+)
 from freqid.estimators import etfe
 from freqid.excitation import chirp, prbs, sine, white_noise
 from freqid.files import read, write
@@ -101,8 +107,12 @@ __all__ = [
     "plot_coherence",
     "plot_design",
     "plot_orders",
+    "plot_parameters",
+    "plot_poles",
     "plot_record",
     "plot_residuals",
+    "plot_response",
+    "plot_spectrogram",
     "prbs",
     "read",
     "residual_test",

@@ -71,6 +71,13 @@ def modes(est: Estimate) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def pole_scatter(est: Estimate) -> tuple[Array, FloatArray]:
+    """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
+    poles, change, covariance = _poles(est)
+    parts = np.stack([change.real, change.imag], axis=1)
+    return poles, parts @ covariance @ parts.swapaxes(-1, -2)
+
+
 def _poles(est: Estimate) -> tuple[Array, Array, FloatArray]:
     """Continuous-time poles (n,), their derivatives by some unknowns, and those' covariance.
 

@@ -23,6 +23,9 @@ from freqid.spectra import spectra
 
 # windows that are worked on at once
 _BLOCK = 256
+# where the noise of a response is so many times what one input without a transient would leave, in
+# one window of ten, windows are widened, up to a part of all lines
+_INFLATED, _WIDEST = 10.0, 0.15
 
 
 def local_polynomial(
@@ -41,11 +44,13 @@ def local_polynomial(
         order: of the polynomials of response and transient.
         band: in Hz, None for all lines.
         width: lines of each window, odd; by default a third more than the unknowns (two thirds
-            for ``local_rational``).
+            for ``local_rational``), and wider, up to a point, where the input is so smooth, as a
+            chirp's is, that it cannot be told from the transient in so few lines.
         reference: for closed loop, as in ``h1``.
 
     Returns a FrequencyResponse (outputs, inputs, K) at the DFT lines with its variance; its
-    ``coherence`` is the part of the output's power in each window that is not noise. Raises
+    ``coherence`` is the part of the output's power in each window that is not noise. Polynomials
+    suit inputs whose DFT is rough, such as noise; for a chirp take ``local_rational``. Raises
     ValueError for windows that are too narrow or a record that is too short.
 
     Source: Pintelon and Schoukens, 2012, section 7.2.
@@ -106,6 +111,7 @@ def _estimate(
     signals = references_of(sets, reference)
     E, m = len(sets), sets[0].n_inputs
     unknown = (order + 1) * (m + E) + poles
+    given = width is not None
     if width is None:
         # polynomials bend soon: a third more equations than unknowns; fractions may have more
         width = max(int((1.7 if poles else 1.34) * unknown / E) + 1, 2 * order + 3)
@@ -118,6 +124,13 @@ def _estimate(
             f"width={width} gives {width * E} equations for {unknown} unknowns; widen it"
         )
     data = _lines(sets, signals, band, width)
+    most = min(int(_WIDEST * len(data.frequency)), (20 if poles else 3) * width)
+    while not given and int(1.5 * width) | 1 <= most:
+        if _inflation(data, order, poles, width) < _INFLATED:
+            break
+        # an input as smooth as a chirp's hides in the transient: wider windows tell them apart
+        width = int(1.5 * width) | 1
+        data = _lines(sets, signals, band, width)
     G, variance, coherence = _windows(data, order, poles, width)
     if signals is not None:
         G, variance, coherence = _through(G, variance, coherence, m)
@@ -198,14 +211,30 @@ def _windows(
         first = np.clip(centres[block] - width // 2, 0, K - width)
         at = first[:, None] + np.arange(width)
         r = (at - centres[block, None]) / (width / 2)
-        G[block], variance[block], share[block] = _solve(data, at, r, order, poles)
+        G[block], variance[block], share[block], _ = _solve(data, at, r, order, poles)
     return G, variance, share
+
+
+def _inflation(data: _Lines, order: int, poles: int, width: int) -> float:
+    """Ninth decile, over some windows, of what input and transient cost one another in noise."""
+    K = len(data.frequency)
+    centres = np.flatnonzero(data.wanted)
+    centres = centres[np.unique(np.linspace(0, len(centres) - 1, 24).astype(int))]
+    first = np.clip(centres - width // 2, 0, K - width)
+    at = first[:, None] + np.arange(width)
+    r = (at - centres[:, None]) / (width / 2)
+    inflated = _solve(data, at, r, order, poles)[3]
+    return float(np.quantile(inflated, 0.9))
 
 
 def _solve(
     data: _Lines, at: Array, r: FloatArray, order: int, poles: int
-) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """One block of windows by QR; the unknowns are G, then each transient, then denominators."""
+) -> tuple[ComplexArray, FloatArray, FloatArray, FloatArray]:
+    """One block of windows by QR; the unknowns are G, then each transient, then denominators.
+
+    Returned are G, its variance, the share of the output that is not noise, and by how much the
+    noise of G exceeds that of U alone, (windows,).
+    """
     U, Y = data.U[..., at], data.Y[..., at]  # (E, m, W, w), (E, p, W, w)
     E, m, W, w = U.shape
     p = Y.shape[1]
@@ -226,6 +255,7 @@ def _solve(
     G = np.empty((W, p, m), complex)
     variance = np.empty((W, p, m))
     share = np.empty((W, p, m))
+    inflated = np.zeros(W)
     for o in range(p):
         A, b = columns, target[..., o]
         if poles:
@@ -247,11 +277,12 @@ def _solve(
         noise = (np.abs(residual) ** 2).sum(axis=1) / freedom
         ratio = y_size[o] / u_size  # (m, W)
         spread = (np.abs(inverse) ** 2).sum(axis=-1)
+        inflated = np.maximum(inflated, spread[:, : m * R1 : R1].max(axis=1) * E * w)
         for i in range(m):
             G[:, o, i] = x[:, i * R1] * ratio[i]
             variance[:, o, i] = noise * spread[:, i * R1] * ratio[i] ** 2
             share[:, o, i] = np.clip(1 - noise, 0, 1)
-    return G, variance, share
+    return G, variance, share, inflated
 
 
 def _through(

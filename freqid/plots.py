@@ -113,7 +113,8 @@ def nyquist(
 ) -> Axes:
     """Responses in the complex plane, with dots at the frequencies ``ticks`` (in ``unit``).
 
-    Takes what ``bode`` takes; returns the axes. Raises ValueError for an unknown unit.
+    Where a response has a variance its dots lie in discs that hold 95 % of it. Takes what ``bode``
+    takes; returns the axes. Raises ValueError for an unknown unit.
 
     >>> import freqid as fq
     >>> ax = fq.nyquist(fq.first_order())
@@ -136,6 +137,9 @@ def nyquist(
                     if frf.omega[0] <= at <= frf.omega[-1]:
                         point = np.interp(at, frf.omega, G.real), np.interp(at, frf.omega, G.imag)
                         ax.plot(*point, "o", markersize=4, color=style.get("color"))
+                        if frf.variance is not None:
+                            spread = float(np.interp(at, frf.omega, frf.variance[pair]))
+                            _disc(ax, point, spread, style.get("color"))
                         # each curve's labels stand off in a direction of their own
                         ax.annotate(
                             f"{tick:g}",
@@ -152,6 +156,14 @@ def nyquist(
         if any(label for _, label in curves):
             ax.legend()
     return ax
+
+
+def _disc(ax: Axes, point: tuple[Any, Any], variance: float, colour: Any) -> None:
+    """The disc that holds a complex value in 95 % of experiments: radius² = χ²₂ variance/2."""
+    import matplotlib.pyplot as plt
+
+    disc = plt.Circle(point, np.sqrt(5.9915 * variance / 2), linewidth=0, alpha=0.2, color=colour)
+    ax.add_patch(disc)
 
 
 def plot_record(record: Record, ax: Any = None) -> Any:
