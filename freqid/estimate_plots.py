@@ -124,6 +124,7 @@ def plot_parameters(est: Estimate, ax: Axes | None = None) -> Axes:
         )
         drawn.auto_set_font_size(False)
         drawn.set_fontsize(9)
+        drawn.auto_set_column_width(list(range(4)))
         drawn.scale(1, 1.3)
     return ax
 

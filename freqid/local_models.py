@@ -9,6 +9,7 @@ transient is taken off, and what is left tells the noise, from one record.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,8 @@ _BLOCK = 256
 # where the noise of a response is so many times what one input without a transient would leave, in
 # one window of ten, windows are widened, up to a part of all lines
 _INFLATED, _WIDEST = 10.0, 0.15
+# and where polynomials remain useless all the same
+_HOPELESS = 100.0
 
 
 def local_polynomial(
@@ -125,12 +128,18 @@ def _estimate(
         )
     data = _lines(sets, signals, band, width)
     most = min(int(_WIDEST * len(data.frequency)), (20 if poles else 3) * width)
-    while not given and int(1.5 * width) | 1 <= most:
-        if _inflation(data, order, poles, width) < _INFLATED:
-            break
+    inflated = 0.0 if given else _inflation(data, order, poles, width)
+    while inflated > _INFLATED and int(1.5 * width) | 1 <= most:
         # an input as smooth as a chirp's hides in the transient: wider windows tell them apart
         width = int(1.5 * width) | 1
         data = _lines(sets, signals, band, width)
+        inflated = _inflation(data, order, poles, width)
+    if inflated > _HOPELESS and not poles:
+        warnings.warn(
+            "the input's spectrum is so smooth, as a chirp's is, that the local polynomials cannot "
+            "tell it from the transient everywhere; use local_rational",
+            stacklevel=3,
+        )
     G, variance, coherence = _windows(data, order, poles, width)
     if signals is not None:
         G, variance, coherence = _through(G, variance, coherence, m)

@@ -89,6 +89,19 @@ def test_local_models_on_the_papers_chirp(plant, fast, slow):
     assert rms(fq.local_rational(slow, band=(10, 80)), plant, hold) < 1e-2
 
 
+def test_a_noisy_chirp_needs_wide_windows(plant, fast):
+    """Less error than the ratio of DFTs, and a word where polynomials cannot do it."""
+    noisy = fast.with_noise(0.5, seed=3)
+    hold = fq.ZeroOrderHold(T1)
+    errors = []
+    for frf in (fq.local_rational(noisy, band=(10, 80)), fq.etfe(noisy, band=(10, 80))):
+        true = plant.frequency_response(frf.omega, hold).response
+        errors.append(np.median(np.abs(frf.response / true - 1)))
+    assert errors[0] < errors[1] / 3
+    with pytest.warns(UserWarning, match="use local_rational"):
+        fq.local_polynomial(noisy, band=(10, 80))
+
+
 def test_local_polynomials_beat_a_window_at_a_resonance(light):
     errors = {"lpm": [], "h1": []}
     for s in range(30):
