@@ -27,6 +27,8 @@ _BLOCK = 256
 # where the noise of a response is so many times what one input without a transient would leave, in
 # one window of ten, windows are widened, up to a part of all lines
 _INFLATED, _WIDEST = 10.0, 0.15
+# lines of a window for each line that it serves
+_LINES_A_WINDOW = 24
 # and where polynomials remain useless all the same
 _HOPELESS = 100.0
 
@@ -210,17 +212,20 @@ def _windows(
     """G (K, outputs, inputs), its variance, and the share of the output that is not noise."""
     K = len(data.frequency)
     centres = np.flatnonzero(data.wanted)
-    p, m = data.Y.shape[1], data.U.shape[1]
-    G = np.empty((len(centres), p, m), complex)
-    variance = np.empty((len(centres), p, m))
-    share = np.empty((len(centres), p, m))
-    for start in range(0, len(centres), _BLOCK):
-        block = slice(start, start + _BLOCK)
+    # a wide window serves the few lines around its own: its functions hold for all of them
+    served = max(width // _LINES_A_WINDOW, 1)
+    own = centres[np.minimum(np.arange(0, len(centres), served) + served // 2, len(centres) - 1)]
+    members = np.minimum(np.arange(len(own) * served), len(centres) - 1).reshape(-1, served)
+    parts = []
+    for start in range(0, len(own), _BLOCK):
+        middle = own[start : start + _BLOCK, None]
         # windows at the ends of the data are shifted inwards
-        first = np.clip(centres[block] - width // 2, 0, K - width)
-        at = first[:, None] + np.arange(width)
-        r = (at - centres[block, None]) / (width / 2)
-        G[block], variance[block], share[block], _ = _solve(data, at, r, order, poles)
+        first = np.clip(middle - width // 2, 0, K - width)
+        at = first + np.arange(width)
+        half = width / 2
+        offsets = (centres[members[start : start + _BLOCK]] - middle) / half
+        parts.append(_solve(data, at, (at - middle) / half, order, poles, offsets)[:3])
+    G, variance, share = (np.concatenate(x)[: len(centres)] for x in zip(*parts, strict=True))
     return G, variance, share
 
 
@@ -232,17 +237,19 @@ def _inflation(data: _Lines, order: int, poles: int, width: int) -> float:
     first = np.clip(centres - width // 2, 0, K - width)
     at = first[:, None] + np.arange(width)
     r = (at - centres[:, None]) / (width / 2)
-    inflated = _solve(data, at, r, order, poles)[3]
+    inflated = _solve(data, at, r, order, poles, np.zeros((len(at), 1)))[3]
     return float(np.quantile(inflated, 0.9))
 
 
 def _solve(
-    data: _Lines, at: Array, r: FloatArray, order: int, poles: int
+    data: _Lines, at: Array, r: FloatArray, order: int, poles: int, offsets: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray, FloatArray]:
     """One block of windows by QR; the unknowns are G, then each transient, then denominators.
 
-    Returned are G, its variance, the share of the output that is not noise, and by how much the
-    noise of G exceeds that of U alone, (windows,).
+    ``at`` (W, w) are the lines of the windows, ``r`` where they are relative to the window's own,
+    ``offsets`` (W, s) the lines that it serves. Returned are G at these, (W s, outputs, inputs),
+    its variance, the share of the output that is not noise, and by how much the noise of G exceeds
+    that of U alone, (W,).
     """
     U, Y = data.U[..., at], data.Y[..., at]  # (E, m, W, w), (E, p, W, w)
     E, m, W, w = U.shape
@@ -261,9 +268,11 @@ def _solve(
         free[:, e, :, e] = powers
     columns = np.concatenate([forced, free.reshape(W, E * w, E * R1)], axis=-1)
     target = np.moveaxis(Y, (0, 1, 2, 3), (1, 3, 0, 2)).reshape(W, E * w, p)
-    G = np.empty((W, p, m), complex)
-    variance = np.empty((W, p, m))
-    share = np.empty((W, p, m))
+    s = offsets.shape[1]
+    G = np.empty((W, s, p, m), complex)
+    variance = np.empty((W, s, p, m))
+    share = np.empty((W, s, p, m))
+    near = offsets[..., None] ** np.arange(order + 1)  # (W, s, R + 1)
     inflated = np.zeros(W)
     for o in range(p):
         A, b = columns, target[..., o]
@@ -287,11 +296,19 @@ def _solve(
         ratio = y_size[o] / u_size  # (m, W)
         spread = (np.abs(inverse) ** 2).sum(axis=-1)
         inflated = np.maximum(inflated, spread[:, : m * R1 : R1].max(axis=1) * E * w)
+        below = np.ones((W, s), complex)
+        if poles:
+            powers_of_d = offsets[..., None] ** np.arange(1, poles + 1)
+            below = below + np.einsum("Wsk,Wk->Ws", powers_of_d, x[:, -poles:])
         for i in range(m):
-            G[:, o, i] = x[:, i * R1] * ratio[i]
-            variance[:, o, i] = noise * spread[:, i * R1] * ratio[i] ** 2
-            share[:, o, i] = np.clip(1 - noise, 0, 1)
-    return G, variance, share, inflated
+            above = np.einsum("Wsk,Wk->Ws", near, x[:, i * R1 : (i + 1) * R1])
+            scale = ratio[i][:, None]
+            G[:, :, o, i] = above / below * scale
+            own = noise * spread[:, i * R1] * ratio[i] ** 2
+            variance[:, :, o, i] = own[:, None] / np.abs(below) ** 2
+            share[:, :, o, i] = np.clip(1 - noise, 0, 1)[:, None]
+    flat = (W * s, p, m)
+    return G.reshape(flat), variance.reshape(flat), share.reshape(flat), inflated
 
 
 def _through(
