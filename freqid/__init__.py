@@ -27,9 +27,6 @@ from freqid.input_spectra import (
     FilteredSpectrum,
     InputSpectrum,
     LineSpectrum,
-    MeasuredSpectrum,
-    MultisineSpectrum,
-    PRBSSpectrum,
     WhiteSpectrum,
 )
 from freqid.local_models import local_polynomial, local_rational
@@ -42,6 +39,7 @@ from freqid.plots import bode, nyquist, plot_coherence, plot_record
 from freqid.quality import check_record
 from freqid.rational import OutputError
 from freqid.record import Record
+from freqid.signal_spectra import MeasuredSpectrum, MultisineSpectrum, PRBSSpectrum
 from freqid.simulation import simulate
 from freqid.transfer_functions import TransferFunction
 from freqid.validation import (

@@ -34,8 +34,9 @@ from freqid.grey_fit import fit_grey_box
 from freqid.holds import Hold, as_hold
 from freqid.input_spectra import InputSpectrum
 from freqid.models import GreyBox
-from freqid.optimise import Objective, settled, triangle
+from freqid.optimise import Objective, settled
 from freqid.preparation import Options
+from freqid.projection import triangle
 from freqid.quadrature import panel_nodes, resolved
 from freqid.rational import OutputError
 from freqid.responses import points, response_and_derivatives

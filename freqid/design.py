@@ -14,8 +14,9 @@ from freqid.bias_map import bias_map, hold_label
 from freqid.checks import FloatArray, choice, positive, whole
 from freqid.experiments import sampled_response
 from freqid.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
-from freqid.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
+from freqid.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum
 from freqid.models import GreyBox
+from freqid.signal_spectra import multisine_lines
 from freqid.structures import GreyStructure
 
 if TYPE_CHECKING:

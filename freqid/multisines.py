@@ -11,7 +11,7 @@ import scipy.fft
 import scipy.optimize
 
 from freqid.checks import FloatArray, choice, positive, whole
-from freqid.input_spectra import multisine_lines
+from freqid.signal_spectra import multisine_lines
 
 # rounds of clipping; the norms then taken in turn; entries of a Jacobian that still is quick
 _CLIPPING_ROUNDS = 400

@@ -9,7 +9,8 @@ import scipy.ndimage
 
 from freqid.checks import FloatArray
 from freqid.experiments import SpectralExperiment
-from freqid.optimise import Objective, eliminate
+from freqid.optimise import Objective
+from freqid.projection import eliminate
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000

@@ -21,7 +21,7 @@ from freqid.checks import FloatArray
 from freqid.experiments import Experiment, Realisation
 from freqid.holds import Hold
 from freqid.priors import Prior
-from freqid.sampled_plant import BLOCK
+from freqid.projection import along, combined, eliminate, triangle_of
 
 
 class Structure(Protocol):
@@ -130,124 +130,11 @@ class Objective:
             known = self.prior.rows(x)
             blocks.append((known[:, :-1].T, known[:, -1], None))
             parts.append(float(known[:, -1] @ known[:, -1]))
-        triangle = _triangle_of(blocks)
+        triangle = triangle_of(blocks)
         if not np.isfinite(triangle).all():
             self.failure = ArithmeticError("the response is not finite")
             return None
         return Point(triangle, initial, parts)
-
-
-def triangle(matrix: FloatArray) -> FloatArray:
-    """R of the QR decomposition, (min(rows, columns), columns).
-
-    A tall matrix is reduced in blocks of rows, whose triangles are reduced again: as stable as
-    Householder's on the whole (TSQR: Demmel, Grigori, Hoemmen and Langou, SIAM J. Scientific
-    Computing 34, 2012), and in pieces that stay in the cache (see BLOCK).
-    """
-    rows, columns = matrix.shape
-    tall = 8 * columns
-    if rows >= 4 * tall:
-        whole = rows - rows % tall
-        blocks = np.ascontiguousarray(matrix[:whole]).reshape(-1, tall, columns)
-        reduced = np.asarray(np.linalg.qr(blocks, mode="r")).reshape(-1, columns)
-        return triangle(np.concatenate([reduced, matrix[whole:]]))
-    return np.asarray(np.linalg.qr(matrix, mode="r"))
-
-
-def inner(A: FloatArray, B: FloatArray) -> FloatArray:
-    """A Bᵀ for few long rows, block by block (see BLOCK)."""
-    if A.shape[1] <= 2 * BLOCK:
-        return A @ B.T
-    total = np.zeros((len(A), len(B)))
-    for start in range(0, A.shape[1], 2 * BLOCK):
-        part = slice(start, start + 2 * BLOCK)
-        total += A[:, part] @ B[:, part].T
-    return total
-
-
-def along(A: FloatArray, x: FloatArray) -> FloatArray:
-    """A x for few long rows; einsum, because BLAS would wake its threads for so little."""
-    return np.einsum("ij,j->i", A, x)
-
-
-def combined(c: FloatArray, A: FloatArray) -> FloatArray:
-    """Σ c_i A_i for few long rows."""
-    return np.einsum("i,ij->j", c, A)
-
-
-# least pivot of the scaled Gram matrix below which half of the digits are gone
-_LEAST_PIVOT = 1e-4
-
-
-def _triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None]]) -> FloatArray:
-    """R of the QR decomposition of stacked [P J, r], from J (P, rows), r and the rows Q of I − P.
-
-    The Cholesky factor of the Gram matrix is R at a fraction of the work, as long as the columns
-    of J, scaled alike, are far from dependent; when they are not, Householder's QR.
-    """
-    P = len(blocks[0][0])
-    G, g, rr = np.zeros((P, P)), np.zeros(P), 0.0
-    size = np.zeros(P)
-    for J, r, Q in blocks:
-        full = inner(J, J)
-        size += np.diag(full)
-        G, g, rr = G + full, g + along(J, r), rr + float(r @ r)
-        if Q is not None:
-            seen = inner(J, Q)
-            G = G - seen @ seen.T
-    size = np.sqrt(size)
-    if np.isfinite(G).all() and np.isfinite(rr) and (size > 0).all():
-        try:
-            L = np.linalg.cholesky(G / np.outer(size, size))
-        except np.linalg.LinAlgError:
-            L = np.zeros_like(G)
-        if np.diag(L).min(initial=1.0) > _LEAST_PIVOT:
-            R = np.zeros((P + 1, P + 1))
-            R[:P, :P] = L.T * size
-            R[:P, P] = np.linalg.solve(L, g / size)
-            R[P, P] = np.sqrt(max(rr - float(R[:P, P] @ R[:P, P]), 0.0))
-            return R
-    columns = []
-    for J, r, Q in blocks:
-        projected = J if Q is None else J - (J @ Q.T) @ Q
-        columns.append(np.concatenate([projected, r[None]]))
-    stacked = np.concatenate(columns, axis=1)
-    if not np.isfinite(stacked).all():
-        return np.full((1, P + 1), np.nan)
-    return triangle(stacked.T)
-
-
-def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal rows that span those of T (q, rows), and the δ that makes |r + δ T| least."""
-    size = np.sqrt(np.einsum("ij,ij->i", T, T))
-    delta = np.zeros(len(T))
-    used = size > 1e-200
-    if not used.any() or not np.isfinite(size).all():
-        return np.zeros((0, len(r))), delta
-    if not used.all():
-        T, size = T[used], size[used]
-    gram = inner(T, T) / np.outer(size, size)
-    try:
-        L = np.linalg.cholesky(gram)
-    except np.linalg.LinAlgError:
-        L = np.zeros_like(gram)
-    least = np.diag(L).min()
-    if least > _LEAST_PIVOT:
-        first = np.linalg.inv(L) / size
-        Q = first @ T
-        if least < 0.03:
-            # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
-            second = np.linalg.inv(np.linalg.cholesky(inner(Q, Q)))
-            Q, first = second @ Q, second @ first
-        delta[used] = -first.T @ along(Q, r)
-        return Q, delta
-    unit = T / size[:, None]
-    # modes that the output hardly shows: keep the directions that it does
-    U, s, Vt = np.linalg.svd(unit.T, full_matrices=False)
-    strong = s > 1e-11 * s[0]
-    U, s, Vt = U[:, strong], s[strong], Vt[strong]
-    delta[used] = -(Vt.T @ ((U.T @ r) / s)) / size
-    return U.T, delta
 
 
 @dataclass(frozen=True)

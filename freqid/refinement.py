@@ -17,7 +17,7 @@ import scipy.linalg
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import SpectralExperiment
-from freqid.optimise import triangle
+from freqid.projection import triangle
 from freqid.sampled_plant import StateSpace
 from freqid.subspace import inputs_of, observed
 

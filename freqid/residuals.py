@@ -13,8 +13,8 @@ from freqid.bases import basis_of
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import Realisation, SpectralExperiment
 from freqid.holds import Hold
-from freqid.optimise import eliminate
 from freqid.preparation import Options, prepare
+from freqid.projection import eliminate
 from freqid.record import Record
 from freqid.responses import Plane
 from freqid.sampled_plant import Linearisation, StateSpace

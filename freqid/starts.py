@@ -17,14 +17,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import Experiment, Realisation, SpectralExperiment, sampled_response
 from freqid.holds import PeriodicHold
-from freqid.optimise import (
-    Objective,
-    ScannableStructure,
-    Solution,
-    Structure,
-    minimise,
-    polish,
-)
+from freqid.optimise import Objective, ScannableStructure, Solution, Structure, minimise, polish
 
 # scattered points that are looked at before the best of them are walked from
 _GLANCES = 512

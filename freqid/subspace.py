@@ -14,7 +14,7 @@ from freqid.bases import basis_of
 from freqid.checks import ComplexArray, FloatArray
 from freqid.experiments import SpectralExperiment
 from freqid.holds import BandLimited
-from freqid.optimise import triangle
+from freqid.projection import triangle
 from freqid.responses import Plane
 from freqid.sampled_plant import StateSpace
 
