@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -255,7 +256,10 @@ def _identity(
 
 
 class _bar:
-    """A progress bar for the length of a ``with`` block; entering gives the function to advance."""
+    """Progress for the length of a ``with`` block; entering gives the function to advance.
+
+    A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth.
+    """
 
     def __init__(self, wanted: bool | None, total: int, done: int) -> None:
         from rich.console import Console
@@ -267,21 +271,30 @@ class _bar:
             TimeRemainingColumn,
         )
 
-        console = Console(stderr=True)
-        shown = console.is_terminal if wanted is None else wanted
+        self.console = Console(stderr=True)
+        live = self.console.is_terminal or self.console.is_jupyter
+        self.lines = bool(wanted) and not live
+        self.total, self.done = total, done
         self.progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
             TimeRemainingColumn(),
-            console=console,
-            disable=not shown,
+            console=self.console,
+            disable=not live if wanted is None else not (wanted and live),
         )
         self.task = self.progress.add_task("bias map", total=total, completed=done)
 
     def __enter__(self) -> Any:
         self.progress.start()
-        return lambda count: self.progress.advance(self.task, count)
+        return self.advance
+
+    def advance(self, count: int) -> None:
+        """``count`` more are done."""
+        before, self.done = self.done, self.done + count
+        self.progress.advance(self.task, count)
+        if self.lines and 10 * before // self.total != 10 * self.done // self.total:
+            print(f"bias map: {self.done} of {self.total}", file=sys.stderr, flush=True)
 
     def __exit__(self, *reason: Any) -> None:
         self.progress.stop()

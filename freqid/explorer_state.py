@@ -184,8 +184,11 @@ def scene(state: State, record: Record | None = None) -> Scene:
             fast = fast.with_noise(state.noise * float(fast.y.std()))
     else:
         fast = record
-    slow = fast.decimate(state.factor) if state.factor > 1 else fast
     assumed = state._assumed()
+    try:
+        slow = fast.decimate(state.factor) if state.factor > 1 else fast
+    except ValueError as error:
+        return Scene(state, fast, fast, None, str(error), as_hold(assumed, fast.dt, fast.hold))
     hold = as_hold(assumed, slow.dt, slow.hold)
     top = min(state.high, slow.nyquist * 0.999)
     band = (min(state.low, 0.8 * top), top)

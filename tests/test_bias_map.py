@@ -71,6 +71,15 @@ def test_a_row_that_fails_leaves_the_rest(plant):
     assert "not physical: d" in by.iloc[0]["message"]
 
 
+def test_progress_in_a_log_file_is_a_line_a_tenth(plant, capsys):
+    fq.bias_map(plant, chirps(20), [10], ["zoh"], base_dt=T1, chunk=1, progress=True)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == "bias map: 20 of 20"
+    assert len(lines) == 10
+    fq.bias_map(plant, chirps(1), [10], ["zoh"], base_dt=T1)
+    assert capsys.readouterr().err == ""
+
+
 def test_bounds_hold(plant):
     bounded = plant.with_bounds(d=(0, 100))
     table = fq.bias_map(bounded, chirps(1), [10], ["zoh"], base_dt=T1)

@@ -268,6 +268,20 @@ def test_an_own_record_takes_the_place_of_the_simulated_one():
     assert shown.estimate["d"] < 0
 
 
+def test_a_record_of_one_sample_is_no_crash():
+    from freqid.explorer_figures import bias_figure, bode_figure, nyquist_figure, time_figure
+
+    tiny = fq.Record([1.0], [2.0], dt=0.01)
+    assert "1" in tiny._repr_html_()
+    assert fq.check_record(tiny)["finding"].tolist() == ["constant", "constant"]
+    for state in (State(), State(factor=10, hold="remembered")):
+        shown = scene(state, tiny)
+        assert shown.estimate is None
+        assert shown.message
+        for figure in (bias_figure, bode_figure, nyquist_figure, time_figure):
+            assert "layout" in figure(shown)
+
+
 def test_only_loopback_unless_told_otherwise():
     with pytest.raises(ValueError, match="allow-remote"):
         explore(host="0.0.0.0")

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
 TEXT = (ROOT / "README.md").read_text()
 
@@ -41,6 +43,16 @@ def test_the_measured_example_runs_in_fifteen_lines(tmp_path, monkeypatch):
     names = run(code, tmp_path, monkeypatch)
     assert names["c"].fit_percent[0] > 80
     assert (tmp_path / "validation.png").is_file()
+
+
+def test_the_tutorial_runs(tmp_path, monkeypatch):
+    text = (ROOT / "docs" / "index.md").read_text()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
+    names = run(code, tmp_path, monkeypatch)
+    assert names["wrong"]["d"] < -200
+    assert names["est"]["d"] == pytest.approx(10, abs=0.1)
+    assert names["model"].n_inputs == 1
+    assert (tmp_path / "est.html").is_file()
 
 
 def test_the_three_commands_run(tmp_path):
