@@ -109,9 +109,12 @@ class Conditions:
             panels = resolved(panels, lambda f: self._columns(held, f, responses))
             frequency, weights = panel_nodes(panels)
         dense = apparent_density(held, self.spectrum, s, frequency)
-        lines = apparent_lines(held, self.spectrum, s)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lines = apparent_lines(held, self.spectrum, s)
         inside = (lines.frequency >= low - 1e-9 * nyquist) & (lines.power > 0)
         inside &= lines.frequency <= high + 1e-9 * nyquist
+        # a plant that integrates answers a constant with anything at all
+        inside &= np.isfinite(lines.response).all(axis=(0, 1))
         power = np.concatenate([dense.power * weights, lines.power[inside]])
         if not power.any():
             raise ValueError(

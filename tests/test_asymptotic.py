@@ -174,6 +174,15 @@ def test_standard_errors_match_the_scatter(plant):
     assert np.allclose(np.std(values, axis=0), expected, rtol=0.2)
 
 
+def test_the_constant_part_says_nothing_of_a_plant_that_integrates():
+    """A binary sequence has a line at zero, where the position of a free axis has no response."""
+    axis = fq.drivetrain(2, outputs=["motor position"]).with_values(fm=0)
+    axis = axis.fix("fm")
+    spectrum = fq.PRBSSpectrum(8, clock=4)
+    est = fq.asymptotic_fit(axis, spectrum, 2e-3, None, fq.ZeroOrderHold(2e-3))
+    assert max(abs(est[n] / axis[n] - 1) for n in est.names) < 1e-6
+
+
 def test_two_inputs_and_two_outputs(rng):
     A = np.array([[-3.0, 10, 0], [-10, -3, 0], [0, 0, -5]])
     B, C = rng.standard_normal((3, 2)), rng.standard_normal((2, 3))
