@@ -44,7 +44,7 @@ from freqid.sampled_plant import StateSpace
 from freqid.structures import GreyStructure
 from freqid.transfer_fit import fit_transfer_function
 from freqid.transfer_functions import TransferFunction
-from freqid.trust import uncertainty
+from freqid.trust import physical_warnings, uncertainty
 
 # times that the nodes are chosen anew for the estimate that they led to
 _ROUNDS = 6
@@ -272,9 +272,12 @@ def _grey(
     objective: Objective = est.problem.objective
     structure: Any = objective.structure
     values = settled(objective, est.problem.x) * structure.scale
+    # what is left of the cost is no noise: no parameter is unphysical by chance
+    kept = [w for w in est.warnings if not w.startswith(("not physical", "edge"))]
     est = dataclasses.replace(
         est,
         values=values,
+        warnings=kept + physical_warnings(plain.parameters, values[:count_physical]),
         model=est.model.with_values(**dict(zip(plain.physical_names, values, strict=False))),
         nominal=first.nominal,
         n_starts=first.n_starts,
