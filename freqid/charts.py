@@ -41,21 +41,23 @@ class Chart:
         directions[: Q.shape[1], : len(Q)] = Q.T
         if free_D:
             directions[Q.shape[1] :, len(Q) :] = np.eye(free_D)
-        parts = np.split(directions, np.cumsum([n * n, n * m, p * n]), axis=1)
-        self.derivative = StateSpace(
-            parts[0].reshape(-1, n, n),
-            parts[1].reshape(-1, n, m),
-            parts[2].reshape(-1, p, n),
-            parts[3].reshape(-1, p, m),
-        )
+        self._directions = directions
+        self._origin = np.concatenate([M.ravel() for M in self.centre])
+        self.derivative = self._parted(directions)
         self.lower = np.full(self.size, -np.inf)
         self.upper = np.full(self.size, np.inf)
 
+    def _parted(self, entries: FloatArray) -> StateSpace:
+        """Entries of all four matrices in a row, (…, entries), as matrices."""
+        lead, at, parts = entries.shape[:-1], 0, []
+        for M in self.centre:
+            parts.append(entries[..., at : at + M.size].reshape(*lead, *M.shape))
+            at += M.size
+        return StateSpace(*parts)
+
     def matrices(self, x: FloatArray) -> StateSpace:
         """The state space at x."""
-        return StateSpace(
-            *(c + np.tensordot(x, d, 1) for c, d in zip(self.centre, self.derivative, strict=True))
-        )
+        return self._parted(self._origin + x @ self._directions)
 
     def realise(self, x: FloatArray) -> Realisation:
         """The state space at x and its derivatives."""
