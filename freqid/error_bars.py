@@ -122,8 +122,8 @@ def profile_intervals(est: Estimate, level: float = 0.95) -> pd.DataFrame:
 
     A value is inside when the cost, minimised over all others, exceeds the least by no more than
     σ² χ²(level); where weights leave the noise coloured the threshold is widened as its standard
-    error is. Columns lower and upper; infinite where nothing holds the parameter within ten
-    standard errors. Raises ValueError for an estimate without a cost (a black box, or one without
+    error is. The period of an estimated hold keeps its linear interval. Columns lower and upper;
+    infinite where nothing holds the parameter within ten standard errors. Raises ValueError for an estimate without a cost (a black box, or one without
     data).
 
     Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
@@ -147,6 +147,11 @@ def profile_intervals(est: Estimate, level: float = 0.95) -> pd.DataFrame:
             continue
         inflated = max(std[i] ** 2 / white[i], 1e-12)
         rise = noise * inflated * float(scipy.stats.chi2.ppf(level, 1))
+        if est.names[i] not in est.model.values:
+            # an estimated hold is part of how the data are read: the linear interval stands
+            half = np.sqrt(float(scipy.stats.chi2.ppf(level, 1))) * std[i]
+            rows.append((x[i] - half, x[i] + half))
+            continue
         held = _Held(structure, i)
         ends = [_end(held, objective, x, i, side, std[i], least.cost, rise) for side in (-1, 1)]
         rows.append((ends[0], ends[1]))

@@ -59,11 +59,17 @@ class Realisation:
 
     def without(self, index: int) -> Realisation:
         """The same point without the derivative by one unknown, which is held."""
-        if self.period is not None or self.delay_scale is not None:
-            raise ValueError("an estimated hold or delay cannot be held")
         at, d = self.linearisation
+        count = len(d.A)
+        if (self.period is not None or self.delay_scale is not None) and index == count - 1:
+            raise ValueError("an estimated hold or delay cannot be held")
         fewer = StateSpace(*(np.delete(M, index, axis=0) for M in d))
-        return Realisation(Linearisation(at, fewer), basis_of(at, fewer), delay=self.delay)
+        return replace(
+            self,
+            linearisation=Linearisation(at, fewer),
+            basis=basis_of(at, fewer),
+            seen={},
+        )
 
     def delayed(
         self, hold: Hold, omega: FloatArray, z: ComplexArray

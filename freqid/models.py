@@ -202,7 +202,12 @@ class GreyBox:
     def response_with_variance(
         self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
     ) -> FrequencyResponse:
-        """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``."""
+        """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``.
+
+        Names that are not the plant's own, such as an estimated hold's period, do not count.
+        """
+        own = [i for i, name in enumerate(names) if name in self.values]
+        names, covariance = [names[i] for i in own], covariance[np.ix_(own, own)]
         lin = self.linearise(self.values, names)
         frf = self.frequency_response(omega, hold)
         between = BandLimited() if hold is None else hold

@@ -79,6 +79,8 @@ def compare(
     >>> bool(fq.compare(fq.first_order(), record).fit_percent[0] > 99.999)
     True
     """
+    if not isinstance(record, Record):
+        raise ValueError(f"record={type(record).__name__} is not a Record; compare them one by one")
     inner = getattr(model, "model", model)
     if hold is None and hasattr(inner, "matrices") and hasattr(inner, "hold"):
         hold = inner.hold

@@ -71,3 +71,16 @@ def test_what_cannot_tell_a_hold_is_named(plant, fast):
         fq.fit(plant, fast, hold="estimate", domain="time")
     with pytest.raises(ValueError, match="needs a GreyBox"):
         fq.fit(fq.OutputError(3), fast, hold="estimate")
+
+
+def test_everything_an_estimate_offers_with_an_estimated_hold(plant, slow, tmp_path):
+    est = fq.fit(plant, slow.with_noise(0.3, seed=4), hold="estimate", band=(10, 80))
+    frf = est.frequency_response(2 * np.pi * np.array([20.0, 40.0]))
+    assert (frf.variance > 0).all()
+    linear, profile = est.intervals(), est.intervals("profile")
+    assert profile.index.tolist()[-1] == "hold_period"
+    half = (linear["upper"] - linear["lower"]) / 2
+    assert ((profile - linear).abs().max(axis=1) < 0.3 * half).all()
+    est.report(tmp_path / "est.html")
+    assert fq.compare(est, slow).fit_percent[0] > 95
+    fq.plot_poles(est)
