@@ -123,8 +123,8 @@ def profile_intervals(est: Estimate, level: float = 0.95) -> pd.DataFrame:
     A value is inside when the cost, minimised over all others, exceeds the least by no more than
     σ² χ²(level); where weights leave the noise coloured the threshold is widened as its standard
     error is. The period of an estimated hold keeps its linear interval. Columns lower and upper;
-    infinite where nothing holds the parameter within ten standard errors. Raises ValueError for an estimate without a cost (a black box, or one without
-    data).
+    infinite where nothing holds the parameter within ten standard errors. Raises ValueError for an
+    estimate without a cost (a black box, or one without data).
 
     Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
     """
