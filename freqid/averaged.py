@@ -197,7 +197,8 @@ def _spectral(
     if length > shortest:
         raise ValueError(f"segment={length} is longer than the shortest record, {shortest} samples")
     if overlap is None:
-        overlap = 0.0 if window in ("boxcar", "rectangular") else 0.5
+        named = isinstance(window, str) and window in ("boxcar", "rectangular")
+        overlap = 0.0 if named else 0.5
     if not 0 <= overlap < 1:
         raise ValueError(f"overlap={overlap!r} must be a part of the segment, from 0 to below 1")
     step = length - int(length * overlap)
@@ -272,7 +273,8 @@ def _excited(uu: ComplexArray, first: Record) -> None:
 
 def _independent(window: Any, length: int, step: int, count: int) -> float:
     """How many independent averages overlapping segments are worth (Welch, 1967)."""
-    w = scipy.signal.get_window(window, length)
+    given = isinstance(window, (list, np.ndarray))
+    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
     total, lag = 1.0, step
     while lag < length and count > 1:
         shared = (w[lag:] @ w[:-lag] / (w @ w)) ** 2

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from freqid.apparent import weight_of
 from freqid.checks import whole
 from freqid.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 from freqid.input_spectra import ChirpSpectrum, InputSpectrum
@@ -236,20 +237,26 @@ def _identity(
     """A fingerprint of what is asked: plants by matrices and slopes, spectra by their values."""
     seen = hashlib.sha256()
     for name, model in plants.items():
-        seen.update(name.encode())
+        free = [(p.name, p.lower, p.upper) for p in model.free_parameters]
+        seen.update(repr((name, free)).encode())
         lin = model.linearise(model.values, [p.name for p in model.free_parameters])
         for matrix in (*lin.at, *lin.derivative):
             seen.update(np.ascontiguousarray(matrix).tobytes())
     f = np.linspace(0, 0.5 / setting.base_dt, 97)
     for spectrum in {r.spectrum_label: r.spectrum for r in rows}.values():
         try:
-            for array in (spectrum.density(f, setting.base_dt), *spectrum.lines(setting.base_dt)):
+            dt = setting.base_dt
+            for array in (spectrum.density(f, dt), spectrum.edges(dt), *spectrum.lines(dt)):
                 seen.update(np.ascontiguousarray(array).tobytes())
         except ValueError as error:
             seen.update(str(error).encode())
     for row in rows:
         labels = (row.plant_label, row.spectrum_label, row.hold_label, row.factor)
         seen.update(repr(labels).encode())
+    for factor in sorted({row.factor for row in rows}):
+        dt = setting.base_dt * factor
+        weight = weight_of(f / factor, dt, setting.prefilter, setting.noise_model)
+        seen.update(weight.tobytes())
     shared = (setting.true_hold, setting.base_dt, setting.band, setting.antialias, chunk)
     seen.update(repr(shared).encode())
     return seen.hexdigest()

@@ -92,9 +92,8 @@ class State:
         values = ", ".join(f"{k}={v:g}" for k, v in moved.items())
         plant = f"fq.{self.plant.replace('-', '_')}({values})"
         u = f"fq.chirp({self.low:g}, {self.high:g}, duration={DURATION:g}, dt={T1:g})"
-        band = f"({self.low:g}, {min(self.high, 0.5 / (T1 * self.factor)):g})"
         if self.sine:
-            u, band = f"fq.sine({self.sine:g}, duration={DURATION:g}, dt={T1:g})", "None"
+            u = f"fq.sine({self.sine:g}, duration={DURATION:g}, dt={T1:g})"
         lines = [
             "import freqid as fq",
             "",
@@ -107,9 +106,22 @@ class State:
         if self.factor > 1:
             lines.append(f"record = record.decimate({self.factor})")
         model = "fq.OutputError(3)" if self.hold == "black box" else "plant"
-        hold = "" if self.hold == "remembered" else f', hold="{self._assumed() or "zoh"}"'
-        lines += [f"est = fq.fit({model}, record, band={band}{hold})", "print(est)"]
+        low, high = self.band(T1 * self.factor, DURATION)
+        options = f"band=({low:.9g}, {high:.9g}), n_starts=1"
+        if self._assumed() is not None:
+            options += f', hold="{self._assumed()}"'
+        if self.sine:
+            options += ', initial_state="steady"'
+        lines += [f"est = fq.fit({model}, record, {options})", "print(est)"]
         return "\n".join(lines)
+
+    def band(self, dt: float, duration: float) -> tuple[float, float]:
+        """What is fitted, in Hz: the sine's line, or the chirp as far as ``dt`` (s) lets it."""
+        if self.sine:
+            near = 1.5 / duration
+            return self.sine - near, self.sine + near
+        top = min(self.high, 0.5 / dt * 0.999)
+        return min(self.low, 0.8 * top), top
 
     def _assumed(self) -> str | None:
         known = {"remembered": None, "black box": "zoh"}
@@ -190,11 +202,7 @@ def scene(state: State, record: Record | None = None) -> Scene:
     except ValueError as error:
         return Scene(state, fast, fast, None, str(error), as_hold(assumed, fast.dt, fast.hold))
     hold = as_hold(assumed, slow.dt, slow.hold)
-    top = min(state.high, slow.nyquist * 0.999)
-    band = (min(state.low, 0.8 * top), top)
-    if state.sine:
-        near = 1.5 / slow.duration
-        band = (state.sine - near, state.sine + near)
+    band = state.band(slow.dt, slow.duration)
     spec: Any = OutputError(3) if state.hold == "black box" else model
     try:
         # the start is near enough that one is enough: it is the true plant

@@ -111,6 +111,11 @@ def test_an_interrupted_map_goes_on_where_it_was(plant, tmp_path, monkeypatch, t
     pd.testing.assert_frame_equal(again, resumed)
     with pytest.raises(ValueError, match="another path"):
         fq.bias_map(plant, chirps(), [2, 5], ["zoh", "foh", None], **ask)
+    for other in ({"prefilter": ([0.1], [1, -0.9])}, {"band": (10, 30)}):
+        with pytest.raises(ValueError, match="another path"):
+            fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], **ask, **other)
+    with pytest.raises(ValueError, match="another path"):
+        fq.bias_map(plant.fix("fm"), chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
 
 
 def test_a_cluster_that_loses_a_worker_gives_the_same_table(plant):

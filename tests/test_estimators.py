@@ -42,6 +42,13 @@ def test_h1_is_that_of_scipy(fast, window):
     assert np.allclose(np.angle(both / frf.response[0, 0]), 0, atol=1e-7)
 
 
+def test_a_window_may_be_an_array(fast):
+    by_name = fq.h1(fast, 4000, window="hann")
+    by_array = fq.h1(fast, 4000, window=scipy.signal.get_window("hann", 4000))
+    assert np.allclose(by_name.response, by_array.response)
+    assert np.allclose(by_name.variance, by_array.variance)
+
+
 def test_noise_on_either_end(light):
     """Noise on the input biases H1 down and not H2; on the output the other way round."""
     u = fq.white_noise(200_000, seed=1)

@@ -271,6 +271,7 @@ def test_every_preset_and_every_code_runs(tmp_path, monkeypatch):
         assert shown.estimate is not None, shown.message
         names: dict = {}
         exec(compile(state.code(), "explorer", "exec"), names)
+        assert np.allclose(names["est"].values, shown.estimate.values, rtol=1e-6)
     figure4 = scene(presets()["Figure 4: the lag estimated at 50 rad/s"]).estimate
     assert figure4["b"] == pytest.approx(135.1, rel=0.01)
 
