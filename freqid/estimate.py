@@ -52,9 +52,10 @@ class Estimate:
     warnings: list[str] = field(default_factory=list)
     # the cost that was minimised, for what asks for more than its least point
     problem: Any = field(default=None, repr=False)
-    # the data, the band (Hz) and the call that made the estimate, for reports of it
+    # the data, the band (Hz), the weights and the call that made the estimate, for reports of it
     data: Sequence[Any] = ()
     band: tuple[float, float] | None = None
+    weights: Any = None
     call: str = ""
 
     def __getitem__(self, name: str) -> float:

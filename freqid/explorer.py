@@ -213,7 +213,7 @@ def _wire(dash: Any, app: Any, record: Record | None) -> None:
         text, doubt = _sentence(shown)
         return (
             bode_figure(shown), nyquist_figure(shown), time_figure(shown), bias_figure(shown),
-            text, "verdict doubt" if doubt else "verdict", state.code(), state.query(),
+            text, "verdict doubt" if doubt else "verdict", state.code(record), state.query(),
             state.query(),
         )  # fmt: skip
 
@@ -234,9 +234,9 @@ def _sentence(shown: Scene) -> tuple[str, bool]:
     # a sign that is impossible says more than any percentage
     worst = min(away, key=lambda n: (est[n] * truth[n] > 0, -abs(away[n])))
     text = (
-        f"{worst} = {est[worst]:.4g} where {truth[worst]:.4g} is true"
+        f"{worst} = {est[worst]:.4g} where {truth[worst]:.4g} is {shown.truth}"
         if abs(away[worst]) > 1e-3
-        else "Every parameter is right to a tenth of a per cent"
+        else f"Every parameter is {shown.truth} to a tenth of a per cent"
     )
     return f"{text}. {shown.message}".strip(), bool(est.warnings)
 

@@ -114,7 +114,7 @@ def bias_figure(shown: Scene) -> dict[str, Any]:
              "text": text, "textposition": "outside", "marker": {"color": colours},
              "error_y": bars, "cliponaxis": False, "showlegend": False}]  # fmt: skip
     reach = max(1.25 * max(abs(r - 1) for r in ratio), 0.05)
-    layout = _base("Parameters: estimate over true value, less one") | {
+    layout = _base(f"Parameters: estimate over {shown.truth} value, less one") | {
         "yaxis": {"title": {"text": "relative error"}, "tickformat": ".0%",
                   "range": [-reach, reach]},
     }  # fmt: skip

@@ -86,8 +86,8 @@ class State:
         plant = PLANTS[self.plant]()
         return plant.with_values(**{k: plant[k] * v for k, v in self.factors.items() if v != 1})
 
-    def code(self) -> str:
-        """The Python lines that make what is shown."""
+    def code(self, record: Record | None = None) -> str:
+        """The Python lines that make what is shown, from the simulation or from a ``record``."""
         moved = {k: self.model()[k] for k, v in self.factors.items() if v != 1}
         values = ", ".join(f"{k}={v:g}" for k, v in moved.items())
         plant = f"fq.{self.plant.replace('-', '_')}({values})"
@@ -101,12 +101,15 @@ class State:
             f"u = {u}",
             f"record = fq.simulate(plant, u, dt={T1:g})",
         ]
-        if self.noise:
+        if record is not None:
+            lines = [*lines[:3], "record = fq.read(...)  # your file"]
+        elif self.noise:
             lines.append(f"record = record.with_noise({self.noise:g} * record.y.std())")
         if self.factor > 1:
             lines.append(f"record = record.decimate({self.factor})")
         model = "fq.OutputError(3)" if self.hold == "black box" else "plant"
-        low, high = self.band(T1 * self.factor, DURATION)
+        dt, duration = (T1, DURATION) if record is None else (record.dt, record.duration)
+        low, high = self.band(dt * self.factor, duration)
         options = f"band=({low:.9g}, {high:.9g}), n_starts=1"
         if self._assumed() is not None:
             options += f', hold="{self._assumed()}"'
@@ -157,17 +160,26 @@ class Scene:
     estimate: Estimate | None
     message: str
     hold: Hold
+    measured: bool = False
+
+    @property
+    def truth(self) -> str:
+        """What the plant of the sliders is: the true one, or beside one's own record a nominal."""
+        return "nominal" if self.measured else "true"
 
     def responses(self) -> dict[str, FrequencyResponse]:
         """True plant at both rates and the estimate, up to the slow Nyquist limit."""
         dt = self.slow.dt
         f = _frequencies(self.state.model(), self.state, 0.5 / dt)
         omega, plant = 2 * np.pi * f, self.state.model()
+        held = self.fast.input_dt
         found = {
-            f"true, ZOH at {1e3 * T1:g} ms": plant.frequency_response(omega, ZeroOrderHold(T1)),
+            f"{self.truth}, ZOH at {1e3 * held:g} ms": plant.frequency_response(
+                omega, ZeroOrderHold(held)
+            ),
         }
         if self.state.factor > 1:
-            found[f"true, ZOH at {1e3 * dt:g} ms"] = plant.frequency_response(
+            found[f"{self.truth}, ZOH at {1e3 * dt:g} ms"] = plant.frequency_response(
                 omega, ZeroOrderHold(dt)
             )
         if self.estimate is not None:
@@ -200,7 +212,8 @@ def scene(state: State, record: Record | None = None) -> Scene:
     try:
         slow = fast.decimate(state.factor) if state.factor > 1 else fast
     except ValueError as error:
-        return Scene(state, fast, fast, None, str(error), as_hold(assumed, fast.dt, fast.hold))
+        between = as_hold(assumed, fast.dt, fast.hold)
+        return Scene(state, fast, fast, None, str(error), between, record is not None)
     hold = as_hold(assumed, slow.dt, slow.hold)
     band = state.band(slow.dt, slow.duration)
     spec: Any = OutputError(3) if state.hold == "black box" else model
@@ -209,9 +222,9 @@ def scene(state: State, record: Record | None = None) -> Scene:
         est = fit(spec, slow, hold=hold, band=band, n_starts=1,
                   initial_state="steady" if state.sine else "estimate")  # fmt: skip
         message = "; ".join(est.warnings)
-        return Scene(state, fast, slow, est, message, hold)
+        return Scene(state, fast, slow, est, message, hold, record is not None)
     except ValueError as error:
-        return Scene(state, fast, slow, None, str(error), hold)
+        return Scene(state, fast, slow, None, str(error), hold, record is not None)
 
 
 def _frequencies(model: GreyBox, state: State, nyquist: float) -> FloatArray:

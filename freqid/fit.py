@@ -130,7 +130,7 @@ def fit(
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
     }  # fmt: skip
     call = _call(model, len(sets), given)
-    return dataclasses.replace(est, data=tuple(sets), band=band, call=call)
+    return dataclasses.replace(est, data=tuple(sets), band=band, weights=weights, call=call)
 
 
 def _call(model: Any, count: int, given: Mapping[str, Any]) -> str:

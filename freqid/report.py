@@ -103,7 +103,7 @@ def _bias(est: Estimate) -> dict[str, float]:
     if all(r.hold == est.hold for r in records) or "hold_period" in est.names:
         return {}
     try:
-        return dict(hold_bias(est, records, band=est.band)["bias"])
+        return dict(hold_bias(est, records, band=est.band, weights=est.weights)["bias"])
     except ValueError:
         return {}
 

@@ -28,9 +28,9 @@ _LEVEL = 0.01
 class Comparison:
     """A model beside a record.
 
-    ``simulated`` and ``residuals`` = measured − simulated are shaped like ``record.y``, whose part
-    in the band ``measured`` (N, outputs) is;
-    ``fit_percent`` (outputs,) is 100·(1 − ‖residual‖/‖y − mean‖), the normalised root mean square.
+    ``measured`` (N, outputs) is the record's output, or its part in the band; ``simulated`` and
+    ``residuals`` = measured − simulated are shaped like ``record.y``; ``fit_percent`` (outputs,)
+    is 100·(1 − ‖residual‖/‖y − mean‖), the normalised root mean square.
     """
 
     record: Record
@@ -81,9 +81,7 @@ def compare(
     """
     if not isinstance(record, Record):
         raise ValueError(f"record={type(record).__name__} is not a Record; compare them one by one")
-    inner = getattr(model, "model", model)
-    if hold is None and hasattr(inner, "matrices") and hasattr(inner, "hold"):
-        hold = inner.hold
+    hold = _own_hold(model, hold)
     errors = line_errors(model, record, hold, None, initial_state)
     residual = -time_errors(errors, record)
     y = record.outputs[: len(residual)]
@@ -128,9 +126,7 @@ def residual_test(
     lags = whole("lags", lags)
     if record.n_samples < 4 * lags:
         raise ValueError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
-    inner = getattr(model, "model", model)
-    if hold is None and hasattr(inner, "matrices") and hasattr(inner, "hold"):
-        hold = inner.hold
+    hold = _own_hold(model, hold)
     errors = line_errors(model, record, hold, None)
     e = -time_errors(errors, record)
     u = record.inputs[:: record.factor][: len(e)]
@@ -196,6 +192,13 @@ def _row(
     }  # fmt: skip
 
 
+def _own_hold(model: Any, hold: Hold | str | None) -> Hold | str | None:
+    """The hold asked for, or the one that a sampled model has inside."""
+    inner = getattr(model, "model", model)
+    sampled = hasattr(inner, "matrices") and hasattr(inner, "hold")
+    return inner.hold if hold is None and sampled else hold
+
+
 def _inside(x: FloatArray, dt: float, band: tuple[float, float]) -> FloatArray:
     """The part of signals (N, channels) inside a band in Hz."""
     X, f = np.fft.rfft(x, axis=0), np.fft.rfftfreq(len(x), dt)
@@ -232,11 +235,16 @@ def cost_test(est: Estimate) -> dict[str, float]:
 
 
 def hold_bias(
-    est: Estimate, data: Record | Sequence[Record], *, band: tuple[float, float] | None = None
+    est: Estimate,
+    data: Record | Sequence[Record],
+    *,
+    band: tuple[float, float] | None = None,
+    weights: Any = None,
 ) -> pd.DataFrame:
     """The bias bar: what the assumed hold has added to each parameter of a grey-box estimate.
 
-    The same model is fitted with the hold that the records remember; ``bias`` is the estimate less
+    The same model is fitted with the hold that the records remember, ``band`` and ``weights`` being
+    those of the estimate; ``bias`` is the estimate less
     that, to be drawn beside ``std``, the error bar of the noise. Columns estimate, remembered,
     bias and std; the ratio of bias to std says which of the two rules.
     """
@@ -246,7 +254,7 @@ def hold_bias(
     nominal = dict(zip(est.names, est.nominal, strict=True))
     usable = {n: v for n, v in nominal.items() if n in start and np.isfinite(v)}
     model = est.model.with_values(**usable)
-    remembered = fit(model, data, band=band)
+    remembered = fit(model, data, band=band, weights=weights)
     names = [n for n in est.names if n in remembered.names]
     index = pd.Index(names, name="parameter")
     estimate = pd.Series([est[n] for n in names], index=index)

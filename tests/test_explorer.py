@@ -138,7 +138,7 @@ def test_the_slider_shows_a_negative_damping_and_the_cure(browser, address):
     from selenium.webdriver.common.keys import Keys
 
     browser.get(address)
-    until(browser, f"{VERDICT}.includes('right to a tenth')", "the page")
+    until(browser, f"{VERDICT}.includes('true to a tenth')", "the page")
     shot(browser, "explorer_start")
     press(browser, "factor", Keys.ARROW_RIGHT, 9)
     until(browser, f"{VERDICT}.startsWith('d = -2')", "the negative damping")
@@ -283,6 +283,10 @@ def test_an_own_record_takes_the_place_of_the_simulated_one():
     shown = scene(State(factor=10), record)
     assert shown.slow.n_samples == 400
     assert shown.estimate["d"] < 0
+    # nobody knows what is true of somebody's own record
+    assert all(name.startswith(("nominal", "estimate")) for name in shown.responses())
+    assert "fq.read(" in shown.state.code(record)
+    assert "simulate" not in shown.state.code(record)
 
 
 def test_a_record_of_one_sample_is_no_crash():
