@@ -21,6 +21,7 @@ from freqid.preparation import Options
 from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.residuals import experiment_length, line_errors
+from freqid.threads import in_one_blas_thread
 from freqid.transfer_fit import fit_transfer_function
 from freqid.transfer_functions import TransferFunction
 
@@ -29,6 +30,7 @@ _NOISE_ROUNDS = 4
 _STANDS = 0.01
 
 
+@in_one_blas_thread
 def fit(
     model: Any,
     data: Record | FrequencyResponse | Sequence[Record | FrequencyResponse],
