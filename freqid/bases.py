@@ -76,7 +76,7 @@ class EigenBasis:
     def _powers(self, period: float, lift: int) -> tuple[ComplexArray, ComplexArray]:
         """Φ^k and its derivatives for k = 0 … lift, from exp(A k·period) at once."""
         times = period * np.arange(lift + 1)
-        value, difference = phi_functions(self.eigenvalues * times[:, None], second=False)
+        value, difference = phi_functions(self.eigenvalues * times[:, None])
         change = (times[:, None, None] * difference[0])[:, None] * self.dA
         return value[0], change
 
@@ -94,8 +94,8 @@ class EigenBasis:
         """
         before, rest = fraction * period, (1 - fraction) * period
         whole = self.through(ZeroOrderHold(period))
-        value, difference = phi_functions(self.eigenvalues * rest, second=False)
-        early, dearly = phi_functions(self.eigenvalues * before, second=False)
+        value, difference = phi_functions(self.eigenvalues * rest)
+        early, dearly = phi_functions(self.eigenvalues * before)
         gamma0, dgamma0 = self._input(rest * value[1], rest**2 * difference[1])
         shift, dshift = value[0], rest * difference[0]
         g, dg = before * early[1], before**2 * dearly[1]

@@ -13,6 +13,7 @@ where Γ⁺ is zero under a zero-order hold.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,17 +33,18 @@ class Sampled(NamedTuple):
 class ModalSampled(NamedTuple):
     """What a hold makes of an eigenvalue λ of A, and the divided differences of that.
 
-    φ = exp(λ h); γ and γ⁺ multiply the rows of V⁻¹B. ``d…`` (…, n, n) are the divided differences
+    φ = exp(λ h); γ and γ⁺ (None under a zero-order hold) multiply the rows of V⁻¹B. ``d…``
+    (…, n, n) are the divided differences
     f[λi, λj], the factors of the Fréchet derivative in the eigenbasis (Higham, Functions of
     Matrices, 2008, theorem 3.11).
     """
 
     phi: ComplexArray
     gamma: ComplexArray
-    gamma_next: ComplexArray
+    gamma_next: Any
     dphi: ComplexArray
     dgamma: ComplexArray
-    dgamma_next: ComplexArray
+    dgamma_next: Any
 
 
 @dataclass(frozen=True)
@@ -103,16 +105,16 @@ class PeriodicHold(Hold):
     def modal(self, eigenvalues: ComplexArray) -> ModalSampled:
         """φ, γ, γ⁺ and their divided differences at the eigenvalues of A, (…, n) in rad/s."""
         h = self.period
-        value, difference = phi_functions(eigenvalues * h, second=self.name == "foh")
+        value, difference = phi_functions(eigenvalues * h)
         gamma, gamma_next = self._weights(value)
         dgamma, dgamma_next = self._weights(difference)
         return ModalSampled(
             value[0],
             h * gamma,
-            h * gamma_next,
+            None if gamma_next is None else h * gamma_next,
             h * difference[0],
             h**2 * dgamma,
-            h**2 * dgamma_next,
+            None if dgamma_next is None else h**2 * dgamma_next,
         )
 
     def _generator(self, A: FloatArray, B: FloatArray) -> FloatArray:
@@ -121,7 +123,7 @@ class PeriodicHold(Hold):
     def _blocks(self, exponential: FloatArray, n: int, m: int) -> Sampled:
         raise NotImplementedError
 
-    def _weights(self, phi: tuple[ComplexArray, ...]) -> tuple[ComplexArray, ComplexArray]:
+    def _weights(self, phi: tuple[ComplexArray, ...]) -> tuple[ComplexArray, Any]:
         raise NotImplementedError
 
 
@@ -150,8 +152,8 @@ class ZeroOrderHold(PeriodicHold):
         gamma = exponential[..., :n, n : n + m]
         return Sampled(exponential[..., :n, :n], gamma, np.zeros_like(gamma))
 
-    def _weights(self, phi: tuple[ComplexArray, ...]) -> tuple[ComplexArray, ComplexArray]:
-        return phi[1], np.zeros_like(phi[1])
+    def _weights(self, phi: tuple[ComplexArray, ...]) -> tuple[ComplexArray, Any]:
+        return phi[1], None
 
 
 @dataclass(frozen=True)
@@ -178,7 +180,7 @@ class FirstOrderHold(PeriodicHold):
         ramp = exponential[..., :n, n + m : n + 2 * m]
         return Sampled(exponential[..., :n, :n], exponential[..., :n, n : n + m] - ramp, ramp)
 
-    def _weights(self, phi: tuple[ComplexArray, ...]) -> tuple[ComplexArray, ComplexArray]:
+    def _weights(self, phi: tuple[ComplexArray, ...]) -> tuple[ComplexArray, Any]:
         return phi[1] - phi[2], phi[2]
 
 
@@ -201,20 +203,25 @@ def _checked(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
     return A, B
 
 
-# eight Gauss-Legendre nodes integrate exp(xs) on [0, 1] to rounding for |x| <= 1
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+# below this size the integrals of φ are summed, above it their recurrences are stable; ten
+# Gauss-Legendre nodes integrate exp(xs) on [0, 1] to rounding for |x| < 4
+_NEAR = 4.0
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
+# what turns exp(xs) at the nodes, and at s = 1, into φ0, φ1' and φ2', and then φ1 and φ2
+_AT = np.append(_NODES, 1.0)
+_SUMS = np.zeros((5, len(_AT)), complex)
+_SUMS[0, -1] = 1
+_SUMS[1, :-1], _SUMS[2, :-1] = _WEIGHTS * _NODES, _WEIGHTS * _NODES * (1 - _NODES)
+_SUMS[3, :-1], _SUMS[4, :-1] = _WEIGHTS, _WEIGHTS * (1 - _NODES)
 
 
-def phi_functions(
-    x: ComplexArray, second: bool = True
-) -> tuple[tuple[ComplexArray, ...], tuple[ComplexArray, ...]]:
+def phi_functions(x: ComplexArray) -> tuple[tuple[ComplexArray, ...], tuple[ComplexArray, ...]]:
     """φ0 = e^x, φ1 = ∫e^{xs}ds, φ2 = ∫(1−s)e^{xs}ds over [0, 1], and their divided differences.
 
-    Args: x (…, n), complex; ``second`` says whether φ2 is wanted. Returns three (…, n) arrays and
-    three (…, n, n) arrays. Where an argument is of size 1 or more the recurrences x φ1 = φ0 − 1,
-    x φ2 = φ1 − 1 (and their divided differences) are stable; nearer zero they cancel, and the
-    integrals are summed instead.
+    Args: x (…, n), complex. Returns three (…, n) arrays and three (…, n, n) arrays. Where an
+    argument is large the recurrences x φ1 = φ0 − 1, x φ2 = φ1 − 1 (and their divided differences)
+    are stable; nearer zero they cancel, and the integrals are summed instead.
 
     >>> value, difference = phi_functions(np.array([0.0, 1.0]))
     >>> bool(np.isclose(difference[0][0, 1], np.e - 1)), bool(np.isclose(difference[1][0, 0], 0.5))
@@ -222,70 +229,76 @@ def phi_functions(
     """
     x = np.asarray(x, dtype=complex)
     size = np.abs(x)
+    if size.max(initial=0) < _NEAR:
+        return _summed(x)
+    near = size < _NEAR
+    inside_value, inside = _summed(np.where(near, x, 0))
+    value = _recurred_values(x, inside_value, near)
+    both = near[..., :, None] & near[..., None, :]
+    outside = _recurred_differences(x, value, size)
+    difference = (np.where(both, i, o) for i, o in zip(inside, outside, strict=True))
+    return value, tuple(difference)
+
+
+@cache
+def _pairs(n: int) -> tuple[Any, Any, Any, Any]:
+    """First and second of the pairs i ≤ j, where each (i, j) and each (i, i) stand among them."""
+    first, second = np.triu_indices(n)
+    place = np.zeros((n, n), int)
+    place[first, second] = place[second, first] = np.arange(len(first))
+    return first, second, place, np.diag(place)
+
+
+def _summed(x: ComplexArray) -> tuple[tuple[ComplexArray, ...], tuple[ComplexArray, ...]]:
+    """By sums over the nodes: f[a, b] = ∫ s w(s) e^{s(a+b)/2} sinhc(s(a−b)/2) ds, f = ∫ w e^{sa}.
+
+    At a = b the integrand of the difference is that of the function itself, but for the factor s.
+    """
+    first, second, place, own = _pairs(x.shape[-1])
+    a, b = x.take(first, -1), x.take(second, -1)
+    half, middle = (a - b) / 2, (a + b) / 2
+    at = _AT[:, None]
+    sums = _SUMS @ (np.exp(middle[..., None, :] * at) * _sinhc(half[..., None, :] * at))
+    d = sums.take(place, -1)
+    value = sums.take(own, -1)
+    return (
+        (value[..., 0, :], value[..., 3, :], value[..., 4, :]),
+        (d[..., 0, :, :], d[..., 1, :, :], d[..., 2, :, :]),
+    )
+
+
+def _recurred_values(
+    x: ComplexArray, inside: tuple[ComplexArray, ...], near: Array
+) -> tuple[ComplexArray, ...]:
+    """φ0, φ1, φ2 by recurrence, but where x is near zero."""
+    safe = np.where(near, 1, x)
+    phi0 = np.exp(x)
+    phi1 = np.where(near, inside[1], (phi0 - 1) / safe)
+    return phi0, phi1, np.where(near, inside[2], (phi1 - 1) / safe)
+
+
+def _recurred_differences(
+    x: ComplexArray, value: tuple[ComplexArray, ...], size: FloatArray
+) -> list[ComplexArray]:
+    """Differences by recurrence: y f[x, y] = g[x, y] − f(x) with y the larger."""
     a, b = x[..., :, None], x[..., None, :]
     half, middle = (a - b) / 2, (a + b) / 2
-    phi0 = np.exp(x)
     if np.abs(x.real).max(initial=0) < 300:
-        d0 = np.exp(middle) * _sinhc(half)
+        previous = np.exp(middle) * _sinhc(half)
     else:
         close = np.abs(half) < 0.5
-        near = np.exp(np.where(close, middle, 0)) * _sinhc(np.where(close, half, 0))
+        beside = np.exp(np.where(close, middle, 0)) * _sinhc(np.where(close, half, 0))
         gap = np.where(close, 1, 2 * half)
-        d0 = np.where(close, near, (phi0[..., :, None] - phi0[..., None, :]) / gap)
-    small = size < 1
-    if small.all():
-        value = _summed(x, second)
-        difference = _summed_differences(half, middle, second)
-    else:
-        value, difference = _recurred(x, phi0, d0, size, second)
-        if small.any():
-            inside = _summed(np.where(small, x, 0), second)
-            value = tuple(np.where(small, i, v) for i, v in zip(inside, value, strict=True))
-            value, difference = _recurred(x, phi0, d0, size, second, value)
-            both = small[..., :, None] & small[..., None, :]
-            inside = _summed_differences(np.where(both, half, 0), np.where(both, middle, 0), second)
-            difference = tuple(
-                np.where(both, i, d) for i, d in zip(inside, difference, strict=True)
-            )
-    return (phi0, *value), (d0, *difference)
-
-
-def _summed(x: ComplexArray, second: bool) -> tuple[ComplexArray, ...]:
-    """φ1 and φ2 by Gauss-Legendre sums, for |x| < 1."""
-    near = np.exp(x[..., None] * _NODES)
-    return near @ _WEIGHTS, near @ (_WEIGHTS * (1 - _NODES)) if second else x
-
-
-def _summed_differences(
-    half: ComplexArray, middle: ComplexArray, second: bool
-) -> tuple[ComplexArray, ...]:
-    """φ1[a, b] = ∫ s e^{s(a+b)/2} sinhc(s(a−b)/2) ds, and the same with s(1−s) for φ2."""
-    kernel = np.exp(middle[..., None] * _NODES) * _sinhc(half[..., None] * _NODES)
-    first = kernel @ (_WEIGHTS * _NODES)
-    return first, kernel @ (_WEIGHTS * _NODES * (1 - _NODES)) if second else first
-
-
-def _recurred(
-    x: ComplexArray,
-    phi0: ComplexArray,
-    d0: ComplexArray,
-    size: FloatArray,
-    second: bool,
-    value: tuple[ComplexArray, ...] | None = None,
-) -> tuple[tuple[ComplexArray, ...], tuple[ComplexArray, ...]]:
-    """φ1, φ2 and differences by recurrence; y f[x, y] = g[x, y] − f(x) with y the larger."""
-    if value is None:
-        safe = np.where(size < 1, 1, x)
-        phi1 = (phi0 - 1) / safe
-        value = phi1, (phi1 - 1) / safe if second else phi1
+        phi0 = value[0]
+        previous = np.where(close, beside, (phi0[..., :, None] - phi0[..., None, :]) / gap)
     swap = size[..., :, None] > size[..., None, :]
-    larger = np.where(swap, x[..., :, None], x[..., None, :])
+    larger = np.where(swap, a, b)
     larger = np.where(np.abs(larger) < 1, 1, larger)
-    differences, previous = [], d0
-    for f in value if second else value[:1]:
+    differences = [previous]
+    for f in value[1:]:
         previous = (previous - np.where(swap, f[..., None, :], f[..., :, None])) / larger
         differences.append(previous)
-    return value, (*differences,) if second else (differences[0], differences[0])
+    return differences
 
 
 def _sinhc(x: ComplexArray) -> ComplexArray:
