@@ -7,8 +7,8 @@ the same descent follows. ``error`` is the cost of the start over the best cost 
 ``end`` the same after the descent, with the evaluations it took. Subspace: freqid's own (McKelvey,
 Akçay and Ljung 1996). SK: twenty Sanathanan-Koerner iterations with a transient polynomial, in
 polynomials made orthogonal on the lines (Stieltjes' procedure). AAA: scipy.interpolate.AAA of the
-empirical response, which has no place for a transient. Both: what freqid does, subspace refined by
-a few Sanathanan-Koerner iterations.
+empirical response, which has no place for a transient. Both: what freqid does, subspace poles
+refined by a few Sanathanan-Koerner and then Gauss-Newton steps in orthonormal polynomials.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ import scipy.interpolate
 import scipy.linalg
 
 import freqid as fq
-from freqid.black_box import _descend, line_points
+from freqid.black_box import _descend, lines_in_plane
 from freqid.charts import Chart
 from freqid.optimise import Objective
-from freqid.preparation import Options, prepare
+from freqid.preparation import Options
 from freqid.refinement import first_model
 from freqid.sampled_plant import StateSpace
-from freqid.subspace import identify, inputs_of, plane_for
+from freqid.subspace import identify, inputs_of
 
 
 def modes(frequencies, dampings):
@@ -148,8 +148,7 @@ METHODS = {
 
 def compare(record, order, hold, band):
     options = Options(hold, band)
-    plane = plane_for(line_points([record], (1, 1), options))
-    experiment, _ = prepare(record, (1, 1), None, options, plane)
+    (experiment,), _, plane = lines_in_plane([record], (1, 1), [None], options)
     found = {}
     for name, method in METHODS.items():
         try:

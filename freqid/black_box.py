@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from freqid.charts import Chart
-from freqid.checks import ComplexArray, FloatArray
+from freqid.checks import FloatArray
 from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
-from freqid.holds import FirstOrderHold, PeriodicHold
+from freqid.holds import FirstOrderHold, Hold, PeriodicHold
 from freqid.optimise import Objective, Problem, Solution, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
-from freqid.rational import DiscreteModel, OutputError
+from freqid.rational import DiscreteModel, OutputError, coefficients_of
 from freqid.refinement import first_model
 from freqid.responses import Plane
 from freqid.subspace import plane_for
@@ -39,10 +39,8 @@ def fit_black_box(
         prepare(sets[0], (0, 0), None, options)
     names = sets[0].input_names, sets[0].output_names
     shape = len(names[1]), len(names[0])
-    plane = plane_for(line_points(sets, shape, options))
     spectral = Options(options.hold, options.band, _without_zero(options.initial_state))
-    pairs = [prepare(d, shape, w, spectral, plane) for d, w in zip(sets, weights, strict=True)]
-    lines = [e for e, _ in pairs if isinstance(e, SpectralExperiment)]
+    lines, hold, plane = lines_in_plane(sets, shape, weights, spectral)
     n_parameters = spec.order * sum(shape) + spec.feedthrough * shape[0] * shape[1]
     enough_rows(lines, n_parameters)
     first = Chart(first_model(lines, spec.order, spec.feedthrough), spec.feedthrough, plane)
@@ -54,7 +52,6 @@ def fit_black_box(
         chart, solution, objective = _descend(
             Chart(centre, spec.feedthrough, Plane()), [e for e, _ in pairs]
         )
-    hold = pairs[0][1]
     dt = hold.period if isinstance(hold, PeriodicHold) else input_dt(sets[0])
     return _estimate(chart, solution, objective, hold, dt, names)
 
@@ -74,10 +71,8 @@ def reference_cost(
     if any(getattr(d, "factor", 1) > 1 for d in sets):
         return None
     try:
-        plane = plane_for(line_points(sets, shape, options))
-        pairs = [prepare(d, shape, w, options, plane) for d, w in zip(sets, weights, strict=True)]
-        lines = [e for e, _ in pairs if isinstance(e, SpectralExperiment)]
-        direct = feedthrough or isinstance(pairs[0][1], FirstOrderHold)
+        lines, hold, plane = lines_in_plane(sets, shape, weights, options)
+        direct = feedthrough or isinstance(hold, FirstOrderHold)
         chart = Chart(first_model(lines, order, direct), direct, plane)
         solution = minimise(Objective(chart, lines), np.zeros(chart.size), limit=12)
     except (ValueError, np.linalg.LinAlgError):
@@ -105,15 +100,20 @@ def input_dt(data: Any) -> float:
     return float(getattr(data, "input_dt", data.dt))
 
 
-def line_points(sets: Sequence[Any], shape: tuple[int, int], options: Options) -> ComplexArray:
-    """z at the lines of the first experiment, to choose the plane by."""
-    spectral = Options(options.hold, options.band, "steady")
-    experiment, _ = prepare(sets[0], shape, None, spectral, Plane())
-    assert isinstance(experiment, SpectralExperiment)
-    if experiment.aliases == 1:
-        return experiment.z
-    power = np.abs(experiment.U).sum(axis=(0, 1)).reshape(-1, experiment.aliases)
-    return experiment.z.reshape(power.shape)[np.arange(len(power)), power.argmax(axis=1)]
+def lines_in_plane(
+    sets: Sequence[Any], shape: tuple[int, int], weights: Sequence[Any], options: Options
+) -> tuple[list[SpectralExperiment], Hold, Plane]:
+    """The experiments of a sampled model, in the plane over which the first one's lines spread."""
+    pairs = [prepare(d, shape, w, options, Plane()) for d, w in zip(sets, weights, strict=True)]
+    lines = [e for e, _ in pairs if isinstance(e, SpectralExperiment)]
+    z = lines[0].z
+    if lines[0].aliases > 1:
+        # of each line the alias with the most energy
+        z = z.reshape(-1, lines[0].aliases)
+        power = np.abs(lines[0].U).sum(axis=(0, 1)).reshape(z.shape)
+        z = z[np.arange(len(z)), power.argmax(axis=1)]
+    plane = plane_for(z)
+    return [e.in_plane(plane) for e in lines], pairs[0][1], plane
 
 
 def _descend(chart: Chart, experiments: Sequence[Any]) -> tuple[Chart, Solution, Objective]:
@@ -150,7 +150,8 @@ def _estimate(
 
     return coefficient_estimate(
         at(solution.x),
-        lambda x: at(x).coefficients(),
+        at(solution.x).coefficients()[0],
+        lambda points: coefficients_of(chart.in_z(points)),
         np.ones(chart.size),
         solution,
         objective,
@@ -161,18 +162,22 @@ def _estimate(
 
 def coefficient_estimate(
     model: Any,
-    coefficients: Callable[[FloatArray], tuple[list[str], FloatArray]],
+    names: list[str],
+    coefficients: Callable[[FloatArray], FloatArray],
     scale: FloatArray,
     solution: Solution,
     objective: Objective,
     hold: Any,
     dt: float,
 ) -> Estimate:
-    """An Estimate whose parameters are coefficients: smooth functions of the unknowns x."""
+    """An Estimate whose parameters are coefficients: smooth functions of the unknowns x.
+
+    ``coefficients`` gives them at many points, (S, unknowns) to (S, names).
+    """
     point, step = solution.point, 1e-7
-    names, values = coefficients(solution.x)
-    moved = [coefficients(solution.x + s)[1] for s in step * np.eye(len(scale))]
-    change = (np.array(moved) - values).T / step
+    moved = np.concatenate([np.zeros((1, len(scale))), step * np.eye(len(scale))])
+    values, *others = coefficients(solution.x + moved)
+    change = (np.array(others) - values).T / step
     noise = noise_variance(objective, point, len(scale))
     half = change @ np.linalg.pinv(point.jacobian)
     return Estimate(

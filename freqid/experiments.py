@@ -238,6 +238,16 @@ class SpectralExperiment:
         scale = np.broadcast_to(np.sqrt(weights), frf.response.shape)
         return cls(frf.omega, frf.omega, U, frf.response, scale, hold, None, plane=plane)
 
+    def in_plane(self, plane: Plane) -> SpectralExperiment:
+        """The same lines of a sampled model, in z until now, seen in another plane."""
+        other = copy.copy(self)
+        other.z = plane.points(self.z)
+        other.U_state = self.U * plane.input_factor(other.z)
+        if self.transient_dt is not None:
+            other.z_free = plane.points(self.z_free)
+            other.free_factor = self.free_factor / self.z_free * plane.free_factor(other.z_free)
+        return other
+
     @property
     def n_lines(self) -> int:
         """Number of DFT lines, whatever their weights."""

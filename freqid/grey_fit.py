@@ -15,11 +15,12 @@ from freqid.experiments import SpectralExperiment
 from freqid.hold_tests import decimation_warning
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
+from freqid.noise_floor import noise_floor
 from freqid.noise_spectrum import score_covariance
 from freqid.optimise import Objective, Problem, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.priors import Prior
-from freqid.starts import Found, log_targets, noise_floor, search
+from freqid.starts import Found, log_targets, search
 from freqid.structures import GreyStructure
 from freqid.trust import coloured, physical_warnings, uncertainty
 

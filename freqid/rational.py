@@ -65,19 +65,11 @@ class DiscreteModel:
 
     def denominator(self) -> FloatArray:
         """a(z), highest power first, (order + 1,)."""
-        return np.real(np.poly(self.matrices.A))
+        return characteristic(self.matrices.A)
 
-    def numerator(
-        self, output: int = 0, input: int = 0, known: FloatArray | None = None
-    ) -> FloatArray:
-        """b(z) from one input to one output, highest power first, (order + 1,).
-
-        ``known`` is the denominator, where it has been computed.
-        """
-        A, B, C, D = self.matrices
-        a = self.denominator() if known is None else known
-        # det(zI − A + b c) = a(z) + c adj(zI − A) b
-        return np.real(np.poly(A - np.outer(B[:, input], C[output]))) - a + D[output, input] * a
+    def numerator(self, output: int = 0, input: int = 0) -> FloatArray:
+        """b(z) from one input to one output, highest power first, (order + 1,)."""
+        return numerator_of(self.matrices, self.denominator(), output, input)
 
     def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
         """Response at ``omega`` (rad/s), taken at exp(jω·dt)."""
@@ -95,17 +87,14 @@ class DiscreteModel:
     def coefficients(self) -> tuple[list[str], FloatArray]:
         """Names and values of the coefficients: b of each channel pair, then a."""
         p, m = self.matrices.D.shape
-        names, values = [], []
-        a = self.denominator()
+        names = []
         for o in range(p):
             for i in range(m):
                 pair = "" if p * m == 1 else f"[{self.output_names[o]},{self.input_names[i]}]"
-                b = self.numerator(o, i, a)
-                for k in range(0 if self.matrices.D.any() else 1, len(b)):
-                    names.append(f"b{k}{pair}")
-                    values.append(b[k])
-        names += [f"a{k}" for k in range(1, len(a))]
-        return names, np.array([*values, *a[1:]])
+                first = 0 if self.matrices.D.any() else 1
+                names += [f"b{k}{pair}" for k in range(first, self.order + 1)]
+        names += [f"a{k}" for k in range(1, self.order + 1)]
+        return names, coefficients_of(self.matrices)
 
     def response_with_variance(
         self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
@@ -168,6 +157,33 @@ class DiscreteModel:
     def __repr__(self) -> str:
         p, m = self.matrices.D.shape
         return f"<DiscreteModel of order {self.order}, {p}x{m}, dt={self.dt:g} s, {self.hold!r}>"
+
+
+def characteristic(A: FloatArray) -> FloatArray:
+    """det(zI − A), highest power first, (…, n + 1), of matrices (…, n, n)."""
+    roots = np.linalg.eigvals(A)
+    a = np.zeros((*roots.shape[:-1], roots.shape[-1] + 1), complex)
+    a[..., 0] = 1
+    for k in range(roots.shape[-1]):
+        a[..., 1 : k + 2] -= roots[..., k, None] * a[..., : k + 1]
+    return a.real
+
+
+def numerator_of(matrices: StateSpace, a: FloatArray, output: int, input: int) -> FloatArray:
+    """b(z) of a channel pair beside the denominator a(z), (…, n + 1)."""
+    A, B, C, D = matrices
+    # det(zI − A + b c) = a(z) + c adj(zI − A) b
+    closed = characteristic(A - B[..., :, input, None] * C[..., output, None, :])
+    return closed - a + D[..., output, input, None] * a
+
+
+def coefficients_of(matrices: StateSpace) -> FloatArray:
+    """Coefficients of all channel pairs' b(z), then of a(z), in a row, (…, coefficients)."""
+    a = characteristic(matrices.A)
+    p, m = matrices.D.shape[-2:]
+    first = 0 if matrices.D.any() else 1
+    rows = [numerator_of(matrices, a, o, i)[..., first:] for o in range(p) for i in range(m)]
+    return np.concatenate([*rows, a[..., 1:]], axis=-1)
 
 
 def invert_hold(sampled: StateSpace, dt: float, hold: Hold) -> StateSpace:

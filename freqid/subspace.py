@@ -21,12 +21,13 @@ from freqid.sampled_plant import StateSpace
 
 def plane_for(z: ComplexArray) -> Plane:
     """The plane in which the arc of the lines z is centred on a quarter turn."""
-    half = np.abs(np.angle(z)) / 2
+    half = np.sort(np.abs(np.angle(z))) / 2
     half = np.clip(half[half > 0], 1e-12, np.pi / 2 - 1e-6)
     if len(half) == 0:
         return Plane()
     # the map multiplies tan(angle/2) by (1+a)/(1−a); the arc is that of four lines in five
-    stretch = 1 / np.sqrt(np.prod(np.tan(np.quantile(half, [0.1, 0.9]))))
+    ends = half[[len(half) // 10, len(half) - 1 - len(half) // 10]]
+    stretch = 1 / np.sqrt(np.prod(np.tan(ends)))
     return Plane((stretch - 1) / (stretch + 1))
 
 

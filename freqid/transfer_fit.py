@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from freqid.black_box import coefficient_estimate, fit_black_box, input_dt, line_points
+from freqid.black_box import coefficient_estimate, fit_black_box, input_dt, lines_in_plane
 from freqid.charts import Chart
 from freqid.checks import ComplexArray, FloatArray
 from freqid.estimate import Estimate
-from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import FirstOrderHold, PeriodicHold
 from freqid.models import GreyBox
@@ -21,7 +20,6 @@ from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError
 from freqid.refinement import first_model
 from freqid.structures import DelayedStructure
-from freqid.subspace import plane_for
 from freqid.transfer_functions import (
     ContinuousModel,
     TransferFunction,
@@ -78,14 +76,14 @@ def fit_transfer_function(
         delay = float(theta[-1]) if estimated else float(spec.delay)
         return rational_model(structure.model.with_values(**values), spec.zeros, delay)
 
-    def described(x: FloatArray) -> tuple[list[str], FloatArray]:
-        named, values = coefficients(at(x))
-        if estimated:
-            return [*named, "delay"], np.append(values, x[-1] * unit)
-        return named, values
+    def described(points: FloatArray) -> FloatArray:
+        values = np.array([coefficients(at(x))[1] for x in points])
+        return np.column_stack([values, points[:, -1] * unit]) if estimated else values
 
+    found = at(solution.x)
+    names_of = [*coefficients(found)[0], *(["delay"] if estimated else [])]
     return coefficient_estimate(
-        at(solution.x), described, structure.scale, solution, objective, hold, unit
+        found, names_of, described, structure.scale, solution, objective, hold, unit
     )
 
 
@@ -137,16 +135,11 @@ def _first_guess(
     """Subspace model of the data with the delay taken off the input, not refined."""
     names = sets[0].input_names, sets[0].output_names
     shape = len(names[1]), len(names[0])
-    plane = plane_for(line_points(sets, shape, options))
-    pairs = [prepare(d, shape, w, options, plane) for d, w in zip(sets, weights, strict=True)]
-    lines = []
-    for experiment, _ in pairs:
-        assert isinstance(experiment, SpectralExperiment)
+    lines, hold, plane = lines_in_plane(sets, shape, weights, options)
+    for experiment in lines:
         late = np.exp(-1j * experiment.omega_input.ravel() * delay)
         experiment.U, experiment.U_state = experiment.U * late, experiment.U_state * late
-        lines.append(experiment)
     chart = Chart(first_model(lines, order, True), True, plane)
-    hold = pairs[0][1]
     dt = hold.period if isinstance(hold, PeriodicHold) else input_dt(sets[0])
     return DiscreteModel(chart.in_z(np.zeros(chart.size)), dt, hold, *names)
 
