@@ -22,7 +22,7 @@ from freqid.bases import Basis, basis_of
 from freqid.checks import ComplexArray, FloatArray
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold, PeriodicHold, ZeroOrderHold
-from freqid.responses import Plane, points, response_and_derivatives, transition
+from freqid.responses import Plane, on_circle, points, response_and_derivatives, transition
 from freqid.sampled_plant import Linearisation, SampledPlant, StateSpace, sum_runs
 from freqid.spectra import Spectra
 
@@ -175,7 +175,7 @@ class SpectralExperiment:
         discrete, plane = plane is not None, plane or Plane()
         period = hold.period * lift if isinstance(hold, PeriodicHold) else None
         if lift > 1 and period is not None:
-            z = np.exp(1j * period * omega)
+            z = on_circle(period * omega)
         else:
             z = points(omega_input.ravel(), hold)
         self.z = plane.points(z)
@@ -186,12 +186,12 @@ class SpectralExperiment:
         if transient_dt is not None:
             ratio = 0.0 if period is None else transient_dt / period
             self.shared = self.aliases == 1 and abs(ratio - 1) < 1e-9
-            z_free = z if self.shared else np.exp(1j * omega * transient_dt)
+            z_free = z if self.shared else on_circle(omega * transient_dt)
             if discrete and not self.shared and isinstance(hold, PeriodicHold):
                 # (z^M I − Φ^M)⁻¹ z^M is the mean of (zI − Φ)⁻¹ z over the M aliases
                 self.free_aliases = round(transient_dt / hold.period)
                 turns = 2 * np.pi * np.arange(self.free_aliases) / transient_dt
-                z_free = np.exp(1j * (omega[:, None] + turns).ravel() * hold.period)
+                z_free = on_circle((omega[:, None] + turns).ravel() * hold.period)
             self.z_free = plane.points(z_free)
             self.free_factor = plane.free_factor(self.z_free) / self.free_aliases
             if self.line_scale is not None:
@@ -256,6 +256,8 @@ class SpectralExperiment:
     @property
     def energy(self) -> float:
         """Weighted energy of the data, the cost of a model that is zero."""
+        if self.line_scale is not None:
+            return float(np.vdot(self.Y, self.Y).real)
         return float(np.sum(self.rows(self.Y) ** 2))
 
     def thinned(self, step: int) -> SpectralExperiment:

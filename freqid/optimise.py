@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import scipy.linalg
 import scipy.optimize
 
 from freqid.checks import FloatArray
 from freqid.experiments import Experiment, Realisation
 from freqid.holds import Hold
 from freqid.priors import Prior
-from freqid.projection import along, combined, eliminate, triangle_of
+from freqid.projection import eliminate, triangle_of
 
 
 class Structure(Protocol):
@@ -119,7 +118,7 @@ class Objective:
                 Q = None
                 if T is not None:
                     Q, delta = eliminate(T, r)
-                    r = r - combined(along(Q, r), Q)
+                    r = r - (Q @ r) @ Q
                 blocks.append((evaluation.jacobian(delta), r, Q))
                 initial.append(delta)
                 parts.append(float(r @ r))
@@ -248,17 +247,13 @@ def polish(
     """
     point = objective.point(x)
     P = len(x)
-    lower, upper = objective.structure.lower, objective.structure.upper
     for _ in range(12):
         if point is None or len(point.triangle) <= P:
             break
         if point.cost <= objective.rounding:
             return Solution(x, point, True, "The cost is down to rounding.")
-        R, c = point.triangle[:P, :P], point.triangle[:P, P]
-        if np.abs(np.diag(R)).min() <= 1e-8 * np.abs(np.diag(R)).max():
-            break
-        step = -scipy.linalg.solve_triangular(R, c)
-        if (x + step < lower).any() or (x + step > upper).any():
+        step, c = _gauss_newton(point), point.triangle[:P, P]
+        if step is None or _outside(objective.structure, x + step):
             break
         # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain
         if np.abs(step).max() <= last_step or float(c @ c) <= tolerance * point.cost:
@@ -279,24 +274,35 @@ def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
 
     A cost that no longer falls in sixteen digits leaves half of them in x; the gradient has more.
     """
-    lower, upper = objective.structure.lower, objective.structure.upper
     P, smallest = len(x), np.inf
     for _ in range(limit):
         point = objective.point(x)
         if point is None or len(point.triangle) <= P:
             break
-        R, c = point.triangle[:P, :P], point.triangle[:P, P]
-        if np.abs(np.diag(R)).min() <= 1e-8 * np.abs(np.diag(R)).max():
+        step = _gauss_newton(point)
+        if step is None:
             break
-        step = -scipy.linalg.solve_triangular(R, c)
         size = float(np.abs(step / np.maximum(np.abs(x), 1e-3)).max())
         moved = x + step
-        if not size < smallest or (moved < lower).any() or (moved > upper).any():
+        if not size < smallest or _outside(objective.structure, moved):
             break
         x, smallest = moved, size
         if size < 1e-13:
             break
     return x
+
+
+def _gauss_newton(point: Point) -> FloatArray | None:
+    """The step to the minimum of the linearised cost; None where unknowns cannot be told apart."""
+    R, c = point.triangle[:-1, :-1], point.triangle[:-1, -1]
+    pivots = np.abs(R.diagonal())
+    if pivots.min() <= 1e-8 * pivots.max():
+        return None
+    return -np.linalg.solve(R, c)
+
+
+def _outside(structure: Structure, x: FloatArray) -> bool:
+    return bool(((x < structure.lower) | (x > structure.upper)).any())
 
 
 def _padded(rows: FloatArray, size: int) -> FloatArray:

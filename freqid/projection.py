@@ -1,7 +1,7 @@
 """Tall, thin linear algebra of the fit: triangles, Gram matrices, and the transient taken off.
 
-Matrices have few long rows, one for each unknown. Products are made in pieces that stay below the
-size at which BLAS wakes its threads, which would cost more than they save.
+Matrices have few long rows, one for each unknown, and products are made in pieces that stay in the
+processor's cache.
 """
 
 from __future__ import annotations
@@ -42,16 +42,6 @@ def inner(A: FloatArray, B: FloatArray) -> FloatArray:
     return total
 
 
-def along(A: FloatArray, x: FloatArray) -> FloatArray:
-    """A x for few long rows; einsum, because BLAS would wake its threads for so little."""
-    return np.einsum("ij,j->i", A, x)
-
-
-def combined(c: FloatArray, A: FloatArray) -> FloatArray:
-    """Σ c_i A_i for few long rows."""
-    return np.einsum("i,ij->j", c, A)
-
-
 # least pivot of the scaled Gram matrix below which half of the digits are gone
 _LEAST_PIVOT = 1e-4
 
@@ -67,8 +57,8 @@ def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None
     size = np.zeros(P)
     for J, r, Q in blocks:
         full = inner(J, J)
-        size += np.diag(full)
-        G, g, rr = G + full, g + along(J, r), rr + float(r @ r)
+        size += full.diagonal()
+        G, g, rr = G + full, g + J @ r, rr + float(r @ r)
         if Q is not None:
             seen = inner(J, Q)
             G = G - seen @ seen.T
@@ -78,7 +68,7 @@ def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None
             L = np.linalg.cholesky(G / np.outer(size, size))
         except np.linalg.LinAlgError:
             L = np.zeros_like(G)
-        if np.diag(L).min(initial=1.0) > _LEAST_PIVOT:
+        if L.diagonal().min(initial=1.0) > _LEAST_PIVOT:
             R = np.zeros((P + 1, P + 1))
             R[:P, :P] = L.T * size
             R[:P, P] = np.linalg.solve(L, g / size)
@@ -108,7 +98,7 @@ def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         L = np.linalg.cholesky(gram)
     except np.linalg.LinAlgError:
         L = np.zeros_like(gram)
-    least = np.diag(L).min()
+    least = L.diagonal().min()
     if least > _LEAST_PIVOT:
         first = np.linalg.inv(L) / size
         Q = first @ T
@@ -116,7 +106,7 @@ def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
             # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
             second = np.linalg.inv(np.linalg.cholesky(inner(Q, Q)))
             Q, first = second @ Q, second @ first
-        delta[used] = -first.T @ along(Q, r)
+        delta[used] = -first.T @ (Q @ r)
         return Q, delta
     unit = T / size[:, None]
     # modes that the output hardly shows: keep the directions that it does

@@ -40,9 +40,15 @@ class Plane:
 
 def points(omega: FloatArray, hold: Hold) -> ComplexArray:
     """Where the response is taken: exp(jω·period) of the hold, or jω without one."""
-    if isinstance(hold, PeriodicHold):
-        return np.exp(1j * hold.period * omega)
-    return 1j * omega
+    return on_circle(hold.period * omega) if isinstance(hold, PeriodicHold) else 1j * omega
+
+
+def on_circle(angle: FloatArray) -> ComplexArray:
+    """exp(j·angle); a cosine and a sine take half of the time of a complex exponential."""
+    z = np.empty(angle.shape, complex)
+    np.cos(angle, out=z.real)
+    np.sin(angle, out=z.imag)
+    return z
 
 
 def transition(basis: Basis, dt: float) -> SampledPlant:

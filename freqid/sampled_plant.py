@@ -18,9 +18,8 @@ import numpy as np
 
 from freqid.checks import Array, ComplexArray, FloatArray
 
-# lines worked on at once: their products stay in the processor's cache, and one matrix product of
-# them stays below the size at which BLAS wakes its threads, which costs more than it saves
-BLOCK = 2048
+# lines worked on at once: their products stay in the processor's cache
+BLOCK = 4096
 
 
 class StateSpace(NamedTuple):

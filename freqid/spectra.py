@@ -105,7 +105,7 @@ def _compute(record: Record, limits: tuple[float, float] | None, lifted: bool) -
         U, folded = _aliases(scipy.fft.rfft(u.T, axis=1), lines, N, M)
     if M > 1:
         Y = dft_at(list(y.T), lines)
-    if not np.abs(U).max() > 1e-13 * np.abs(u).max() * np.sqrt(N):
+    if not np.abs(U).max() > 1e-13 * np.sqrt(np.vdot(u, u)):
         raise ValueError(
             f"u is zero over band={limits}; an input without energy there identifies nothing"
         )
@@ -130,8 +130,7 @@ def dft_at(x: Sequence[FloatArray], lines: npt.NDArray[np.int64]) -> ComplexArra
     factor (Cooley and Tukey's first step, stopped at the lines that are wanted).
     """
     N = len(x[0])
-    long = N >= 2**19
-    parts = 8 if long else 4
+    parts = 8 if N >= _LONG else 4
     first, last = int(lines[0]), int(lines[-1])
     if last - first + 1 == len(lines):
         wanted: Any = slice(first, last + 1)
@@ -139,21 +138,41 @@ def dft_at(x: Sequence[FloatArray], lines: npt.NDArray[np.int64]) -> ComplexArra
         wanted = lines
     if N < 2**16 or N % parts or lines[-1] > N // (2 * parts) or len(lines) > N // 8:
         return np.array([scipy.fft.rfft(signal)[wanted] for signal in x])
-    twiddle = np.exp(-2j * np.pi / N * lines)
+    twiddle = _twiddle(lines, N)
+    X = np.empty((len(x), len(lines)), complex)
 
-    def row(signal: FloatArray) -> ComplexArray:
+    def row(signal: FloatArray, out: ComplexArray) -> None:
         pieces = np.ascontiguousarray(signal.reshape(N // parts, parts).T)
         F = scipy.fft.rfft(pieces, axis=-1)[:, wanted]
-        total = F[-1].copy()
-        for part in F[-2::-1]:
-            total *= twiddle
-            total += part
-        return total
+        for start in range(0, len(lines), _RUN):
+            run = slice(start, start + _RUN)
+            total = out[run]
+            total[:] = F[-1, run]
+            for part in F[-2::-1]:
+                total *= twiddle[run]
+                total += part[run]
 
-    if not long:
-        return np.array([row(signal) for signal in x])
+    if N < _LONG:
+        for signal, out in zip(x, X, strict=True):
+            row(signal, out)
+        return X
     with ThreadPoolExecutor(max_workers=2) as pool:
-        return np.array(list(pool.map(row, x)))
+        list(pool.map(row, x, X))
+    return X
+
+
+# samples from which two threads and eight parts are worth it; lines that stay in the cache
+_LONG = 2**19
+_RUN = 4096
+
+
+def _twiddle(lines: npt.NDArray[np.int64], N: int) -> ComplexArray:
+    """exp(−j2πk/N) from two short tables: k = k0 + 256 a + b, and the exponentials multiply."""
+    offset = lines - lines[0]
+    turn = -2j * np.pi / N
+    coarse = np.exp(turn * (int(lines[0]) + 256 * np.arange(int(offset[-1]) // 256 + 1)))
+    fine = np.exp(turn * np.arange(256))
+    return coarse[offset // 256] * fine[offset % 256]
 
 
 def _aliases(
