@@ -1,7 +1,7 @@
 """Every number of docs/performance.md, printed as a table.
 
-    python benchmarks/run.py            all of it, about 15 minutes on two cores
-    python benchmarks/run.py --quick    a tenth of the runs, about two minutes
+    python benchmarks/run.py            all of it, about eight minutes on two cores
+    python benchmarks/run.py --quick    a tenth of the runs, about a minute
 
 Times are medians; each ratio compares two things timed in turn in this one run.
 """
@@ -31,16 +31,20 @@ def show(what, value, target):
     print(f"{what:66s} {value:>24s}   ({target})", flush=True)
 
 
+ROUNDS = 5
+
+
 def paired(ours, theirs, count):
-    """Median times of two functions, each called ``count`` times running, in turn, twice.
+    """Median times of two functions, each called ``count`` times running, in turn, in five rounds.
 
     Not call by call: the threads of BLAS spin for a while after the last product, and would be
-    charged to whatever comes next. The pauses let them go to sleep.
+    charged to whatever comes next; the pauses let them go to sleep. In rounds, because the clock of
+    a shared machine wanders.
     """
     times = {ours: [], theirs: []}
-    for _ in range(2):
+    for _ in range(ROUNDS):
         for function in (ours, theirs):
-            time.sleep(0.5)
+            time.sleep(0.3)
             function()
             for _ in range(count):
                 start = time.perf_counter()
@@ -120,7 +124,7 @@ def kernel():
 
     a, b = eigenbasis(), block_exponential()
     difference = np.abs(a[1][:, 0, 0] - b[1][:, :, 0, 0]).max() / np.abs(a[1]).max()
-    ours, theirs = paired(eigenbasis, block_exponential, 200)
+    ours, theirs = paired(eigenbasis, block_exponential, 100)
     show(
         "kernel: response and five derivatives, 701 lines",
         f"{ours / theirs:.2f} ({1e3 * ours:.2f} ms)",
@@ -142,7 +146,7 @@ def speed(quick):
         def theirs(record=record):
             return baseline.grey_box(record.u, record.y, T1, 1.2 * TRUE)
 
-        count = {10: 15, 100: 9, 1000: 5}[duration] if not quick else 3
+        count = {10: 9, 100: 5, 1000: 3}[duration] if not quick else 1
         mine, other = paired(ours, theirs, count)
         error = np.abs(ours().values / TRUE - 1).max()
         show(
@@ -208,7 +212,7 @@ def black_boxes():
         slow.__dict__.pop("_spectra", None)
         return fq.fit(fq.OutputError(3), slow, hold="zoh")
 
-    mine, other = paired(ours, lambda: baseline.output_error(slow.u, slow.y), 15)
+    mine, other = paired(ours, lambda: baseline.output_error(slow.u, slow.y), 9)
     show(
         "third-order output error against Steiglitz-McBride + LM",
         f"{mine / other:.1f} times ({1e3 * mine:.1f} ms)",

@@ -1,4 +1,4 @@
-"""Fits of black boxes: subspace start, then least squares in a chart that follows the estimate."""
+"""Fits of black boxes: a start, then least squares in a chart that follows the estimate."""
 
 from __future__ import annotations
 

@@ -15,6 +15,7 @@ from freqid.preparation import Options, prepare
 from freqid.rational import OutputError
 from freqid.record import Record
 from freqid.responses import Plane
+from freqid.threads import in_one_blas_thread
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 _FOLDS = 4
 
 
+@in_one_blas_thread
 def select_order(
     data: Record | FrequencyResponse,
     orders: Iterable[int],

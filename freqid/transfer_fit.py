@@ -132,7 +132,7 @@ def _starting_poles(
 def _first_guess(
     order: int, sets: Sequence[Any], weights: Sequence[Any], options: Options, delay: float
 ) -> DiscreteModel:
-    """Subspace model of the data with the delay taken off the input, not refined."""
+    """Sampled model of the data with the delay taken off the input, where its start lands."""
     names = sets[0].input_names, sets[0].output_names
     shape = len(names[1]), len(names[0])
     lines, hold, plane = lines_in_plane(sets, shape, weights, options)
