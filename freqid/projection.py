@@ -32,16 +32,23 @@ def triangle(matrix: FloatArray) -> FloatArray:
 
 
 def inner(A: FloatArray, B: FloatArray) -> FloatArray:
-    """A Bᵀ for few long rows, block by block (see BLOCK)."""
-    if A.shape[1] <= 2 * BLOCK:
+    """A Bᵀ for few long rows, in blocks; where they are very few, row by row.
+
+    BLAS copies matrices to multiply them, which takes longer than to multiply so few rows.
+    """
+    columns = A.shape[1]
+    if len(B) <= _FEW_ROWS and columns > _SHORT:
+        return np.array([A @ b for b in B]).reshape(len(B), len(A)).T
+    if columns <= 2 * BLOCK:
         return A @ B.T
     total = np.zeros((len(A), len(B)))
-    for start in range(0, A.shape[1], 2 * BLOCK):
+    for start in range(0, columns, 2 * BLOCK):
         part = slice(start, start + 2 * BLOCK)
         total += A[:, part] @ B[:, part].T
     return total
 
 
+_FEW_ROWS, _SHORT = 6, 2000
 # least pivot of the scaled Gram matrix below which half of the digits are gone
 _LEAST_PIVOT = 1e-4
 
