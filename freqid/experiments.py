@@ -260,10 +260,17 @@ class SpectralExperiment:
             return float(np.vdot(self.Y, self.Y).real)
         return float(np.sum(self.rows(self.Y) ** 2))
 
-    def thinned(self, step: int) -> SpectralExperiment:
-        """Every ``step``-th line, weighted so that costs stay comparable."""
+    def thinned(self, step: int, scattered: bool = False) -> SpectralExperiment:
+        """One line in ``step``, weighted so that costs stay comparable.
+
+        ``scattered`` takes any of each run, always the same, instead of the first: weights may have
+        a period of their own.
+        """
         few = copy.copy(self)
         lines = np.arange(0, len(self.omega), step)
+        if scattered:
+            lines = lines + np.random.default_rng(0).integers(0, step, len(lines))
+            lines = lines[lines < len(self.omega)]
         inputs = (lines[:, None] * self.aliases + np.arange(self.aliases)).ravel()
         more = np.sqrt(step)
         few.omega, few.omega_input = self.omega[lines], self.omega_input[lines]

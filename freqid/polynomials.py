@@ -42,7 +42,7 @@ class Basis:
         """The polynomials at other points, (n + 1, points)."""
         Q = np.empty((len(self.H), len(w)), complex)
         Q[0] = self.Q[0, 0]
-        for j in range(len(w) and self.H.shape[1]):
+        for j in range(self.H.shape[1]):
             Q[j + 1] = (w * Q[j] - self.H[: j + 1, j] @ Q[: j + 1]) / self.H[j + 1, j]
         return Q
 

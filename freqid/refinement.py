@@ -23,6 +23,8 @@ from freqid.subspace import identify, observed
 # little more than their noise, is believed
 _BELIEVED = 0.03
 _EXPLAINED = 1.5
+# lines that are enough to come next to the minimum
+_LINES = 20000
 # poles of larger models beyond those that are wanted
 _LARGER = (2, 4)
 
@@ -36,18 +38,27 @@ def first_model(
     """
     single = all(e.Y.shape[:2] == (1, 1) and e.U.shape[:2] == (1, 1) for e in experiments)
     single &= all(e.aliases == 1 and e.free_aliases == 1 for e in experiments)
-    best: Minimum | None = None
-    if single:
-        lines = RationalLines(experiments, feedthrough)
-        for poles in _begun(lines, order):
-            found = lines.minimum(poles)
-            if found is not None and (best is None or found.cost < best.cost):
-                best = found
-            if found is not None and found is best and _believed(lines, best):
-                break
-    if best is None:
+    if not single:
         return identify(experiments, order, feedthrough)
-    return lines.state_space(best)
+    few = _fewer_lines(experiments)
+    lines = RationalLines(few, feedthrough)
+    best: Minimum | None = None
+    for poles in _begun(lines, order):
+        found = lines.minimum(poles)
+        if found is not None and (best is None or found.cost < best.cost):
+            best = found
+        if found is not None and found is best and _believed(lines, best):
+            break
+    if best is not None and few is not experiments:
+        lines = RationalLines(experiments, feedthrough)
+        best = lines.minimum(best.poles)
+    return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
+
+
+def _fewer_lines(experiments: Sequence[SpectralExperiment]) -> Sequence[SpectralExperiment]:
+    """A part of the lines, where they are very many: their minimum is next to that of all."""
+    step = sum(len(e.omega) for e in experiments) // _LINES
+    return [e.thinned(step, scattered=True) for e in experiments] if step > 1 else experiments
 
 
 def _believed(lines: RationalLines, found: Minimum) -> bool:
@@ -65,15 +76,18 @@ def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:
     if order <= FEW:
         # few poles are found from anywhere
         yield nowhere
-    yield np.linalg.eigvals(observed(lines.experiments, order)[0])
-    for more in _LARGER:
+    for more in (0, *_LARGER):
         try:
             A, _ = observed(lines.experiments, order + more)
         except ValueError:
-            # the lines are too few for a larger model
+            # the lines are too few
+            if more == 0 and order > FEW:
+                raise
             break
-        larger = lines.minimum(np.linalg.eigvals(A))
-        if larger is not None:
+        poles = np.linalg.eigvals(A)
+        if more == 0:
+            yield poles
+        elif (larger := lines.minimum(poles)) is not None:
             yield _fewer(lines, larger.poles, order)
     if order > FEW:
         yield nowhere

@@ -95,3 +95,29 @@ def test_the_start_is_the_minimum_with_a_direct_term_and_without(rng, feedthroug
     # the time domain: a filter with these coefficients leaves the noise that was put in
     error = lfilter(est.model.numerator(), est.model.denominator(), u) - record.y
     assert error[100:].std() == pytest.approx(0.1, rel=0.05)
+
+
+def test_very_many_lines_with_gaps_end_in_the_same_minimum(rng):
+    """A part of the lines is searched, whatever the period of the weights, and all decide."""
+    from scipy.signal import lfilter
+
+    b, a = [0.0, 0.5, -0.2], np.poly([0.6 + 0.6j, 0.6 - 0.6j])
+    u = rng.standard_normal(2**17)
+    record = fq.Record(u, lfilter(b, a, u), dt=0.01).with_noise(0.5, seed=1)
+    weights = np.where(np.arange(2**16 + 1) % 4 == 0, 0.0, 1.0)
+    est = fq.fit(fq.OutputError(2), record, weights=weights)
+    assert est.n_evaluations <= 3
+    # all lines decide: from rest, the estimate's own output is nearer there than the truth's
+    ours = lfilter([0, *est.values[:2]], [1, *est.values[2:]], u)
+    power = [np.abs(np.fft.rfft(y - record.y)) ** 2 for y in (ours, lfilter(b, a, u))]
+    assert weights @ power[0] <= weights @ power[1]
+    true = np.array([0.5, -0.2, *a[1:]])
+    assert (np.abs(est.values - true) < 5 * np.sqrt(np.diag(est.covariance_matrix))).all()
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_few_lines_are_enough_for_few_poles(rng, order):
+    u = rng.standard_normal(2 * order + 2)
+    record = fq.Record(u, np.convolve(u, [0, 0.5, 0.2])[: len(u)], dt=0.1).with_noise(0.3, seed=2)
+    est = fq.fit(fq.OutputError(order), record, initial_state="steady")
+    assert est.cost < np.sum(record.y**2)
