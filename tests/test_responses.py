@@ -151,6 +151,6 @@ def test_user_functions_that_refuse_complex_numbers_get_differences(plant):
     smooth = fq.GreyBox(
         lambda k: ([[0, 1], [-(k**2), -0.1]], [[0], [1]], [[1, 0]], 0), [fq.Parameter("k", 2.0)]
     )
-    assert smooth._takes_complex
+    assert smooth._function.takes_complex(["k"])
     lin = smooth.linearise(smooth.values, ["k"])
     assert abs(lin.derivative.A[0, 1, 0] + 4) < 1e-15
