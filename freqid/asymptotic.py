@@ -28,7 +28,6 @@ from freqid.apparent import (
 from freqid.black_box import fit_black_box
 from freqid.checks import Array, ComplexArray, FloatArray, band, positive, whole
 from freqid.estimate import Estimate
-from freqid.experiments import sampled_response
 from freqid.frequency_response import FrequencyResponse
 from freqid.grey_fit import fit_grey_box
 from freqid.holds import Hold, as_hold
@@ -39,6 +38,7 @@ from freqid.preparation import Options
 from freqid.projection import triangle
 from freqid.quadrature import panel_nodes, resolved
 from freqid.rational import OutputError
+from freqid.realisation import sampled_response
 from freqid.responses import points, response_and_derivatives
 from freqid.sampled_plant import StateSpace
 from freqid.structures import GreyStructure

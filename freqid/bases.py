@@ -15,7 +15,8 @@ import numpy as np
 import scipy.linalg
 
 from freqid.checks import Array, ComplexArray, FloatArray
-from freqid.holds import Hold, PeriodicHold, Sampled, ZeroOrderHold, phi_functions
+from freqid.holds import Hold, PeriodicHold, Sampled, ZeroOrderHold
+from freqid.phi import phi_functions
 from freqid.sampled_plant import SampledPlant, StateSpace
 
 # beyond this the eigenbasis loses more digits than the fit can spare

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.linalg
 
 from freqid.checks import FloatArray
-from freqid.experiments import Realisation
+from freqid.realisation import Realisation
 from freqid.responses import Plane
 from freqid.sampled_plant import Linearisation, StateSpace
 

@@ -12,10 +12,10 @@ from freqid.apparent import Sampling, state_space_of
 from freqid.asymptotic import Conditions, error_covariance, model_responses
 from freqid.bias_map import bias_map, hold_label
 from freqid.checks import FloatArray, choice, positive, whole
-from freqid.experiments import sampled_response
 from freqid.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 from freqid.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum
 from freqid.models import GreyBox
+from freqid.realisation import sampled_response
 from freqid.signal_spectra import multisine_lines
 from freqid.structures import GreyStructure
 

@@ -14,13 +14,14 @@ from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.hold_tests import decimation_warning
 from freqid.holds import Hold, ZeroOrderHold
+from freqid.log_stage import log_targets
 from freqid.models import GreyBox
 from freqid.noise_floor import noise_floor
 from freqid.noise_spectrum import score_covariance
 from freqid.optimise import Objective, Problem, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.priors import Prior
-from freqid.starts import Found, log_targets, search
+from freqid.starts import Found, search
 from freqid.structures import GreyStructure
 from freqid.trust import coloured, physical_warnings, uncertainty
 

@@ -17,10 +17,11 @@ import numpy as np
 import scipy.optimize
 
 from freqid.checks import FloatArray
-from freqid.experiments import Experiment, Realisation
+from freqid.experiments import Experiment
 from freqid.holds import Hold
 from freqid.priors import Prior
 from freqid.projection import eliminate, triangle_of
+from freqid.realisation import Realisation
 
 
 class Structure(Protocol):

@@ -11,10 +11,11 @@ import scipy.fft
 from freqid.apparent import state_space_of
 from freqid.bases import basis_of
 from freqid.checks import ComplexArray, FloatArray
-from freqid.experiments import Realisation, SpectralExperiment
+from freqid.experiments import SpectralExperiment
 from freqid.holds import Hold
 from freqid.preparation import Options, prepare
 from freqid.projection import eliminate
+from freqid.realisation import Realisation
 from freqid.record import Record
 from freqid.responses import Plane
 from freqid.sampled_plant import Linearisation, StateSpace

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.experiments import Realisation
 from freqid.holds import Hold, ZeroOrderHold
 from freqid.models import GreyBox
+from freqid.realisation import Realisation
 from freqid.responses import many_responses
 from freqid.sampled_plant import Linearisation, StateSpace
 

@@ -6,8 +6,9 @@ import numpy as np
 import scipy.fft
 
 from freqid.checks import Array, FloatArray
-from freqid.experiments import Evaluation, Realisation
+from freqid.experiments import Evaluation
 from freqid.holds import PeriodicHold, Sampled
+from freqid.realisation import Realisation
 from freqid.record import Record
 from freqid.sampled_plant import Linearisation
 from freqid.simulation import FreeMotion, forcing, propagate

@@ -12,11 +12,11 @@ import numpy as np
 
 from freqid.bases import basis_of
 from freqid.checks import Array, ComplexArray, FloatArray, finite, whole
-from freqid.experiments import Realisation
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import BandLimited, Hold
 from freqid.models import GreyBox
 from freqid.parameter import Parameter
+from freqid.realisation import Realisation
 from freqid.responses import frequency_response, points, transfer
 from freqid.sampled_plant import Linearisation, StateSpace
 
