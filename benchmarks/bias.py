@@ -12,7 +12,7 @@ import numpy as np
 
 import freqid as fq
 from freqid.apparent import Sampling
-from freqid.asymptotic import Conditions
+from freqid.conditions import Conditions
 
 T1 = 0.5e-3
 PLANT = fq.two_mass()

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import cyclopts
 import numpy as np
 from cyclopts import Parameter as Option
-from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import freqid as fq
 from freqid.checks import choice, whole
-from freqid.files import whole_file
 from freqid.input_spectra import below_nyquist
 from freqid.plants import PLANTS
+from freqid.terminal import folder, hold_of, plain, progress, show, write
 
-notes = Console(stderr=True)
 app = cyclopts.App(
     name="freqid",
     help="Physical parameters from chirp experiments, whatever the input did between the samples.",
@@ -58,35 +54,24 @@ def _fail(message: str) -> None:
     sys.exit(2)
 
 
-def _progress() -> Progress:
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        TimeElapsedColumn(),
-        console=notes,
-        transient=True,
-        disable=not notes.is_terminal,
-    )
-
-
 @app.command
 def reproduce(out: Path = Path("out")) -> None:
     """Every figure, table and equation of the paper, into a folder and on the screen."""
     from freqid.paper_figures import draw, save
 
-    _folder(out)
-    with _progress() as progress:
-        task = progress.add_task("Table 2", total=None)
+    folder(out)
+    with progress() as bar:
+        task = bar.add_task("Table 2", total=None)
         table = fq.paper.table2()
-        _write(out / "table2.csv", lambda path: table.to_csv(path, index=False))
-        progress.update(task, description="equations 3, 6 and 15")
+        write(out / "table2.csv", lambda path: table.to_csv(path, index=False))
+        bar.update(task, description="equations 3, 6 and 15")
         equations = fq.paper.equations()
-        _write(out / "equations.csv", lambda path: equations.to_csv(path, index=False))
+        write(out / "equations.csv", lambda path: equations.to_csv(path, index=False))
         for number in range(1, 11):
-            progress.update(task, description=f"Figure {number} of 10")
+            bar.update(task, description=f"Figure {number} of 10")
             save(draw(number), number, out)
-    _show("Table 2: two-mass plant, decimated by 10", table)
-    _show("Equations", equations)
+    show("Table 2: two-mass plant, decimated by 10", table)
+    show("Equations", equations)
     print(
         f"Phase of G_T1 against G_T2 at 50 rad/s: {fq.paper.phase_difference():.4f} degrees "
         "(paper: about 7)"
@@ -103,7 +88,7 @@ def reproduce(out: Path = Path("out")) -> None:
 @app.command
 def demo(out: Path = Path("data")) -> None:
     """Write the paper's chirp experiment as CSV at both rates."""
-    _folder(out)
+    folder(out)
     s = fq.paper.study_records()
     for name, record in (("chirp_fast.csv", s[0]), ("chirp_slow.csv", s[1])):
         fq.write(record, out / name)
@@ -152,10 +137,10 @@ def frf(
     }[method]()
     frame = response.to_frame()
     if out is not None:
-        _write(out, lambda path: frame.to_csv(path, index=False))
+        write(out, lambda path: frame.to_csv(path, index=False))
     if plot is not None:
         axes = fq.bode(response, labels=[data.name], unit="Hz")
-        _write(plot, lambda path: axes[0].figure.savefig(path))
+        write(plot, lambda path: axes[0].figure.savefig(path))
     if out is None and plot is None:
         print(frame.to_string(index=False))
     else:
@@ -206,10 +191,10 @@ def fit(
     record = fq.read(data, input, output, dt)
     if decimate != 1:
         record = record.decimate(decimate, keep_input=keep_input)
-    plant = fq.OutputError(order) if model == "output-error" else _plant(model)
-    between = _hold(hold)
-    with _progress() as progress:
-        progress.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
+    plant = fq.OutputError(order) if model == "output-error" else PLANTS[model]()
+    between = hold_of(hold)
+    with progress() as bar:
+        bar.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
         estimate = fq.fit(
             plant,
             record,
@@ -220,15 +205,15 @@ def fit(
             weights=weights,
         )
     if out is not None:
-        text = json.dumps(_plain(estimate.to_dict()), indent=2, allow_nan=False)
-        _write(out, lambda path: path.write_text(text + "\n"))
+        text = json.dumps(plain(estimate.to_dict()), indent=2, allow_nan=False)
+        write(out, lambda path: path.write_text(text + "\n"))
     if report is not None:
         estimate.report(report, title=f"{model} from {data.name}")
     if plot is not None:
         comparison = fq.compare(estimate, record, band=band)
         figure = comparison.plot()[0].figure
-        _write(plot, lambda path: figure.savefig(path))
-    _show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
+        write(plot, lambda path: figure.savefig(path))
+    show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
     print(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
@@ -276,16 +261,16 @@ def bias(
         choice("--hold", name, ("zoh", "foh", "bl", "remembered"))
     holds = [None if name == "remembered" else name for name in names]
     factors = [whole("--factor", f) for f in factor]
-    plant = _plant(model)
+    plant = PLANTS[model]()
     low, high = chirp
     below_nyquist(high, base_dt)
     asked = f"{low:g}-{high:g}"
     table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, holds, base_dt)
     if out is not None:
-        _write(out, lambda path: table.to_csv(path, index=False))
+        write(out, lambda path: table.to_csv(path, index=False))
     shown = table.drop(columns=["spectrum", "message"])
     shown["relative_bias"] = [f"{100 * b:+.3g} %" for b in shown["relative_bias"]]
-    _show(f"{model}, chirp {asked} Hz held for {1e3 * base_dt:g} ms", shown)
+    show(f"{model}, chirp {asked} Hz held for {1e3 * base_dt:g} ms", shown)
     finite = table[np.isfinite(table["relative_bias"])]
     if parameter is None and len(finite):
         parameter = finite.loc[finite["relative_bias"].abs().idxmax(), "parameter"]
@@ -296,7 +281,7 @@ def bias(
     around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}
     picture = fq.bias_map(plant, around, factors, holds, base_dt)
     axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[asked])
-    _write(plot, lambda path: axes[0].figure.savefig(path))
+    write(plot, lambda path: axes[0].figure.savefig(path))
     print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")
     return 0 if table["converged"].all() else 1
 
@@ -327,51 +312,6 @@ def explore(
 
     record = None if data is None else fq.read(data, input, output, dt)
     serve(record, host, port, allow_remote)
-
-
-def _hold(text: str | None) -> Any:
-    if text is None or ":" not in text:
-        return text
-    kind, _, period = text.partition(":")
-    kinds = {"zoh": fq.ZeroOrderHold, "foh": fq.FirstOrderHold}
-    try:
-        return kinds[kind](float(period))
-    except (KeyError, ValueError):
-        raise ValueError(
-            f"--hold {text} is not a hold; expected zoh, foh, bl, zoh:PERIOD or foh:PERIOD (s)"
-        ) from None
-
-
-def _folder(out: Path) -> None:
-    if out.exists() and not out.is_dir():
-        raise ValueError(f"--out {out} is a file; give a folder")
-    out.mkdir(parents=True, exist_ok=True)
-
-
-def _write(path: Path, save: Callable[[Path], Any]) -> None:
-    with whole_file(path) as beside:
-        save(beside)
-
-
-def _plain(value: Any) -> Any:
-    """JSON has neither infinity nor NaN: null stands for both."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
-
-
-def _plant(name: str) -> fq.GreyBox:
-    return PLANTS[name]()
-
-
-def _show(title: str, frame: Any) -> None:
-    """A table whose columns are as wide as they need, for screens, pipes and papers alike."""
-    shown = frame.map(lambda v: f"{v:.5g}" if isinstance(v, float) else str(v))
-    print(f"{title}\n{shown.replace('nan', '').to_string(index=False)}\n")
 
 
 if __name__ == "__main__":

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.apparent import Sampling, state_space_of
-from freqid.asymptotic import Conditions, error_covariance, model_responses
+from freqid.asymptotic import error_covariance, model_responses
 from freqid.bias_map import bias_map, hold_label
 from freqid.checks import FloatArray, choice, positive, whole
+from freqid.conditions import Conditions
 from freqid.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 from freqid.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum
 from freqid.models import GreyBox

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from freqid.apparent import Sampling, state_space_of
-from freqid.asymptotic import Conditions, asymptotic_fit, model_responses
+from freqid.asymptotic import asymptotic_fit, model_responses
 from freqid.batched_fit import Answers, Batch, Problem, descend, solve
 from freqid.checks import FloatArray
+from freqid.conditions import Conditions
 from freqid.holds import Hold, as_hold
 from freqid.input_spectra import InputSpectrum
 from freqid.models import GreyBox

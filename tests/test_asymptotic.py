@@ -6,7 +6,7 @@ import pytest
 import scipy.signal
 
 import freqid as fq
-from freqid import asymptotic
+from freqid import conditions
 
 T1 = 0.5e-3
 TRUE = fq.ZeroOrderHold(T1)
@@ -54,14 +54,14 @@ def test_quadrature_against_a_hundred_times_as_many_nodes(
     plant, monkeypatch, factor, hold, spectrum
 ):
     est = fq.asymptotic_fit(plant, spectrum, factor * T1, hold, TRUE)
-    coarse = asymptotic.resolved
+    coarse = conditions.resolved
 
     def fine(panels, functions):
         panels = coarse(panels, functions)
         edges = np.linspace(panels[:, 0], panels[:, 1], 101)
         return np.column_stack([edges[:-1].T.ravel(), edges[1:].T.ravel()])
 
-    monkeypatch.setattr(asymptotic, "resolved", fine)
+    monkeypatch.setattr(conditions, "resolved", fine)
     start = dict(zip(est.names, est.values, strict=True))
     reference = fq.asymptotic_fit(plant, spectrum, factor * T1, hold, TRUE, start=start, n_starts=1)
     assert np.abs(est.values / reference.values - 1).max() < 1e-8
