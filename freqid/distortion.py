@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.averaged import as_records
 from freqid.checks import ComplexArray, FloatArray, positive, whole
 from freqid.frequency_response import FrequencyResponse
 from freqid.record import Record
+from freqid.record_sets import as_records
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from freqid.averaged import as_records, references_of
 from freqid.checks import Array, ComplexArray, FloatArray, whole
 from freqid.frequency_response import FrequencyResponse
 from freqid.record import Record
+from freqid.record_sets import as_records, references_of
 from freqid.spectra import spectra
 
 # windows that are worked on at once
