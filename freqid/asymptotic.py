@@ -202,7 +202,7 @@ def _black(
             break
         expected = finer
         est = solve(expected)
-    return dataclasses.replace(est, covariance_matrix=np.zeros_like(est.covariance_matrix))
+    return dataclasses.replace(est, uncertainty=np.zeros_like(est.covariance_matrix))
 
 
 def _responses_of(model: Any, hold: Hold) -> Responses:
@@ -226,7 +226,7 @@ def _with_errors(
 ) -> Estimate:
     N = None if duration is None else duration / sampling.dt
     covariance = error_covariance(est.values, structure, expected, est.hold, noise_std, N)
-    return dataclasses.replace(est, covariance_matrix=covariance)
+    return dataclasses.replace(est, uncertainty=covariance)
 
 
 def error_covariance(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from freqid.estimate import Estimate
 from freqid.experiments import SpectralExperiment
 from freqid.frequency_response import FrequencyResponse
 from freqid.holds import FirstOrderHold, Hold, PeriodicHold
+from freqid.noise_spectrum import score_covariance
 from freqid.optimise import Objective, Problem, Solution, minimise, noise_variance, outcome, polish
 from freqid.preparation import Options, enough_rows, prepare
 from freqid.rational import DiscreteModel, OutputError, coefficients_of
@@ -152,7 +154,6 @@ def _estimate(
         at(solution.x),
         at(solution.x).coefficients()[0],
         lambda points: coefficients_of(chart.in_z(points)),
-        np.ones(chart.size),
         solution,
         objective,
         hold,
@@ -160,11 +161,37 @@ def _estimate(
     )
 
 
+@dataclass(frozen=True)
+class _Uncertainty:
+    """Covariance of coefficients, computed when it is asked for.
+
+    H⁻¹ M H⁻¹ as for grey boxes (see score_covariance), carried to the coefficients by their
+    derivative; for samples in time, and where nothing but rounding is left, of white noise.
+    """
+
+    objective: Objective
+    solution: Solution
+    change: FloatArray
+
+    def __call__(self) -> FloatArray:
+        point = self.solution.point
+        half = np.linalg.pinv(point.jacobian)
+        score = None
+        if point.cost > 1e-18 * sum(e.energy for e in self.objective.experiments):
+            score = score_covariance(self.objective, self.solution.x)
+        inverse = half @ half.T
+        if score is None:
+            inner = noise_variance(self.objective, point, len(half)) * inverse
+        else:
+            inner = inverse @ score @ inverse
+        covariance: FloatArray = self.change @ inner @ self.change.T
+        return covariance
+
+
 def coefficient_estimate(
     model: Any,
     names: list[str],
     coefficients: Callable[[FloatArray], FloatArray],
-    scale: FloatArray,
     solution: Solution,
     objective: Objective,
     hold: Any,
@@ -174,19 +201,17 @@ def coefficient_estimate(
 
     ``coefficients`` gives them at many points, (S, unknowns) to (S, names).
     """
-    point, step = solution.point, 1e-7
-    moved = np.concatenate([np.zeros((1, len(scale))), step * np.eye(len(scale))])
+    step, count = 1e-7, len(solution.x)
+    moved = np.concatenate([np.zeros((1, count)), step * np.eye(count)])
     values, *others = coefficients(solution.x + moved)
     change = (np.array(others) - values).T / step
-    noise = noise_variance(objective, point, len(scale))
-    half = change @ np.linalg.pinv(point.jacobian)
     return Estimate(
         model=model,
         names=names,
         values=values,
         nominal=np.full(len(values), np.nan),
         units=[""] * len(values),
-        covariance_matrix=noise * half @ half.T,
+        uncertainty=_Uncertainty(objective, solution, change),
         hold=hold,
         dt=dt,
         warnings=[] if solution.converged else [f"not converged: {solution.message}"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -38,7 +38,8 @@ class Estimate:
     values: FloatArray
     nominal: FloatArray
     units: Sequence[str]
-    covariance_matrix: FloatArray
+    # the covariance, or what computes it when it is asked for
+    uncertainty: FloatArray | Callable[[], FloatArray]
     cost: float
     fit_percent: float
     converged: bool
@@ -73,6 +74,11 @@ class Estimate:
     def hold_period(self) -> float | None:
         """Period of the hold in s; None for a band-limited input."""
         return getattr(self.hold, "period", None)
+
+    @cached_property
+    def covariance_matrix(self) -> FloatArray:
+        """Covariance of the parameters, (P, P)."""
+        return self.uncertainty() if callable(self.uncertainty) else self.uncertainty
 
     @cached_property
     def parameters(self) -> pd.DataFrame:

@@ -182,7 +182,7 @@ def _estimate(
         values=values,
         nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),
         units=[*(p.unit for p in structure.parameters), "s"][: len(values)],
-        covariance_matrix=covariance,
+        uncertainty=covariance,
         problem=Problem(objective, solution.x),
         hold=hold,
         dt=dt,

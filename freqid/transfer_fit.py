@@ -82,9 +82,7 @@ def fit_transfer_function(
 
     found = at(solution.x)
     names_of = [*coefficients(found)[0], *(["delay"] if estimated else [])]
-    return coefficient_estimate(
-        found, names_of, described, structure.scale, solution, objective, hold, unit
-    )
+    return coefficient_estimate(found, names_of, described, solution, objective, hold, unit)
 
 
 def _edges(data: Any, options: Options) -> tuple[float, float, int]:

@@ -117,3 +117,46 @@ def test_the_refined_start_lands_near_the_minimum_in_noise(rng):
     least = fq.fit(fq.OutputError(4), record).cost
     assert cost(first_model([experiment], 4, False)) < 1.001 * least
     assert cost(identify([experiment], 4, False)) > 1.1 * least
+
+
+@pytest.mark.parametrize("spec", [fq.OutputError(2), fq.TransferFunction(1, 2)])
+def test_error_bars_of_black_boxes_hold_in_coloured_noise(spec):
+    """Noise with a resonance beside the plant's: bars of white noise hold in two cases of three."""
+    from scipy.signal import lfilter
+
+    runs, dt = 100, 0.01
+    a = np.poly([0.7 + 0.5j, 0.7 - 0.5j])
+    colour = np.poly([0.7 + 0.55j, 0.7 - 0.55j])
+    rng = np.random.default_rng(7)
+    inside, values = 0.0, []
+    truth = np.array([0.5, -0.2, *a[1:]])
+    if isinstance(spec, fq.TransferFunction):
+        clean = rng.standard_normal(4000)
+        exact = fq.fit(spec, fq.Record(clean, lfilter([0, 0.5, -0.2], a, clean), dt=dt))
+        truth = exact.values
+    for _ in range(runs):
+        u, noise = rng.standard_normal(2000), lfilter([1], colour, rng.standard_normal(2000))
+        est = fq.fit(spec, fq.Record(u, lfilter([0, 0.5, -0.2], a, u) + 0.1 * noise, dt=dt))
+        inside += (np.abs(est.values - truth) < 1.96 * est.parameters["std"].to_numpy()) / runs
+        values.append(est.values)
+    # four standard deviations of the share that holds below 95 %
+    assert (inside > 0.95 - 4 * np.sqrt(0.95 * 0.05 / runs)).all()
+    assert np.allclose(np.std(values, axis=0), est.parameters["std"], rtol=0.35)
+
+
+def test_error_bars_of_black_boxes_in_white_noise_are_those_of_white_noise(rng):
+    """Against σ²(JᵀJ)⁻¹ with the Jacobian of the time domain, by differences."""
+    from scipy.signal import lfilter
+
+    a = np.poly([0.7 + 0.5j, 0.7 - 0.5j])
+    u = rng.standard_normal(20000)
+    theta = np.array([0.5, -0.2, *a[1:]])
+
+    def output(t):
+        return lfilter([0, *t[:2]], [1, *t[2:]], u)
+
+    J = np.array([(output(theta + s) - output(theta)) / 1e-6 for s in 1e-6 * np.eye(4)]).T
+    expected = 0.1 * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    record = fq.Record(u, output(theta), dt=0.01).with_noise(0.1, seed=3)
+    est = fq.fit(fq.OutputError(2), record)
+    assert np.allclose(est.parameters["std"], expected, rtol=0.1)

@@ -232,7 +232,7 @@ def test_reports_of_odd_estimates(plant, slow, tmp_path):
     n = 10_000
     many = dataclasses.replace(
         est, names=[f"p{i}" for i in range(n)], values=np.ones(n), nominal=np.ones(n),
-        units=[""] * n, covariance_matrix=np.eye(n), data=(), problem=None,
+        units=[""] * n, uncertainty=np.eye(n), data=(), problem=None,
     )  # fmt: skip
     many.report(tmp_path / "many.html")
     text = (tmp_path / "many.html").read_text()
