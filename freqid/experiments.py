@@ -112,7 +112,7 @@ class SpectralExperiment:
         if discrete:
             # the matrices are sampled already: the kernel takes them as they are
             self.hold = BandLimited()
-        self.n_rows = 2 * Y.size - n_real
+        self.n_rows = 2 * int(np.count_nonzero(scale)) - n_real
 
     @classmethod
     def of_record(
@@ -126,13 +126,14 @@ class SpectralExperiment:
     ) -> SpectralExperiment:
         """Lines of a record; ``weights`` (K,) or (outputs, K) multiply the squared error."""
         scale = np.sqrt(s.multiplicity * weights / s.n_samples)
-        n_real = int((s.multiplicity == 1).sum()) * len(s.Y)
+        scale = np.broadcast_to(scale, s.Y.shape)
+        n_real = int(np.count_nonzero(scale[:, s.multiplicity == 1]))
         return cls(
             s.omega,
             s.omega_input,
             s.U.reshape(len(s.U), 1, -1),
             s.Y[:, None, :],
-            np.broadcast_to(scale, s.Y.shape)[:, None, :],
+            scale[:, None, :],
             hold,
             s.dt if transient else None,
             n_real,
@@ -172,17 +173,11 @@ class SpectralExperiment:
             return float(np.vdot(self.Y, self.Y).real)
         return float(np.sum(self.rows(self.Y) ** 2))
 
-    def thinned(self, step: int, scattered: bool = False) -> SpectralExperiment:
-        """One line in ``step``, weighted so that costs stay comparable.
-
-        ``scattered`` takes any of each run, always the same, instead of the first: weights may have
-        a period of their own.
-        """
+    def thinned(self, step: int) -> SpectralExperiment:
+        """One in ``step`` of the lines that count, weighted so that costs stay comparable."""
         few = copy.copy(self)
-        lines = np.arange(0, len(self.omega), step)
-        if scattered:
-            lines = lines + np.random.default_rng(0).integers(0, step, len(lines))
-            lines = lines[lines < len(self.omega)]
+        # weights may leave out lines with a period of their own
+        lines = np.flatnonzero((self.scale > 0).any(axis=(0, 1)))[::step]
         inputs = (lines[:, None] * self.aliases + np.arange(self.aliases)).ravel()
         more = np.sqrt(step)
         few.omega, few.omega_input = self.omega[lines], self.omega_input[lines]

@@ -17,7 +17,7 @@ _LINES = 4000
 
 
 def smoothed_power(error: Any) -> FloatArray:
-    """Local mean of |error|² over neighbouring lines, (…, K), for complex errors (…, K)."""
+    """Local mean of |error|² over neighbouring lines, (…, K), for errors (…, K)."""
     power = np.abs(error) ** 2
     K = power.shape[-1]
     width = min(2 * int(np.sqrt(K)) + 1, K)
@@ -58,6 +58,7 @@ def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
             assert isinstance(e, SpectralExperiment)
             step = max(len(e.omega) // _LINES, 1)
             few = e.thinned(step) if step > 1 else e
+            counted = (few.scale > 0).astype(float).reshape(-1, len(few.omega))
             evaluation = few.at(realisation)
             r, T, delta = evaluation.residual, evaluation.transient, None
             Q = np.zeros((0, len(r)))
@@ -68,7 +69,8 @@ def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
             J = J - (J @ Q.T) @ Q
             lines = r.view(complex).reshape(-1, len(few.omega))
             # half of a complex error's power is in each of its parts
-            power = np.repeat(smoothed_power(lines).ravel() / 2, 2)
+            local = smoothed_power(lines) / np.maximum(smoothed_power(counted), 1e-9)
+            power = np.repeat(local.ravel() / 2, 2)
             total += (J * power) @ J.T / step
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)

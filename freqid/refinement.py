@@ -58,7 +58,7 @@ def first_model(
 def _fewer_lines(experiments: Sequence[SpectralExperiment]) -> Sequence[SpectralExperiment]:
     """A part of the lines, where they are very many: their minimum is next to that of all."""
     step = sum(len(e.omega) for e in experiments) // _LINES
-    return [e.thinned(step, scattered=True) for e in experiments] if step > 1 else experiments
+    return [e.thinned(step) for e in experiments] if step > 1 else experiments
 
 
 def _believed(lines: RationalLines, found: Minimum) -> bool:
