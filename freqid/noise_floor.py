@@ -22,6 +22,9 @@ def noise_floor(experiments: Sequence[Experiment]) -> float:
 def _local_noise(e: Experiment) -> float:
     if not isinstance(e, SpectralExperiment) or e.U.shape[:2] != (1, 1) or e.aliases > 1:
         return 0.0
+    if not (e.scale > 0).all():
+        # among lines that are left out nothing is smooth
+        e = e.thinned(1)
     width, K = 12, len(e.omega)
     count = K // width
     if count < 4:

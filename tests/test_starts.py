@@ -99,3 +99,17 @@ def test_a_narrow_band_of_a_long_record_is_the_same_dft(rng):
         lines = np.arange(N // 50, N // 20)
         full = np.fft.rfft(x)[:, lines]
         assert np.abs(dft_at(x, lines) - full).max() < 1e-12 * np.abs(full).max()
+
+
+@pytest.mark.parametrize("period", [None, 2, 4])
+def test_the_noise_floor_is_the_noise_that_was_added(plant, period):
+    """Over K lines of weight 1 white noise of σ costs 2 K σ², whichever lines are left out."""
+    from freqid.noise_floor import noise_floor
+    from freqid.preparation import Options, prepare
+
+    record = fq.simulate(plant, fq.chirp(10, 80, 40, 5e-4), 5e-4).with_noise(0.3, seed=2)
+    weights = np.ones(2801)
+    if period is not None:
+        weights[::period] = 0
+    experiment, _ = prepare(record, (1, 1), weights, Options(None, (10, 80)))
+    assert noise_floor([experiment]) == pytest.approx(2 * weights.sum() * 0.3**2, rel=0.15)
