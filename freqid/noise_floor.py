@@ -9,6 +9,10 @@ import numpy as np
 from freqid.experiments import Experiment, SpectralExperiment
 
 
+# median of χ² over its mean, with the twelve degrees of freedom of a window
+_MEDIAN = 0.945
+
+
 def noise_floor(experiments: Sequence[Experiment]) -> float:
     """Cost that the data's own noise explains, from local polynomials; 0 where it is unknown.
 
@@ -46,4 +50,4 @@ def _local_noise(e: Experiment) -> float:
     Y = (e.Y if e.line_scale is not None else e.Y * e.scale)[:, 0][:, at][..., None]
     left = Y - Q @ (Q.conj().swapaxes(-1, -2) @ Y)
     variance = (np.abs(left[..., 0]) ** 2).sum(axis=-1) / (width - 6)
-    return float(np.median(variance, axis=-1).sum() * K)
+    return float(np.median(variance, axis=-1).sum() * K / _MEDIAN)

@@ -112,4 +112,4 @@ def test_the_noise_floor_is_the_noise_that_was_added(plant, period):
     if period is not None:
         weights[::period] = 0
     experiment, _ = prepare(record, (1, 1), weights, Options(None, (10, 80)))
-    assert noise_floor([experiment]) == pytest.approx(2 * weights.sum() * 0.3**2, rel=0.15)
+    assert noise_floor([experiment]) == pytest.approx(2 * weights.sum() * 0.3**2, rel=0.2)
