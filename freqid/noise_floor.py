@@ -8,7 +8,6 @@ import numpy as np
 
 from freqid.experiments import Experiment, SpectralExperiment
 
-
 # median of χ² over its mean, with the twelve degrees of freedom of a window
 _MEDIAN = 0.945
 
