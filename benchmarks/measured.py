@@ -1,6 +1,6 @@
 """Error bars, estimators of the response and the measured robot, printed as a table.
 
-    python benchmarks/measured.py            all of it, about half an hour on two cores
+    python benchmarks/measured.py            all of it, about three minutes on two cores
     python benchmarks/measured.py --quick    a tenth of the runs
 
 The robot's records are looked for as examples/ruler_robot.py does; that part is left out where they
