@@ -9,6 +9,7 @@ import resource
 import time
 
 import numpy as np
+from table import show
 
 import freqid as fq
 from freqid.apparent import Sampling
@@ -25,10 +26,6 @@ def chirps(count):
         for low in (4, 10)
         for high in np.linspace(30, 95, count)
     }
-
-
-def show(what, value, target):
-    print(f"{what:62s} {value:>24s}   ({target})", flush=True)
 
 
 def speed():

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.signal
+from table import show
 
 import freqid as fq
 
@@ -25,10 +26,6 @@ T1, BAND = 0.5e-3, (10, 80)
 PLANT = fq.two_mass()
 NAMES = [p.name for p in PLANT.free_parameters]
 TRUE = np.array([PLANT[n] for n in NAMES])
-
-
-def show(what, value, target):
-    print(f"{what:66s} {value:>24s}   ({target})", flush=True)
 
 
 def coverage(count):

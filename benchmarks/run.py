@@ -20,17 +20,12 @@ from freqid.responses import points
 
 sys.path.insert(0, str(Path(__file__).parent))
 import baseline
+from table import show
 
 T1, BAND = 0.5e-3, (10, 80)
 PLANT = fq.two_mass()
 NAMES = [p.name for p in PLANT.free_parameters]
 TRUE = np.array([PLANT[n] for n in NAMES])
-
-
-def show(what, value, target):
-    print(f"{what:66s} {value:>24s}   ({target})", flush=True)
-
-
 ROUNDS = 5
 
 

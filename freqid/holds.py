@@ -34,9 +34,8 @@ class ModalSampled(NamedTuple):
     """What a hold makes of an eigenvalue λ of A, and the divided differences of that.
 
     φ = exp(λ h); γ and γ⁺ (None under a zero-order hold) multiply the rows of V⁻¹B. ``d…``
-    (…, n, n) are the divided differences
-    f[λi, λj], the factors of the Fréchet derivative in the eigenbasis (Higham, Functions of
-    Matrices, 2008, theorem 3.11).
+    (…, n, n) are the divided differences f[λi, λj], the factors of the Fréchet derivative in the
+    eigenbasis (Higham, Functions of Matrices, 2008, theorem 3.11).
     """
 
     phi: ComplexArray

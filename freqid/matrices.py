@@ -62,12 +62,7 @@ class MatrixFunction:
         A complex step (Squire and Trapp, SIAM Review 40, 1998) gives the derivative to rounding;
         where the user's function does not carry complex numbers through, central differences.
         """
-        if self.jacobian is not None:
-            resolved = self.ties.resolve(values)
-            return Linearisation(
-                _shaped(self.matrices(**resolved), resolved), self._by_jacobian(values, names)
-            )
-        if self.vectorized:
+        if self.vectorized and self.jacobian is None:
             columns = np.array(list(values.values()), dtype=float)[:, None]
             at, derivative = self._complex_batch(list(values), columns, names)
             return Linearisation(
@@ -75,15 +70,18 @@ class MatrixFunction:
             )
         resolved = self.ties.resolve(values)
         at = _shaped(self.matrices(**resolved), resolved)
-        derivative = self._differentiate(values, names, self.takes_complex(names))
-        return Linearisation(at, derivative)
+        if self.jacobian is not None:
+            return Linearisation(at, self._by_jacobian(at, values, names))
+        exact = self.takes_complex(names)
+        return Linearisation(at, self._differentiate(at, values, names, exact))
 
-    def _by_jacobian(self, values: Mapping[str, float], names: Sequence[str]) -> StateSpace:
+    def _by_jacobian(
+        self, at: StateSpace, values: Mapping[str, float], names: Sequence[str]
+    ) -> StateSpace:
         """The user's derivatives, carried through the ties by the chain rule."""
         assert self.jacobian is not None
         by = self.jacobian(**self.ties.resolve(values))
-        shapes = [M.shape for M in self.at(values)]
-        total = [np.zeros((len(names), *shape)) for shape in shapes]
+        total = [np.zeros((len(names), *M.shape)) for M in at]
         for i, name in enumerate(names):
             moved = self.ties.resolve({**values, name: values[name] + _COMPLEX_STEP * 1j})
             for other, value in moved.items():
@@ -136,14 +134,18 @@ class MatrixFunction:
         )
 
     def _differentiate(
-        self, values: Mapping[str, float], names: Sequence[str], by_complex_step: bool
+        self,
+        at: StateSpace,
+        values: Mapping[str, float],
+        names: Sequence[str],
+        by_complex_step: bool,
     ) -> StateSpace:
         columns = []
         for name in names:
             v = values[name]
             if by_complex_step:
-                at = self.ties.resolve({**values, name: v + _COMPLEX_STEP * 1j})
-                moved = _dense(self.matrices(**at), complex)
+                stepped = self.ties.resolve({**values, name: v + _COMPLEX_STEP * 1j})
+                moved = _dense(self.matrices(**stepped), complex)
                 columns.append([M.imag / _COMPLEX_STEP for M in moved])
             else:
                 # the step that balances rounding against the third derivative
@@ -153,11 +155,10 @@ class MatrixFunction:
                     for s in (step, -step)
                 )
                 columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])
-        shapes = [M.shape for M in self.at(values)]
         return StateSpace(
             *(
-                np.array([c[i] for c in columns]).reshape(len(names), *shape)
-                for i, shape in enumerate(shapes)
+                np.array([c[i] for c in columns]).reshape(len(names), *M.shape)
+                for i, M in enumerate(at)
             )
         )
 
@@ -169,8 +170,9 @@ class MatrixFunction:
         return self._carries[key]
 
     def _tried(self, values: Mapping[str, float], names: Sequence[str]) -> bool:
+        at = self.at(values)
         try:
-            exact = self._differentiate(values, names, by_complex_step=True)
+            exact = self._differentiate(at, values, names, by_complex_step=True)
         except (
             TypeError,
             ValueError,
@@ -179,7 +181,7 @@ class MatrixFunction:
             np.exceptions.ComplexWarning,
         ):
             return False
-        rough = self._differentiate(values, names, by_complex_step=False)
+        rough = self._differentiate(at, values, names, by_complex_step=False)
         return all(
             bool(
                 np.all(np.abs(a - b) <= 1e-4 * np.abs(b).max(axis=(1, 2), keepdims=True, initial=0))

@@ -31,6 +31,10 @@ def triangle(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
+# rows for which, from so many columns on, products row by row are faster
+_FEW_ROWS, _SHORT = 6, 2000
+
+
 def inner(A: FloatArray, B: FloatArray) -> FloatArray:
     """A Bᵀ for few long rows, in blocks; where they are very few, row by row.
 
@@ -48,7 +52,6 @@ def inner(A: FloatArray, B: FloatArray) -> FloatArray:
     return total
 
 
-_FEW_ROWS, _SHORT = 6, 2000
 # least pivot of the scaled Gram matrix below which half of the digits are gone
 _LEAST_PIVOT = 1e-4
 

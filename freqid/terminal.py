@@ -10,8 +10,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-import freqid as fq
 from freqid.files import whole_file
+from freqid.holds import FirstOrderHold, ZeroOrderHold
 
 notes = Console(stderr=True)
 
@@ -33,7 +33,7 @@ def hold_of(text: str | None) -> Any:
     if text is None or ":" not in text:
         return text
     kind, _, period = text.partition(":")
-    kinds = {"zoh": fq.ZeroOrderHold, "foh": fq.FirstOrderHold}
+    kinds = {"zoh": ZeroOrderHold, "foh": FirstOrderHold}
     try:
         return kinds[kind](float(period))
     except (KeyError, ValueError):

@@ -341,12 +341,11 @@ class _Late:
         return fq.GreyBox(self, [fq.Parameter("b", 5.5), fq.Parameter("a", 7)])
 
 
-@pytest.mark.parametrize("first", [0, 1])
-def test_weights_that_leave_out_lines_with_a_period_of_their_own(plant, first):
+@pytest.mark.parametrize("kept", [[1, 2, 3], [3]])
+def test_weights_that_leave_out_lines_with_a_period_of_their_own(plant, kept):
     """A quarter of the lines left out, then three: the error bars are those of fewer data."""
     record = fq.simulate(plant, fq.chirp(10, 80, 100, 5e-4), 5e-4).with_noise(0.3, seed=5)
-    lines = np.arange(7001)
-    out = (lines % 4 == first) if first == 0 else (lines % 4 != 3)
+    out = ~np.isin(np.arange(7001) % 4, kept)
     start = {p.name: 1.2 * p.value for p in plant.free_parameters}
     whole = fq.fit(plant, record, band=(10, 80))
     part = fq.fit(plant, record, band=(10, 80), weights=np.where(out, 0.0, 1.0), start=start)
