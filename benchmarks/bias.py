@@ -12,8 +12,8 @@ import numpy as np
 from table import show
 
 import freqid as fq
-from freqid.apparent import Sampling
-from freqid.conditions import Conditions
+from freqid.bias.apparent import Sampling
+from freqid.bias.conditions import Conditions
 
 T1 = 0.5e-3
 PLANT = fq.two_mass()

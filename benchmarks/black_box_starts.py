@@ -16,13 +16,13 @@ import scipy.interpolate
 import scipy.linalg
 
 import freqid as fq
-from freqid.black_box import _descend, lines_in_plane
-from freqid.charts import Chart
-from freqid.optimise import Objective
-from freqid.preparation import Options
-from freqid.refinement import first_model
-from freqid.sampled_plant import StateSpace
-from freqid.subspace import identify, inputs_of
+from freqid.fitting.black_box.output_error import _descend, lines_in_plane
+from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.subspace import identify, inputs_of
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.minimum import Objective
+from freqid.fitting.preparation import Options
+from freqid.lti.sampled import StateSpace
 
 
 def modes(frequencies, dampings):

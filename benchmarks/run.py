@@ -15,8 +15,8 @@ import numpy as np
 import scipy.linalg
 
 import freqid as fq
-from freqid.bases import basis_of
-from freqid.responses import points
+from freqid.lti.bases import basis_of
+from freqid.lti.responses import points
 
 sys.path.insert(0, str(Path(__file__).parent))
 import baseline

@@ -1,0 +1,126 @@
+"""What decimated data will say of a plant, at frequencies that stand for all of them.
+
+Densities become sums over the nodes of Gauss's rule, as many as the functions under the integral
+need, so that a fit to them is the one of measured responses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from freqid.bias.apparent import (
+    Held,
+    Sampling,
+    apparent_density,
+    apparent_lines,
+    held_response,
+    slow_edges,
+    weight_of,
+)
+from freqid.checks import Array, ComplexArray, FloatArray, band
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.excitation.input_spectra import InputSpectrum
+from freqid.lti.quadrature import panel_nodes, resolved
+from freqid.lti.sampled import StateSpace
+
+Responses = Callable[[FloatArray], Array]
+
+
+@dataclass(frozen=True)
+class Expected:
+    """All that decimated data will say, at K frequencies that stand for all of them.
+
+    ``weight`` (K,) is the power of the input at each node times the prefilter's; ``error_power``
+    (outputs, inputs, K) the power per sample, at each node, of what is not a response to the input
+    as it was kept, as a part of the input's own density there.
+    """
+
+    frequency: FloatArray
+    weight: FloatArray
+    gain: FloatArray
+    response: ComplexArray
+    error_power: FloatArray
+    panels: FloatArray
+
+    def as_response(self, sampling: Sampling, plant: Any) -> FrequencyResponse:
+        """The same as a FrequencyResponse at the slow rate."""
+        return FrequencyResponse(
+            self.frequency,
+            self.response,
+            dt=sampling.dt,
+            hold=sampling.hold,
+            input_names=getattr(plant, "inputs", None),
+            output_names=getattr(plant, "outputs", None),
+        )
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Everything but the model: spectrum, sampling, band and weights."""
+
+    spectrum: InputSpectrum
+    sampling: Sampling
+    band: tuple[float, float] | None = None
+    prefilter: Any = None
+    noise_model: Any = None
+
+    def expected(self, at: StateSpace, responses: Responses | None = None) -> Expected:
+        """The data, at nodes that resolve them and the ``responses`` (any, K) of frequencies in Hz.
+
+        Raises ValueError where the spectrum has no energy below the slow Nyquist limit.
+        """
+        s, held = self.sampling, held_response(at, self.sampling.hold)
+        nyquist = 0.5 / s.dt
+        low, high = (0.0, nyquist) if self.band is None else band(self.band, nyquist)
+        edges = slow_edges(self.spectrum, s)
+        edges = np.unique(np.clip(edges, low, high)) if len(edges) else edges
+        panels = np.column_stack([edges[:-1], edges[1:]])
+        frequency, weights = np.zeros(0), np.zeros(0)
+        if len(panels):
+            middle = panels.mean(axis=1)
+            panels = panels[apparent_density(held, self.spectrum, s, middle).power > 0]
+        if len(panels):
+            panels = resolved(panels, lambda f: self._columns(held, f, responses))
+            frequency, weights = panel_nodes(panels)
+        dense = apparent_density(held, self.spectrum, s, frequency)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lines = apparent_lines(held, self.spectrum, s)
+        inside = (lines.frequency >= low - 1e-9 * nyquist) & (lines.power > 0)
+        inside &= lines.frequency <= high + 1e-9 * nyquist
+        # a plant that integrates answers a constant with anything at all
+        inside &= np.isfinite(lines.response).all(axis=(0, 1))
+        power = np.concatenate([dense.power * weights, lines.power[inside]])
+        if not power.any():
+            raise ValueError(
+                f"spectrum has no energy between {low:g} and {high:g} Hz at dt={s.dt:g} s; it "
+                "identifies nothing there"
+            )
+        where = np.concatenate([frequency, lines.frequency[inside]])
+        order = np.argsort(where, kind="stable")
+        gain = weight_of(where, s.dt, self.prefilter, self.noise_model)
+        G = np.concatenate([dense.response, lines.response[..., inside]], axis=-1)
+        # lines are sure of their phase: they leak nothing into one another
+        sure = np.ones((*dense.coherence.shape[:2], int(inside.sum())))
+        coherence = np.concatenate([dense.coherence, sure], axis=-1)
+        error = np.abs(G) ** 2 * (1 / np.maximum(coherence, 1e-300) - 1)
+        density = np.concatenate([dense.power, np.zeros(inside.sum())]) / (2 * s.dt)
+        return Expected(
+            where[order],
+            (power * gain)[order],
+            gain[order],
+            G[..., order],
+            (error * density)[..., order],
+            panels,
+        )
+
+    def _columns(self, held: Held, f: FloatArray, responses: Responses | None) -> Array:
+        seen = apparent_density(held, self.spectrum, self.sampling, f)
+        weight = seen.power * weight_of(f, self.sampling.dt, self.prefilter, self.noise_model)
+        rows = [weight[None], seen.response.reshape(-1, len(f))]
+        if responses is not None:
+            rows.append(responses(f))
+        return np.concatenate(rows)

@@ -1,0 +1,228 @@
+"""Which experiment tells most: bias and scatter together, before anything is measured."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.bias.apparent import Sampling, state_space_of
+from freqid.bias.asymptotic import error_covariance, model_responses
+from freqid.bias.conditions import Conditions
+from freqid.bias.maps import bias_map, hold_label
+from freqid.checks import FloatArray, choice, positive, whole
+from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum
+from freqid.excitation.signal_spectra import multisine_lines
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.lti.holds.hold import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.lti.realisation import sampled_response
+from freqid.models.grey_box import GreyBox
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# peak over rms that a multisine of low crest reaches; that of a sine is √2
+_CREST = 1.45
+# lines of a D-optimal design, and a share of the power below which one is left out
+_GRID_LINES = 4000
+_LEAST_SHARE = 1e-4
+
+
+def experiment_design(
+    plant: GreyBox,
+    base_dt: float,
+    *,
+    noise_std: float,
+    amplitude: float = 1.0,
+    duration: float = 10.0,
+    factors: Iterable[int] = (1, 2, 5, 10),
+    bands: Sequence[tuple[float, float]] | None = None,
+    holds: Iterable[Hold | str | None] = (None,),
+    true_hold: Hold | None = None,
+    method: str = "linear",
+    d_optimal: bool = False,
+    criterion: str = "worst",
+    n_jobs: int | None = None,
+) -> pd.DataFrame:
+    """Rank chirp bands and logging rates by the error to expect in the parameters.
+
+    Args:
+        plant: a guess of the plant, at its values.
+        base_dt: sample time of the converter in s; the output is logged at ``factors`` times it.
+        noise_std: standard deviation of white noise on every logged sample of the output.
+        amplitude: the largest input that is allowed; ``duration`` of the record in s.
+        bands: (low, high) in Hz; by default a grid around the plant's poles.
+        holds: that the fit is to assume; None is the true one.
+        true_hold: what the converter does; None for a zero-order hold at ``base_dt``.
+        method: of the chirps, ``"linear"`` or ``"log"``.
+        d_optimal: add for each rate the multisine that determines the parameters best together.
+        criterion: ``"worst"`` or ``"rms"`` of the parameters' relative errors makes the ranking.
+
+    Returns a DataFrame, best first: excitation, low, high, factor, dt, hold, error, worst (the
+    parameter that is worst), then bias, std and error of each parameter, relative to its value:
+    error² = bias² + std². ``attrs["best"]`` is the first row as a dict. Raises ValueError for a
+    noise, amplitude or duration that is not positive, or bands that are not.
+
+    >>> import freqid as fq
+    >>> table = experiment_design(fq.two_mass(), 0.5e-3, noise_std=0.01, factors=[10],
+    ...                           bands=[(2, 10), (10, 80)])
+    >>> float(table.attrs["best"]["high"])
+    80.0
+    """
+    import pandas as pd
+
+    positive("noise_std", noise_std)
+    positive("amplitude", amplitude)
+    positive("duration", duration, "s")
+    choice("criterion", criterion, ("worst", "rms"))
+    counts = [whole("factors", f) for f in factors]
+    hold = ZeroOrderHold(base_dt) if true_hold is None else true_hold
+    grid = _bands(plant, base_dt) if bands is None else [(float(a), float(b)) for a, b in bands]
+    spectra: dict[str, InputSpectrum] = {
+        f"chirp {low:g}-{high:g} Hz": ChirpSpectrum(low, high, method, amplitude)
+        for low, high in grid
+    }
+    edges = dict(zip(spectra, grid, strict=True))
+    assumed = list(holds)
+    names = [p.name for p in plant.free_parameters]
+    tables = [(counts, spectra)]
+    if d_optimal:
+        low, high = min(b[0] for b in grid), max(b[1] for b in grid)
+        for factor in counts:
+            name = f"D-optimal multisine at {1e3 * base_dt * factor:g} ms"
+            limit = min(high, 0.45 / (base_dt * factor))
+            if limit <= low:
+                continue
+            power = (amplitude / _CREST) ** 2
+            best = d_optimal_spectrum(
+                plant, (low, limit), duration, base_dt * factor, hold, power=power
+            )
+            edges[name] = (best.frequencies[0], best.frequencies[-1])
+            tables.append(([factor], {name: best}))
+    rows = []
+    for some, chosen in tables:
+        biases = bias_map(
+            plant, chosen, some, assumed, base_dt, true_hold=hold, n_jobs=n_jobs, progress=False
+        )
+        keys = ["hold", "factor", "spectrum"]
+        parts = dict(tuple(biases.groupby(keys, sort=False)))
+        for given, factor, name in itertools.product(assumed, some, chosen):
+            label = hold_label(given)
+            sampling = Sampling(hold, base_dt, factor)
+            part = parts[(label, factor, name)]
+            bias, std = _bias_and_scatter(
+                plant, chosen[name], sampling, given, part, noise_std, duration
+            )
+            low, high = edges[name]
+            row = {"excitation": name, "low": low, "high": high, "factor": factor}
+            row |= {"dt": sampling.dt, "hold": label}
+            rows.append(row | _score(names, bias, std, criterion))
+    table = pd.DataFrame(rows).sort_values("error", kind="stable", ignore_index=True)
+    table.attrs["best"] = table.iloc[0].to_dict()
+    return table
+
+
+def _bias_and_scatter(
+    plant: GreyBox,
+    spectrum: InputSpectrum,
+    sampling: Sampling,
+    hold: Hold | str | None,
+    biases: pd.DataFrame,
+    noise_std: float,
+    duration: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Relative bias and relative standard error of each parameter, (P,)."""
+    structure = GreyStructure(plant)
+    true = structure.values
+    size = np.where(true == 0, 1.0, np.abs(true))
+    values = biases.set_index("parameter")["estimate"].reindex(structure.names).to_numpy(float)
+    if not biases["converged"].all():
+        return np.full(len(true), np.inf), np.full(len(true), np.inf)
+    assumed = as_hold(hold, sampling.dt, sampling.hold)
+    seen = model_responses(structure, values / structure.scale, assumed)
+    expected = Conditions(spectrum, sampling).expected(state_space_of(plant), seen)
+    count = duration / sampling.dt
+    covariance = error_covariance(values, structure, expected, assumed, noise_std, count)
+    return (values - true) / size, np.sqrt(np.diag(covariance)) / size
+
+
+def _score(
+    names: Sequence[str], bias: FloatArray, std: FloatArray, criterion: str
+) -> dict[str, Any]:
+    """Columns of one design: the error that ranks it, and those of each parameter."""
+    error = np.hypot(bias, std)
+    total = error.max() if criterion == "worst" else np.sqrt(np.mean(error**2))
+    found: dict[str, Any] = {"error": float(total), "worst": names[int(error.argmax())]}
+    for i, name in enumerate(names):
+        found |= {f"bias {name}": bias[i], f"std {name}": std[i], f"error {name}": error[i]}
+    return found
+
+
+def _bands(plant: GreyBox, base_dt: float) -> list[tuple[float, float]]:
+    """Low and high ends around the plant's poles and zeros, half an octave to two octaves apart."""
+    poles = np.abs(np.linalg.eigvals(plant.state_space().A)) / (2 * np.pi)
+    poles = poles[poles > 1e-6 * max(poles.max(), 1e-12)]
+    centre = float(poles.max()) if len(poles) else 0.05 / base_dt
+    lows = centre * np.array([0.04, 0.1, 0.2, 0.4, 0.7])
+    highs = np.minimum(centre * np.array([0.8, 1.1, 1.6, 2.5, 4.0]), 0.5 / base_dt)
+    return [
+        (float(f"{low:.3g}"), float(f"{high:.3g}"))
+        for low in lows
+        for high in np.unique(highs)
+        if high > 1.2 * low
+    ]
+
+
+def d_optimal_spectrum(
+    plant: GreyBox,
+    band: tuple[float, float],
+    period: float,
+    dt: float,
+    hold: Hold | None = None,
+    *,
+    power: float = 1.0,
+) -> LineSpectrum:
+    """The multisine of a given power that makes the information's determinant largest.
+
+    Args: ``band`` in Hz, lines at multiples of 1/``period`` (s); ``dt`` of the record in s;
+    ``hold`` of the input, a zero-order hold at ``dt`` where not given; ``power`` in u².
+    Multiplicative updates (Fedorov and Hackl, Model-Oriented Design of Experiments, 1997, section
+    3.2) raise the determinant at each step. Returns a LineSpectrum of the few lines that carry
+    power. Raises ValueError for a band without lines, or lines that do not determine the
+    parameters.
+
+    >>> import freqid as fq
+    >>> best = d_optimal_spectrum(fq.first_order(), (1, 60), 1.0, 1e-3)
+    >>> len(best.frequencies) <= 3
+    True
+    """
+    k = multisine_lines(band, period)
+    k = k[np.unique(np.linspace(0, len(k) - 1, _GRID_LINES).astype(int))]
+    structure = GreyStructure(plant)
+    between = ZeroOrderHold(dt) if hold is None else hold
+    omega = 2 * np.pi * k / period
+    if isinstance(between, PeriodicHold) and omega[-1] * dt > np.pi * (1 + 1e-9):
+        raise ValueError(f"band={band} Hz reaches beyond {0.5 / dt:g} Hz, the Nyquist limit")
+    _, dG = sampled_response(structure.realise(structure.start), omega, between)
+    P = len(structure.names)
+    rows = np.moveaxis(dG, -1, 0).reshape(len(k), P, -1)
+    each = (rows @ rows.conj().swapaxes(-1, -2)).real
+    share = np.full(len(k), 1 / len(k))
+    for _ in range(3000):
+        H = np.tensordot(share, each, 1)
+        scale = np.sqrt(np.diag(H))
+        try:
+            inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
+        except np.linalg.LinAlgError:
+            raise ValueError(
+                f"band={band} Hz with a period of {period:g} s does not determine the parameters"
+            ) from None
+        gain = np.einsum("kij,ji->k", each, inverse) / P
+        if gain.max() < 1 + 1e-4:
+            break
+        share = share * gain
+    keep = share > _LEAST_SHARE
+    kept: FloatArray = share[keep] / share[keep].sum() * positive("power", power)
+    return LineSpectrum((k[keep] / period).tolist(), kept.tolist())

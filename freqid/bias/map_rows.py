@@ -1,0 +1,174 @@
+"""The rows of a bias map: what is asked of each, and a chunk of them answered together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from freqid.bias.apparent import Sampling, state_space_of
+from freqid.bias.asymptotic import asymptotic_fit, model_responses
+from freqid.bias.batched_fit import Answers, Batch, Problem, descend, solve
+from freqid.bias.conditions import Conditions
+from freqid.checks import FloatArray
+from freqid.excitation.input_spectra import InputSpectrum
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.trust import physical_warnings
+from freqid.lti.holds.hold import Hold, as_hold
+from freqid.lti.quadrature import TOLERANCE
+from freqid.models.grey_box import GreyBox
+
+# times that nodes are added to a row for the answer that it led to
+_ROUNDS = 3
+# least eigenvalue of JᵀJ with unit columns: below, the parameters are told apart by rounding
+_DETERMINED = 1e-14
+
+
+@dataclass(frozen=True)
+class Row:
+    """One fit of a map; labels are what the table shows."""
+
+    plant_label: str
+    spectrum_label: str
+    hold_label: str
+    factor: int
+    spectrum: InputSpectrum
+    hold: Hold | str | None
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all rows share."""
+
+    true_hold: Hold
+    base_dt: float
+    band: tuple[float, float] | None = None
+    antialias: bool = False
+    prefilter: Any = None
+    noise_model: Any = None
+
+    def conditions(self, row: Row) -> Conditions:
+        """Spectrum and sampling of a row."""
+        sampling = Sampling(self.true_hold, self.base_dt, row.factor, self.antialias)
+        return Conditions(row.spectrum, sampling, self.band, self.prefilter, self.noise_model)
+
+    def assumed(self, row: Row) -> Hold:
+        """The hold that a row's fit assumes."""
+        return as_hold(row.hold, self.base_dt * row.factor, self.true_hold)
+
+
+@dataclass
+class Answer:
+    """Estimates (P,) of one row, or why there are none."""
+
+    values: FloatArray
+    cost: float
+    converged: bool
+    message: str = ""
+
+
+def answer_chunk(model: GreyBox, rows: Sequence[Row], setting: Setting) -> list[Answer]:
+    """All rows of one plant and one kind of hold. A row that fails says so; the others stand."""
+    count = len(model.free_parameters)
+    answers = [Answer(np.full(count, np.nan), np.nan, False) for _ in rows]
+    problems: list[Problem] = []
+    kept: list[int] = []
+    for i, row in enumerate(rows):
+        try:
+            problems.append(_problem(model, row, setting))
+            kept.append(i)
+        except (ValueError, ArithmeticError) as error:
+            answers[i].message = str(error)
+    bounded = any(np.isfinite([p.lower, p.upper]).any() for p in model.free_parameters)
+    single = list(kept)
+    if kept and not bounded:
+        single = _together(model, [rows[i] for i in kept], setting, problems, kept, answers)
+    for i in single:
+        answers[i] = _alone(model, rows[i], setting)
+    for i in kept:
+        if answers[i].converged and not answers[i].message:
+            notes = physical_warnings(model.free_parameters, answers[i].values)
+            answers[i].message = "; ".join(notes)
+    return answers
+
+
+def _problem(model: GreyBox, row: Row, setting: Setting, at: FloatArray | None = None) -> Problem:
+    """Nodes for a row, fine enough for the model at its own values and at ``at`` (scaled)."""
+    structure = GreyStructure(model)
+    hold = setting.assumed(row)
+    points = [structure.start] if at is None else [structure.start, at]
+    seen = [model_responses(structure, x, hold) for x in points]
+    expected = setting.conditions(row).expected(
+        state_space_of(model), lambda f: np.concatenate([r(f) for r in seen])
+    )
+    count = 2 * expected.response.size
+    if count < len(structure.names):
+        raise ValueError(
+            f"spectrum has {count} real values for {len(structure.names)} free parameters; it does "
+            "not determine them: add lines or fix parameters"
+        )
+    return Problem(
+        expected.frequency, expected.weight, expected.response, hold, len(expected.panels)
+    )
+
+
+def _together(
+    model: GreyBox,
+    rows: Sequence[Row],
+    setting: Setting,
+    problems: list[Problem],
+    kept: Sequence[int],
+    answers: list[Answer],
+) -> list[int]:
+    """Fill in the answers of the batch; return the rows that it could not settle."""
+    batch = Batch(model, problems)
+    found = solve(batch)
+    for _ in range(_ROUNDS):
+        # lines among the nodes have no panels, and are exact
+        coarse = np.flatnonzero(batch.unresolved(found.values, 10 * TOLERANCE) & found.converged)
+        if len(coarse) == 0:
+            break
+        for i in coarse.tolist():
+            problems[i] = _problem(model, rows[i], setting, found.values[i])
+        batch = Batch(model, problems)
+        part = Batch(model, [problems[i] for i in coarse.tolist()])
+        again = descend(part, found.values[coarse])
+        found.values[coarse], found.cost[coarse] = again.values, again.cost
+        found.converged[coarse] = again.converged
+    settled = found.converged & _determined(batch, found)
+    for place, i in enumerate(kept):
+        if settled[place]:
+            answers[i] = Answer(found.values[place] * batch.scale, float(found.cost[place]), True)
+    return [i for place, i in enumerate(kept) if not settled[place]]
+
+
+def _determined(batch: Batch, found: Answers) -> Any:
+    """Whether the parameters of each problem are told apart by its spectrum, (S,)."""
+    H = batch.normal(found.values, np.arange(len(found.values)))[2]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.sqrt(np.einsum("sii->si", H))
+        scaled = H / (size[:, :, None] * size[:, None, :])
+    scaled = np.where(np.isfinite(scaled), scaled, 0)
+    return np.linalg.eigvalsh(scaled)[:, 0] > _DETERMINED
+
+
+def _alone(model: GreyBox, row: Row, setting: Setting) -> Answer:
+    try:
+        est = asymptotic_fit(
+            model,
+            row.spectrum,
+            setting.base_dt * row.factor,
+            row.hold,
+            setting.true_hold,
+            base_dt=setting.base_dt,
+            band=setting.band,
+            antialias=setting.antialias,
+            prefilter=setting.prefilter,
+            noise_model=setting.noise_model,
+        )
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+        count = len(model.free_parameters)
+        return Answer(np.full(count, np.nan), np.nan, False, str(error))
+    return Answer(est.values, est.cost, est.converged, "; ".join(est.warnings))

@@ -1,0 +1,307 @@
+"""``bias_map``: the bias of every parameter over spectra, decimation factors, holds and plants."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.bias.apparent import weight_of
+from freqid.bias.map_rows import Answer, Row, Setting, answer_chunk
+from freqid.bias.map_store import MapStore
+from freqid.checks import whole
+from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum
+from freqid.lti.holds.hold import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.models.grey_box import GreyBox
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_CHUNK = 64
+
+
+def bias_map(
+    plant: GreyBox | Mapping[str, GreyBox],
+    spectra: Mapping[str, InputSpectrum],
+    factors: Iterable[int],
+    holds: Iterable[Hold | str | None] = ("zoh", "foh", None),
+    base_dt: float | None = None,
+    *,
+    true_hold: Hold | None = None,
+    band: tuple[float, float] | None = None,
+    antialias: bool = False,
+    prefilter: Any = None,
+    noise_model: Any = None,
+    path: Any = None,
+    n_jobs: int | None = None,
+    progress: bool | None = None,
+    chunk: int = _CHUNK,
+) -> pd.DataFrame:
+    """Asymptotic estimates for every combination, without data: one row for each parameter.
+
+    Args:
+        plant: the true plant and the model at once, or several by name.
+        spectra: of the input as the converter holds it, by name.
+        factors: one sample in so many is kept.
+        holds: that the fit assumes: names mean a hold at the slow rate, None the true one.
+        base_dt: sample time of the input in s; by default the period of ``true_hold``.
+        true_hold: what the converter does; None for a zero-order hold at ``base_dt``.
+        band, antialias, prefilter, noise_model: as in ``asymptotic_fit``.
+        path: of a .parquet file. What is finished is kept beside it; the same call takes an
+            interrupted map up again, and reads a finished one.
+        n_jobs: processes, through joblib; ``joblib.parallel_config(backend="dask")`` around the
+            call runs the map on a cluster.
+        progress: a bar on standard error; by default where that is a terminal.
+        chunk: fits that advance together.
+
+    Returns a DataFrame with the columns spectrum, factor, hold, parameter, true, estimate,
+    relative_bias = (estimate − true)/|true|, cost, converged and message; and plant, first, where
+    several were given. The remembered hold is called "remembered". A row that fails is one with
+    ``converged`` False and a message. Raises ValueError for empty arguments or a factor that is
+    not a whole number.
+
+    >>> import freqid as fq
+    >>> table = bias_map(fq.two_mass(), {"10-80": fq.ChirpSpectrum(10, 80)}, [10], ["zoh", None],
+    ...                  base_dt=0.5e-3)
+    >>> table.query("parameter == 'd'")["estimate"].round(2).tolist()
+    [-231.44, 10.0]
+    """
+    import pandas as pd
+
+    plants = {"": plant} if isinstance(plant, GreyBox) else dict(plant)
+    setting, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
+    setting = Setting(setting.true_hold, setting.base_dt, band, antialias, prefilter, noise_model)
+    chunks = _chunks(rows, whole("chunk", chunk))
+    store = None if path is None else MapStore(path, _identity(plants, rows, setting, chunk))
+    finished = None if store is None else store.whole()
+    if finished is not None:
+        return finished
+    tables: dict[int, pd.DataFrame] = {}
+    if store is not None:
+        kept = {n: store.chunk(n) for n in range(len(chunks))}
+        tables = {n: t for n, t in kept.items() if t is not None}
+    todo = [n for n in range(len(chunks)) if n not in tables]
+    jobs = [(n, plants[rows[chunks[n][0]].plant_label], [rows[i] for i in chunks[n]]) for n in todo]
+    with _bar(progress, len(rows), sum(len(chunks[n]) for n in tables)) as advance:
+        for n, answers in _run(jobs, setting, n_jobs):
+            model = plants[rows[chunks[n][0]].plant_label]
+            tables[n] = _table(model, chunks[n], [rows[i] for i in chunks[n]], answers)
+            if store is not None:
+                store.keep(n, tables[n])
+            advance(len(answers))
+    table = pd.concat([tables[n] for n in range(len(chunks))], ignore_index=True)
+    table = table.sort_values("row", kind="stable", ignore_index=True).drop(columns="row")
+    if isinstance(plant, GreyBox):
+        table = table.drop(columns="plant")
+    table.attrs["upper_frequency"] = {
+        name: float(s.high) for name, s in spectra.items() if isinstance(s, ChirpSpectrum)
+    }
+    if store is not None:
+        store.finish(table)
+    return table
+
+
+def _asked(
+    plants: Mapping[str, GreyBox],
+    spectra: Mapping[str, InputSpectrum],
+    factors: Iterable[int],
+    holds: Iterable[Hold | str | None],
+    base_dt: float | None,
+    true_hold: Hold | None,
+) -> tuple[Setting, list[Row]]:
+    """The checked arguments as rows, spectra running fastest: neighbours resemble one another."""
+    for name, model in plants.items():
+        if not isinstance(model, GreyBox):
+            raise ValueError(f"plant {name!r} is a {type(model).__name__}; expected a GreyBox")
+        if not model.free_parameters:
+            raise ValueError("plant has no free parameter; free one with plant.free(name)")
+    if not isinstance(spectra, Mapping):
+        raise ValueError("spectra must be a mapping from names to spectra, {'10-80': ...}")
+    for name, spectrum in spectra.items():
+        if not isinstance(spectrum, InputSpectrum):
+            raise ValueError(f"spectra[{name!r}] is a {type(spectrum).__name__}, not a spectrum")
+    counts = [whole("factors", f) for f in factors]
+    assumed = list(holds)
+    for what, given in (("plant", plants), ("spectra", spectra)):
+        if not given:
+            raise ValueError(f"{what} is empty; give at least one")
+    if not counts or not assumed:
+        raise ValueError("factors and holds must hold at least one entry each")
+    if true_hold is None:
+        if base_dt is None:
+            raise ValueError("base_dt is missing; give the sample time of the input in s")
+        true_hold = ZeroOrderHold(base_dt)
+    if base_dt is None:
+        if not isinstance(true_hold, PeriodicHold):
+            raise ValueError(
+                "base_dt is missing; a band-limited input has no period to take it from"
+            )
+        base_dt = true_hold.period
+    for hold in assumed:
+        if hold == "estimate":
+            raise ValueError("holds contains 'estimate'; a map compares holds that are assumed")
+        as_hold(hold, base_dt, true_hold)
+    rows = [
+        Row(plant, name, hold_label(hold), factor, spectrum, hold)
+        for plant in plants
+        for hold in assumed
+        for factor in counts
+        for name, spectrum in spectra.items()
+    ]
+    return Setting(true_hold, base_dt), rows
+
+
+def hold_label(hold: Hold | str | None) -> str:
+    """What the table calls an assumed hold."""
+    if hold is None:
+        return "remembered"
+    return hold if isinstance(hold, str) else repr(hold)
+
+
+def _chunks(rows: Sequence[Row], size: int) -> list[list[int]]:
+    """Numbers of the rows that advance together: of one plant and one assumption."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i, row in enumerate(rows):
+        groups.setdefault((row.plant_label, row.hold_label), []).append(i)
+    return [
+        group[start : start + size]
+        for group in groups.values()
+        for start in range(0, len(group), size)
+    ]
+
+
+Job = tuple[int, GreyBox, list[Row]]
+
+
+def _work(job: Job, setting: Setting) -> tuple[int, list[Answer]]:
+    number, model, rows = job
+    return number, answer_chunk(model, rows, setting)
+
+
+def _run(
+    jobs: Sequence[Job], setting: Setting, n_jobs: int | None
+) -> Iterator[tuple[int, list[Answer]]]:
+    """Answers of the chunks in the order in which they are finished."""
+    try:
+        import joblib
+    except ImportError:
+        if n_jobs not in (None, 1):
+            raise ValueError(
+                f"n_jobs={n_jobs} needs joblib; pip install 'freqid[parallel]'"
+            ) from None
+        yield from (_work(job, setting) for job in jobs)
+        return
+    parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")
+    yield from parallel(joblib.delayed(_work)(job, setting) for job in jobs)
+
+
+def _table(
+    model: GreyBox, numbers: Sequence[int], rows: Sequence[Row], answers: Sequence[Answer]
+) -> pd.DataFrame:
+    import pandas as pd
+
+    names = [p.name for p in model.free_parameters]
+    true = np.array([p.value for p in model.free_parameters])
+    P = len(names)
+    estimate = np.array([a.values for a in answers])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bias = np.where(true == 0, np.nan, (estimate - true) / np.abs(true))
+
+    def each(values: Sequence[Any]) -> Any:
+        return np.repeat(np.array(values), P)
+
+    return pd.DataFrame(
+        {
+            "row": each(numbers),
+            "plant": each([r.plant_label for r in rows]),
+            "spectrum": each([r.spectrum_label for r in rows]),
+            "factor": each([r.factor for r in rows]),
+            "hold": each([r.hold_label for r in rows]),
+            "parameter": np.tile(names, len(rows)),
+            "true": np.tile(true, len(rows)),
+            "estimate": estimate.ravel(),
+            "relative_bias": bias.ravel(),
+            "cost": each([a.cost for a in answers]),
+            "converged": each([a.converged for a in answers]),
+            "message": each([a.message for a in answers]),
+        }
+    )
+
+
+def _identity(
+    plants: Mapping[str, GreyBox], rows: Sequence[Row], setting: Setting, chunk: int
+) -> str:
+    """A fingerprint of what is asked: plants by matrices and slopes, spectra by their values."""
+    seen = hashlib.sha256()
+    for name, model in plants.items():
+        free = [(p.name, p.lower, p.upper) for p in model.free_parameters]
+        seen.update(repr((name, free)).encode())
+        lin = model.linearise(model.values, [p.name for p in model.free_parameters])
+        for matrix in (*lin.at, *lin.derivative):
+            seen.update(np.ascontiguousarray(matrix).tobytes())
+    f = np.linspace(0, 0.5 / setting.base_dt, 97)
+    for spectrum in {r.spectrum_label: r.spectrum for r in rows}.values():
+        try:
+            dt = setting.base_dt
+            for array in (spectrum.density(f, dt), spectrum.edges(dt), *spectrum.lines(dt)):
+                seen.update(np.ascontiguousarray(array).tobytes())
+        except ValueError as error:
+            seen.update(str(error).encode())
+    for row in rows:
+        labels = (row.plant_label, row.spectrum_label, row.hold_label, row.factor)
+        seen.update(repr(labels).encode())
+    for factor in sorted({row.factor for row in rows}):
+        dt = setting.base_dt * factor
+        weight = weight_of(f / factor, dt, setting.prefilter, setting.noise_model)
+        seen.update(weight.tobytes())
+    shared = (setting.true_hold, setting.base_dt, setting.band, setting.antialias, chunk)
+    seen.update(repr(shared).encode())
+    return seen.hexdigest()
+
+
+class _bar:
+    """Progress for the length of a ``with`` block; entering gives the function to advance.
+
+    A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth.
+    """
+
+    def __init__(self, wanted: bool | None, total: int, done: int) -> None:
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        self.console = Console(stderr=True)
+        live = self.console.is_terminal or self.console.is_jupyter
+        self.lines = bool(wanted) and not live
+        self.total, self.done = total, done
+        self.progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            console=self.console,
+            disable=not live if wanted is None else not (wanted and live),
+        )
+        self.task = self.progress.add_task("bias map", total=total, completed=done)
+
+    def __enter__(self) -> Any:
+        self.progress.start()
+        return self.advance
+
+    def advance(self, count: int) -> None:
+        """``count`` more are done."""
+        before, self.done = self.done, self.done + count
+        self.progress.advance(self.task, count)
+        if self.lines and 10 * before // self.total != 10 * self.done // self.total:
+            print(f"bias map: {self.done} of {self.total}", file=sys.stderr, flush=True)
+
+    def __exit__(self, *reason: Any) -> None:
+        self.progress.stop()

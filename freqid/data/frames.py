@@ -1,0 +1,193 @@
+"""Pandas frames as records see them: which column is what, and whether the time is uniform."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import FloatArray, positive, unknown
+from freqid.lti.holds.hold import BandLimited, FirstOrderHold, Hold, ZeroOrderHold
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_HOLD_COLUMNS = {"zoh_period": ZeroOrderHold, "foh_period": FirstOrderHold}
+
+
+def record_fields(
+    frame: pd.DataFrame,
+    inputs: Sequence[str] | str | None,
+    outputs: Sequence[str] | str | None,
+    dt: float | None,
+    hold: Hold | str | None,
+    reference: str | None,
+) -> dict[str, Any]:
+    """The fields of a Record that a frame holds: columns to channels, time to periods."""
+    if len(frame) < 2:
+        raise ValueError(f"frame has {len(frame)} rows; a record needs two or more")
+    step = _sample_time(frame, dt)
+    signals = [c for c in frame.columns if c not in ("time", "band_limited", *_HOLD_COLUMNS)]
+    u_names, y_names = _channels(signals, inputs, outputs, reference)
+    u, y = (_numbers(frame, names) for names in (u_names, y_names))
+    commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
+
+    factor = _slow_output(y)
+    y = y[::factor]
+    return {
+        "u": u[:, 0] if len(u_names) == 1 else u,
+        "y": y[:, 0] if len(y_names) == 1 else y,
+        "dt": step * factor,
+        "input_dt": step,
+        "hold": _remembered(frame) if hold is None else hold,
+        "input_names": u_names,
+        "output_names": y_names,
+        "reference": None if commanded is None else commanded[::factor],
+    }
+
+
+def regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+    """The frame on a regular time, blanks filled, by straight lines; and what was done, in words.
+
+    The step is the median one. Raises ValueError for a frame without a time, or whose times do not
+    increase.
+    """
+    import pandas as pd
+
+    times = _times(frame)
+    if times is None:
+        raise ValueError("resample=True needs a column or index called 'time'")
+    gaps = np.diff(times)
+    if not np.isfinite(times).all() or (gaps <= 0).any():
+        raise ValueError("column 'time' must increase; sort or repair the rows")
+    step = float(f"{np.median(gaps):.6g}")
+    grid = times[0] + step * np.arange(round((times[-1] - times[0]) / step) + 1)
+    notes = []
+    wide = int((gaps > 1.5 * step).sum())
+    if wide:
+        notes.append(f"{wide} gaps in time were filled by straight lines, the widest of "
+                     f"{gaps.max():g} s")  # fmt: skip
+    jitter = np.abs(gaps[gaps <= 1.5 * step] - step).max(initial=0)
+    if jitter > 1e-6 * step:
+        notes.append(f"jitter of up to {jitter:g} s was taken off by straight lines")
+    new: dict[str, Any] = {"time": grid}
+    for name in frame.columns:
+        if name == "time":
+            continue
+        x = frame[name].to_numpy(dtype=float)
+        there = np.isfinite(x)
+        if not there.any():
+            raise ValueError(f"column {name!r} has no samples at all; leave it out")
+        missing = len(x) - int(there.sum())
+        if missing:
+            notes.append(f"{missing} missing samples of {name!r} were filled by straight lines")
+        new[str(name)] = np.interp(grid, times[there], x[there])
+    return pd.DataFrame(new), notes
+
+
+def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
+    times = _times(frame)
+    if times is None:
+        if dt is None:
+            raise ValueError(
+                "dt=None, but the data have no column or index called 'time'; give dt in s"
+            )
+        return positive("dt", dt, "s")
+    gaps = np.diff(times)
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    if not np.isfinite(times).all() or (gaps <= 0).any():
+        row = int(np.argmax(~(gaps > 0))) + 1
+        raise ValueError(f"column 'time' does not increase in row {row}; sort or repair the rows")
+    if np.abs(gaps - step).max() > 0.01 * step:
+        row = int(np.argmax(np.abs(gaps - step))) + 1
+        raise ValueError(
+            f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on "
+            "average; resample=True puts them on a regular grid"
+        )
+    if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
+        raise ValueError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")
+    # a time column printed with few digits carries their rounding: prefer the round number
+    rounded = float(f"{step:.9g}")
+    return rounded if dt is None else float(dt)
+
+
+def _times(frame: pd.DataFrame) -> FloatArray | None:
+    import pandas as pd
+
+    if "time" in frame.columns:
+        column: Any = frame["time"]
+    elif frame.index.name == "time" or isinstance(
+        frame.index, (pd.DatetimeIndex, pd.TimedeltaIndex)
+    ):
+        column = frame.index.to_series()
+    else:
+        return None
+    if pd.api.types.is_datetime64_any_dtype(column) or pd.api.types.is_timedelta64_dtype(column):
+        column = (column - column.iloc[0]) / pd.Timedelta(seconds=1)
+    try:
+        return np.asarray(column, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError("column 'time' holds values that are not numbers of seconds") from None
+
+
+def _channels(
+    signals: list[str],
+    inputs: Sequence[str] | str | None,
+    outputs: Sequence[str] | str | None,
+    reference: str | None,
+) -> tuple[list[str], list[str]]:
+    given: list[list[str] | None] = []
+    for argument, value in (("inputs", inputs), ("outputs", outputs), ("reference", reference)):
+        names = None if value is None else [value] if isinstance(value, str) else list(value)
+        for name in names or []:
+            if name not in signals:
+                raise ValueError(unknown(argument, name, signals))
+        if names == []:
+            raise ValueError(f"{argument}=[] names no column; expected one of {signals}")
+        given.append(names)
+    u, y, r = given
+    rest = [s for s in signals if s not in (u or []) + (y or []) + (r or [])]
+    if u is None and y is None:
+        if set(rest) >= {"u", "y"}:
+            return ["u"], ["y"]
+        if len(rest) != 2:
+            raise ValueError(f"inputs=None, outputs=None: name them; the columns are {signals}")
+        return rest[:1], rest[1:]
+    if u is None or y is None:
+        if len(rest) != 1:
+            missing = "inputs" if u is None else "outputs"
+            raise ValueError(f"{missing}=None: name them; the other columns are {rest}")
+        return u or rest, y or rest
+    return u, y
+
+
+def _numbers(frame: pd.DataFrame, names: list[str]) -> FloatArray:
+    try:
+        return frame[names].to_numpy(dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"columns {names} hold values that are not numbers") from None
+
+
+def _slow_output(y: FloatArray) -> int:
+    """How many rows lie between output samples, where all the others are blank; else 1."""
+    there = np.isfinite(y).all(axis=1)
+    rows = np.flatnonzero(there)
+    if there.all() or len(rows) < 2 or rows[0] != 0:
+        return 1
+    factor = int(rows[1])
+    regular = np.array_equal(rows, np.arange(0, len(y), factor))
+    blank = bool(np.isnan(y[~there]).all())
+    return factor if regular and blank else 1
+
+
+def _remembered(frame: pd.DataFrame) -> Hold | None:
+    if "band_limited" in frame.columns:
+        return BandLimited()
+    for column, kind in _HOLD_COLUMNS.items():
+        if column in frame.columns:
+            periods = np.unique(frame[column].to_numpy(dtype=float))
+            if len(periods) != 1:
+                raise ValueError(f"column {column!r} must hold one period; it holds {len(periods)}")
+            return kind(positive(column, float(periods[0]), "s"))
+    return None

@@ -1,0 +1,202 @@
+"""FrequencyResponse: a response at some frequencies, measured or computed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray, band
+from freqid.lti.holds.hold import Hold
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse:
+    """Response (outputs, inputs, frequencies) at ``frequency`` (Hz), immutable.
+
+    Args:
+        frequency: increasing, in Hz, (K,).
+        response: complex, (outputs, inputs, K), or (K,) for one input and one output.
+        dt: sample time in s; 0 for a continuous-time response.
+        hold: what the input did between its samples; None where it does not apply.
+        variance: variance of the complex response, shaped like it.
+        coherence: between 0 and 1, shaped like the response.
+        input_spectrum: energy |U|² of each input at the frequencies, (inputs, K): the weight of
+            the bias integral (paper, eq. 2).
+        input_names, output_names: channel names.
+
+    Raises ValueError for shapes that disagree, frequencies that do not increase, or values that
+    are not finite.
+
+    >>> frf = FrequencyResponse([1.0, 2.0], [1 + 0j, 0.5j], dt=0.1)
+    >>> frf.response.shape, frf.select((1.5, 3)).frequency
+    ((1, 1, 2), array([2.]))
+    """
+
+    frequency: FloatArray
+    response: ComplexArray
+    dt: float = 0.0
+    hold: Hold | None = None
+    variance: FloatArray | None = None
+    coherence: FloatArray | None = None
+    input_spectrum: FloatArray | None = None
+    input_names: Sequence[str] | None = None
+    output_names: Sequence[str] | None = None
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        f = np.array(self.frequency, dtype=float)
+        if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
+            raise ValueError("frequency must be finite and increasing, (K,), in Hz")
+        put(self, "frequency", _frozen(f))
+        G = np.array(self.response, dtype=complex)
+        G = G.reshape(1, 1, -1) if G.ndim == 1 else G
+        if G.ndim != 3 or G.shape[2] != len(f):
+            raise ValueError(
+                f"response has shape {G.shape} for {len(f)} frequencies; "
+                "expected (outputs, inputs, frequencies)"
+            )
+        put(self, "response", _frozen(G))
+        if not np.isfinite(self.dt) or self.dt < 0:
+            raise ValueError(f"dt={self.dt!r} must be a sample time in s, or 0 for continuous time")
+        p, m, K = G.shape
+        for name, shape in (
+            ("variance", G.shape),
+            ("coherence", G.shape),
+            ("input_spectrum", (m, K)),
+        ):
+            value = getattr(self, name)
+            if value is not None:
+                array = np.array(value, dtype=float)
+                if array.size != np.prod(shape):
+                    raise ValueError(f"{name} has shape {array.shape}; expected {shape}")
+                put(self, name, _frozen(array.reshape(shape)))
+        for name, letter, count in (("input_names", "u", m), ("output_names", "y", p)):
+            given = getattr(self, name)
+            if given is None:
+                given = [letter] if count == 1 else [f"{letter}{i + 1}" for i in range(count)]
+            if len(given) != count:
+                raise ValueError(f"{name}={list(given)} names {len(given)} of {count} channels")
+            put(self, name, tuple(given))
+
+    @property
+    def omega(self) -> FloatArray:
+        """Angular frequency in rad/s, (K,)."""
+        return 2 * np.pi * self.frequency
+
+    @property
+    def magnitude(self) -> FloatArray:
+        """|G|, (outputs, inputs, K)."""
+        return np.abs(self.response)
+
+    @property
+    def phase(self) -> FloatArray:
+        """Unwrapped phase in degrees, (outputs, inputs, K)."""
+        return np.rad2deg(np.unwrap(np.angle(self.response), axis=-1))
+
+    def select(self, limits: tuple[float, float]) -> FrequencyResponse:
+        """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""
+        low, high = band(limits, np.inf, "limits")
+        keep = (self.frequency >= low * (1 - 1e-9)) & (self.frequency <= high * (1 + 1e-9))
+        if not keep.any():
+            raise ValueError(
+                f"limits=({low:g}, {high:g}) Hz hold no frequency; the response has "
+                f"{len(self.frequency)} from {self.frequency[0]:g} to {self.frequency[-1]:g} Hz"
+            )
+        cut: dict[str, Any] = {
+            name: None if getattr(self, name) is None else getattr(self, name)[..., keep]
+            for name in ("frequency", "response", "variance", "coherence", "input_spectrum")
+        }
+        return dataclasses.replace(self, **cut)
+
+    def to_control(self) -> Any:
+        """The response as ``control.FrequencyResponseData``.
+
+        >>> FrequencyResponse([1.0, 2.0], [1.0, 0.5j], dt=0.1).to_control().ninputs
+        1
+        """
+        import control
+
+        return control.FrequencyResponseData(
+            self.response,
+            self.omega,
+            dt=self.dt,
+            inputs=list(self.input_names or ()),
+            outputs=list(self.output_names or ()),
+        )
+
+    @classmethod
+    def from_control(cls, frd: Any, hold: Hold | None = None) -> FrequencyResponse:
+        """A response from ``control.FrequencyResponseData``; ValueError for anything else."""
+        if not hasattr(frd, "omega") or not hasattr(frd, "frdata"):
+            raise ValueError(f"frd={type(frd).__name__} is not a control.FrequencyResponseData")
+        dt = 0.0 if frd.dt is None or frd.dt is True else float(frd.dt)
+        order = np.argsort(frd.omega)
+        return cls(
+            np.asarray(frd.omega)[order] / (2 * np.pi),
+            np.asarray(frd.frdata)[:, :, order],
+            dt=dt,
+            hold=hold,
+            input_names=frd.input_labels,
+            output_names=frd.output_labels,
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row for each frequency and channel pair: magnitude, phase (degrees), re, im, …
+
+        >>> FrequencyResponse([1.0], [1j]).to_frame()["phase"].iloc[0]
+        np.float64(90.0)
+        """
+        import pandas as pd
+
+        p, m, K = self.response.shape
+        columns: dict[str, Any] = {
+            "frequency": np.tile(self.frequency, p * m),
+            "output": np.repeat(list(self.output_names or ()), m * K),
+            "input": np.tile(np.repeat(list(self.input_names or ()), K), p),
+            "magnitude": self.magnitude.ravel(),
+            "phase": self.phase.ravel(),
+            "real": self.response.real.ravel(),
+            "imag": self.response.imag.ravel(),
+        }
+        for name in ("variance", "coherence"):
+            if getattr(self, name) is not None:
+                columns[name] = getattr(self, name).ravel()
+        return pd.DataFrame(columns)
+
+    def to_xarray(self) -> Any:
+        """The response as an xarray.DataArray (output, input, frequency / Hz); needs xarray.
+
+        Raises ValueError where xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ValueError("to_xarray needs xarray; pip install xarray") from None
+        coordinates = {
+            "output": list(self.output_names or ()),
+            "input": list(self.input_names or ()),
+            "frequency": self.frequency,
+        }
+        return xarray.DataArray(self.response, coordinates, dims=tuple(coordinates))
+
+    def __repr__(self) -> str:
+        p, m, K = self.response.shape
+        f = self.frequency
+        kind = f"dt={self.dt:g} s" if self.dt else "continuous"
+        return f"<FrequencyResponse {p}x{m}: {K} lines, {f[0]:g}-{f[-1]:g} Hz, {kind}>"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(repr(self)[1:-1])}</p>" + self.to_frame().head(8).to_html(index=False)
+
+
+def _frozen(array: Any) -> Any:
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,117 @@
+"""Whether a record can be trusted: stuck, saturated, quantised and constant channels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.data.record import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# a run of equal values, as a part of the record, that is called stuck
+_STUCK = 0.05
+# samples in a row at an extreme value that are an overload, where the last step to it was so many
+# quantisation steps
+_PLATEAU = 3
+_FAST = 3
+# values that a channel takes at the most to be called quantised
+_FEW = 0.2
+
+
+def check_record(record: Record) -> pd.DataFrame:
+    """What is wrong with a record's channels, one row a finding; empty where all is well.
+
+    Columns channel, finding (``constant``, ``stuck``, ``saturated``, ``quantised``, ``offset``,
+    ``unrelated reference``, ``note``), value and meaning. Quantisation is reported with its step q
+    and the noise q/√12 that it makes (Widrow and Kollár, Quantization Noise, 2008).
+
+    >>> import numpy as np
+    >>> t = np.arange(1000) * 1e-3
+    >>> u = np.sin(20 * t)
+    >>> check_record(Record(u, np.clip(u, -0.5, 0.5), 1e-3))["finding"].tolist()
+    ['saturated', 'saturated']
+    """
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = []
+    channels = [
+        *zip(record.input_names, record.inputs.T, strict=True),
+        *zip(record.output_names, record.outputs.T, strict=True),
+    ]
+    if record.reference is not None and record.reference.ndim == 1:
+        channels.append(("reference", record.reference))
+    for name, x in channels:
+        rows += [{"channel": name, **finding} for finding in _findings(x)]
+    if record.reference is not None and record.reference.ndim == 1:
+        rows += _reference(record)
+    rows += [
+        {"channel": "", "finding": "note", "value": np.nan, "meaning": n} for n in record.notes
+    ]
+    return pd.DataFrame(rows, columns=["channel", "finding", "value", "meaning"])
+
+
+def _findings(x: FloatArray) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
+
+    def add(finding: str, value: float, meaning: str) -> None:
+        found.append({"finding": finding, "value": float(value), "meaning": meaning})
+
+    N, span = len(x), float(np.ptp(x))
+    if span == 0:
+        add("constant", x[0], "the channel never moves; leave it out or check the sensor")
+        return found
+    changes = np.flatnonzero(np.diff(x)) + 1
+    edges = np.concatenate([[0], changes, [N]])
+    runs = np.diff(edges)
+    # a record may rest before and after its excitation
+    inner = runs[1:-1]
+    values = np.unique(x)
+    q = float(np.diff(values).min())
+    at_limit = False
+    for value, which in ((x.max(), "largest"), (x.min(), "smallest")):
+        plateaus = np.flatnonzero((x[edges[:-1]] == value) & (runs >= _PLATEAU))
+        arrivals = plateaus[plateaus > 0]
+        # a quantised sine lingers at its top too, but does not arrive there at full speed
+        jumps = np.abs(value - x[edges[:-1][arrivals] - 1])
+        if len(values) > 3 and len(jumps) and np.median(jumps) > _FAST * q:
+            at_limit = True
+            add("saturated", value, f"{int((x == value).sum())} samples stand at the {which} value,"
+                f" up to {int(runs[plateaus].max())} in a row: the sensor or the drive was "
+                "overloaded")  # fmt: skip
+    longest = int(inner.max(initial=0))
+    if longest > max(_STUCK * N, 20) and not at_limit and len(values) > 3:
+        where = int(edges[1:-2][int(inner.argmax())]) if len(inner) else 0
+        add("stuck", longest, f"{longest} samples in a row are equal, from sample {where}")
+    steps = np.diff(values) / q
+    if 3 < len(values) < _FEW * N and np.allclose(steps, np.round(steps), atol=1e-3):
+        add("quantised", q, f"steps of {q:g} make a noise of {q / np.sqrt(12):.3g} rms, "
+            f"{100 * q / np.sqrt(12) / x.std():.2g} % of the signal")  # fmt: skip
+    if abs(x.mean()) > 3 * x.std():
+        add("offset", x.mean(), "the mean is far above the movement; detrend() takes it off")
+    return found
+
+
+def _reference(record: Record) -> list[dict[str, Any]]:
+    u, r = record.inputs[:: record.factor][:, 0][: record.n_samples], record.reference
+    assert r is not None
+    if np.ptp(u) == 0 or np.ptp(r) == 0:
+        return []
+    U, R = np.fft.rfft(u - u.mean()), np.fft.rfft(r - r.mean())
+    strong = np.abs(R) > 0.1 * np.abs(R).max()
+    related = np.abs(np.vdot(R[strong], U[strong])) / (
+        np.linalg.norm(R[strong]) * np.linalg.norm(U[strong])
+    )
+    if related > 0.1:
+        return []
+    return [
+        {
+            "channel": "reference",
+            "finding": "unrelated reference",
+            "value": float(related),
+            "meaning": "it has next to nothing to do with the input, and cannot stand for it",
+        }
+    ]

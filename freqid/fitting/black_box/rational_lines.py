@@ -1,0 +1,205 @@
+"""One input and one output as a rational function of w on the lines, and its descent.
+
+Y = (b(w) U + t(w)) / a(w), with t the transient of each experiment. Two iterations follow one
+another on the same columns, each step a linear least squares problem in b, t and a at once:
+
+- Sanathanan and Koerner (IEEE Trans. Automatic Control 8, 1963) weight the error times the
+  denominator by the denominator of the step before; they come near to the minimum from afar;
+- Gauss and Newton put the model's own output in the place of the data and end in the minimum.
+
+A step costs a tenth of one in a state space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.black_box.subspace import inputs_of
+from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.lti.polynomials import Basis
+from freqid.lti.projection import triangle_of
+from freqid.lti.sampled import StateSpace
+
+# steps of Sanathanan and Koerner at the most; a denominator that has changed by less than this,
+# relative, on the lines is the last one
+_STEPS = 6
+_SETTLED = 0.3
+# polynomials of so few poles need not be made orthonormal anew as the weights change
+FEW = 4
+# Gauss-Newton steps at the most, and the part of the cost that the last one gains
+_DESCENTS = 60
+_GAIN = 1e-9
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """x = (b, t, a) in a basis, its cost, and whether every step on the way there succeeded."""
+
+    basis: Basis
+    x: FloatArray
+    cost: float
+    straight: bool
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Roots of a, in the experiments' plane."""
+        return self.basis.roots(self.x[1 - len(self.basis.Q) :])
+
+
+class RationalLines:
+    """The lines of all experiments in a row, and the rational model's columns on them."""
+
+    def __init__(self, experiments: Sequence[SpectralExperiment], feedthrough: bool) -> None:
+        self.experiments, self.feedthrough = experiments, feedthrough
+        # with one channel the weights are in the data already
+        self.w = np.concatenate([e.z for e in experiments])
+        self.Y = np.concatenate([e.Y[0, 0] for e in experiments])
+        self.U = np.concatenate([e.U[0, 0] for e in experiments])
+        state = np.concatenate([e.U_state[0, 0] for e in experiments])
+        self.driven = self.U if feedthrough else state
+        ends = np.cumsum([len(e.omega) for e in experiments])
+        self.free = []
+        for e, end in zip(experiments, ends, strict=True):
+            if e.transient_dt is not None:
+                own = np.zeros(len(self.w), complex)
+                own[end - len(e.omega) : end] = e.free_factor
+                self.free.append(own)
+
+    def minimum(self, poles: ComplexArray) -> Minimum | None:
+        """Where both iterations lead from these poles; None where the polynomials vanish."""
+        try:
+            with np.errstate(all="ignore"):
+                return self._descend(*self._approach(poles))
+        except np.linalg.LinAlgError:
+            return None
+
+    def cost(self, poles: ComplexArray) -> float:
+        """What the best b and t leave of the data with these poles."""
+        denominator = np.prod(self.w - poles[:, None], axis=0)
+        try:
+            with np.errstate(all="ignore"):
+                basis = Basis.on(self.w, np.abs(self.U / denominator), len(poles))
+                return float(_triangle(self._columns(basis, 1 / denominator), self.Y)[-1, -1] ** 2)
+        except np.linalg.LinAlgError:
+            return np.inf
+
+    def _approach(self, poles: ComplexArray) -> tuple[Basis, FloatArray]:
+        """Steps of Sanathanan and Koerner: a basis and x = (b, t, a) in it."""
+        n = len(poles)
+        denominator = np.prod(self.w - poles[:, None], axis=0)
+        basis: Basis | None = None
+        for _ in range(_STEPS):
+            if basis is None or n > FEW:
+                basis = Basis.on(self.w, np.abs(self.U / denominator), n)
+            inverse = 1 / denominator
+            right = self.Y * inverse
+            R = _triangle(
+                [*self._columns(basis, inverse), -basis.Q[:n] * right], basis.Q[n] * right
+            )
+            x = _least(R)
+            previous, denominator = denominator, basis.denominator(x)
+            last, now = previous / previous[0], denominator / denominator[0]
+            if np.linalg.norm(now - last) <= _SETTLED * np.linalg.norm(now):
+                break
+        assert basis is not None
+        return basis, x
+
+    def _columns(self, basis: Basis, inverse: ComplexArray) -> list[ComplexArray]:
+        """Those of b and of each t, over the denominator."""
+        n = len(basis.Q) - 1
+        parts = [basis.Q[: n + self.feedthrough] * (self.driven * inverse)]
+        return parts + [basis.Q[:n] * (own * inverse) for own in self.free]
+
+    def _descend(self, basis: Basis, x: FloatArray) -> Minimum:
+        """Gauss-Newton steps from x, damped (Levenberg and Marquardt) where they fail."""
+        n = len(basis.Q) - 1
+        best, damping, straight = Minimum(basis, x, np.inf, True), 0.0, True
+        R = np.zeros((0, 0))
+        for _ in range(_DESCENTS):
+            inverse = 1 / basis.denominator(x)
+            columns = self._columns(basis, inverse)
+            output = x[:-n] @ np.concatenate(columns)
+            error = self.Y - output
+            cost = float(np.vdot(error, error).real)
+            if cost < best.cost:
+                gain = best.cost - cost
+                best = Minimum(basis, x, cost, straight)
+                R = _triangle([*columns, basis.Q[:n] * (-output * inverse)], error)
+                if damping and gain <= _GAIN * cost:
+                    break
+                damping = damping / 10 if damping > 1e-6 else 0.0
+            elif not len(R):
+                break
+            else:
+                damping, straight = max(10 * damping, 1e-3), False
+                if damping > 1e9:
+                    break
+            x = best.x + _least(R, damping)
+            if not damping and cost - R[-1, -1] ** 2 <= _GAIN * cost:
+                return Minimum(basis, x, R[-1, -1] ** 2, straight)
+        return best
+
+    def state_space(self, found: Minimum) -> StateSpace:
+        """Modal and real: the poles are the roots of a, and the inputs b's residues there."""
+        basis, x = found.basis, found.x
+        n = len(basis.Q) - 1
+        poles = found.poles
+        A, C = _with_poles(poles)
+        if not self.feedthrough:
+            # q_n + Σ a_k q_k = lead Π (w − λ)
+            lead = basis.Q[0, 0].real / np.prod(np.diag(basis.H, -1))
+            apart = poles[:, None] - poles + np.eye(n)
+            with np.errstate(all="ignore"):
+                residues = x[:n] @ basis.at(poles)[:n] / (lead * np.prod(apart, axis=1))
+            if np.isfinite(residues).all():
+                return StateSpace(A, _driving(poles, residues), C, np.zeros((1, 1)))
+        return inputs_of(self.experiments, A, C, self.feedthrough)
+
+
+def _triangle(columns: Sequence[ComplexArray], right: ComplexArray) -> FloatArray:
+    """Triangle of the real least squares problem of columns (terms, K) and ``right``."""
+    J = np.concatenate(columns).view(float)
+    R = triangle_of([(J, right.view(float), None)])
+    if len(R) <= len(J) or not np.isfinite(R).all():
+        raise np.linalg.LinAlgError("the columns vanish on the lines")
+    return R
+
+
+def _least(R: FloatArray, damping: float = 0.0) -> FloatArray:
+    """The solution of a triangle; ``damping`` adds that part of each column's own square."""
+    M, c = R[:-1, :-1], R[:-1, -1]
+    if damping:
+        size = np.sqrt(damping * (M**2).sum(axis=0))
+        M, c = np.concatenate([M, np.diag(size)]), np.append(c, np.zeros(len(size)))
+    else:
+        pivots = np.abs(np.diag(M))
+        if pivots.min() > 1e-10 * pivots.max():
+            return np.linalg.solve(M, c)
+    return np.linalg.lstsq(M, c)[0]
+
+
+def _with_poles(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Real A and C with these poles, each seen by the output."""
+    A, C = np.zeros((len(poles), len(poles))), np.zeros((1, len(poles)))
+    at = 0
+    for pole in poles[poles.imag >= 0].tolist():
+        A[at, at], C[0, at] = pole.real, 1
+        if pole.imag > 0:
+            A[at + 1, at + 1], A[at, at + 1], A[at + 1, at] = pole.real, pole.imag, -pole.imag
+        at += 1 + (pole.imag > 0)
+    return A, C
+
+
+def _driving(poles: ComplexArray, residues: ComplexArray) -> FloatArray:
+    """Γ (n, 1) that gives the poles of ``_with_poles`` these residues."""
+    rows: list[float] = []
+    for pole, residue in zip(poles, residues, strict=True):
+        if pole.imag > 0:
+            rows += [2 * residue.real, -2 * residue.imag]
+        elif pole.imag == 0:
+            rows.append(residue.real)
+    return np.array(rows)[:, None]

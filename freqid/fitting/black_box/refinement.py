@@ -1,0 +1,112 @@
+"""The start of a black box: subspace identification, and with one input and output far more.
+
+A rational function on the lines is followed down to its minimum from several starts: from no poles
+at all, from subspace poles, and from those of larger models with the poles taken away that the data
+miss least. Black boxes of too low an order have many local minima, and these starts find different
+ones. On the hard cases of ``benchmarks/black_box_starts.py`` they leave nothing to descend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from freqid.checks import ComplexArray
+from freqid.fitting.black_box.rational_lines import FEW, Minimum, RationalLines
+from freqid.fitting.black_box.subspace import identify, observed
+from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.search.noise_floor import noise_floor
+from freqid.lti.sampled import StateSpace
+
+# a minimum that was found without a detour and leaves less than this part of the data's energy, or
+# little more than their noise, is believed
+_BELIEVED = 0.03
+_EXPLAINED = 1.5
+# lines that are enough to come next to the minimum
+_LINES = 20000
+# poles of larger models beyond those that are wanted
+_LARGER = (2, 4)
+
+
+def first_model(
+    experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
+) -> StateSpace:
+    """Φ̃, Γ, C, D in the experiments' plane; with one input and output next to the minimum.
+
+    Raises ValueError where the lines are too few.
+    """
+    single = all(e.Y.shape[:2] == (1, 1) and e.U.shape[:2] == (1, 1) for e in experiments)
+    single &= all(e.aliases == 1 and e.free_aliases == 1 for e in experiments)
+    if not single:
+        return identify(experiments, order, feedthrough)
+    few = _fewer_lines(experiments)
+    lines = RationalLines(few, feedthrough)
+    best: Minimum | None = None
+    for poles in _begun(lines, order):
+        found = lines.minimum(poles)
+        if found is not None and (best is None or found.cost < best.cost):
+            best = found
+        if found is not None and found is best and _believed(lines, best):
+            break
+    if best is not None and few is not experiments:
+        lines = RationalLines(experiments, feedthrough)
+        best = lines.minimum(best.poles)
+    return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
+
+
+def _fewer_lines(experiments: Sequence[SpectralExperiment]) -> Sequence[SpectralExperiment]:
+    """A part of the lines, where they are very many: their minimum is next to that of all."""
+    step = sum(len(e.omega) for e in experiments) // _LINES
+    return [e.thinned(step) for e in experiments] if step > 1 else experiments
+
+
+def _believed(lines: RationalLines, found: Minimum) -> bool:
+    if not found.straight:
+        return False
+    energy = sum(e.energy for e in lines.experiments)
+    if found.cost <= _BELIEVED * energy:
+        return True
+    return found.cost <= _EXPLAINED * noise_floor(lines.experiments)
+
+
+def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:
+    """Poles to begin from, those that are most likely to do first."""
+    nowhere = np.zeros(order, complex)
+    if order <= FEW:
+        # few poles are found from anywhere
+        yield nowhere
+    for more in (0, *_LARGER):
+        try:
+            A, _ = observed(lines.experiments, order + more)
+        except ValueError:
+            # the lines are too few
+            if more == 0 and order > FEW:
+                raise
+            break
+        poles = np.linalg.eigvals(A)
+        if more == 0:
+            yield poles
+        elif (larger := lines.minimum(poles)) is not None:
+            yield _fewer(lines, larger.poles, order)
+    if order > FEW:
+        yield nowhere
+
+
+def _fewer(lines: RationalLines, poles: ComplexArray, order: int) -> ComplexArray:
+    """``order`` of the poles: taken away are, in turn, the real ones and pairs least missed."""
+    groups = [[p] if p.imag == 0 else [p, p.conj()] for p in poles[poles.imag >= 0]]
+    while (over := sum(map(len, groups)) - order) > 0:
+        # where one pole too many is half of a pair, a real one takes the pair's place
+        spare: list[complex] = [] if over > 1 or any(len(g) == 1 for g in groups) else [0.0]
+        tried = []
+        for i, group in enumerate(groups):
+            if len(group) - len(spare) <= over:
+                rest = [*groups[:i], *groups[i + 1 :], *([spare] if spare else [])]
+                tried.append((lines.cost(_joined(rest)), rest))
+        groups = min(tried, key=lambda t: t[0])[1]
+    return _joined(groups)
+
+
+def _joined(groups: Sequence[Sequence[complex]]) -> ComplexArray:
+    return np.array([pole for group in groups for pole in group], complex)

@@ -1,0 +1,114 @@
+"""Black boxes as the optimiser sees them: a local chart of all state-space models of one order.
+
+A state space has n² entries more than the model has parameters, because any change of its states
+leaves the model as it is. The chart moves only at right angles to those changes (data driven local
+coordinates: McKelvey, Helmersson and Ribarits, Automatica 40, 2004), which is well conditioned at
+any order and for any number of channels, where coefficients of polynomials are not.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from freqid.checks import FloatArray
+from freqid.lti.realisation import Realisation
+from freqid.lti.responses import Plane
+from freqid.lti.sampled import Linearisation, StateSpace
+
+
+class Chart:
+    """Models near a state space (Φ̃, Γ, C, D) of a plane, by unknowns x that are zero there."""
+
+    def __init__(self, centre: StateSpace, feedthrough: bool, plane: Plane, moves: int = 0) -> None:
+        self.moves = moves
+        self.centre, self.feedthrough, self.plane = balanced(centre), feedthrough, plane
+        A, B, C, D = self.centre
+        n, m, p = len(A), B.shape[1], len(C)
+        free_D = D.size if feedthrough else 0
+        # derivative of the entries by T in (A T − T A, −T B, C T)
+        eye = np.eye(n)
+        tangent = np.concatenate(
+            [
+                _kron(A, eye) - _kron(eye, A.T),
+                -_kron(eye, B.T),
+                _kron(C, eye),
+            ]
+        )
+        Q = np.linalg.qr(tangent, mode="complete")[0][:, n * n :]
+        self.size = Q.shape[1] + free_D
+        directions = np.zeros((self.size, n * n + n * m + p * n + D.size))
+        directions[: Q.shape[1], : len(Q)] = Q.T
+        if free_D:
+            directions[Q.shape[1] :, len(Q) :] = np.eye(free_D)
+        self._directions = directions
+        self._origin = np.concatenate([M.ravel() for M in self.centre])
+        self.derivative = self._parted(directions)
+        self.lower = np.full(self.size, -np.inf)
+        self.upper = np.full(self.size, np.inf)
+
+    def _parted(self, entries: FloatArray) -> StateSpace:
+        """Entries of all four matrices in a row, (…, entries), as matrices."""
+        lead, at, parts = entries.shape[:-1], 0, []
+        for M in self.centre:
+            parts.append(entries[..., at : at + M.size].reshape(*lead, *M.shape))
+            at += M.size
+        return StateSpace(*parts)
+
+    def matrices(self, x: FloatArray) -> StateSpace:
+        """The state space at x."""
+        return self._parted(self._origin + x @ self._directions)
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """The state space at x and its derivatives."""
+        return Realisation.of(Linearisation(self.matrices(x), self.derivative))
+
+    def moved(self, x: FloatArray) -> Chart:
+        """A chart around the model at x."""
+        return Chart(self.matrices(x), self.feedthrough, self.plane, self.moves + 1)
+
+    def describe(self, x: FloatArray) -> str:
+        """Said of the trial point in errors."""
+        return f"poles {np.linalg.eigvals(self.matrices(x).A)}"
+
+    def in_z(self, x: FloatArray) -> StateSpace:
+        """The state space at x in the z plane."""
+        return from_plane(self.matrices(x), self.plane)
+
+
+def _kron(A: FloatArray, B: FloatArray) -> FloatArray:
+    """Kronecker's product; numpy's own takes ten times as long for matrices of this size."""
+    shape = A.shape[0] * B.shape[0], A.shape[1] * B.shape[1]
+    return (A[:, None, :, None] * B[None, :, None, :]).reshape(shape)
+
+
+def balanced(model: StateSpace) -> StateSpace:
+    """The same model with reachability and observability Gramians equal, where it is stable."""
+    A, B, C, D = model
+    if np.abs(np.linalg.eigvals(A)).max() >= 1 - 1e-9:
+        size_B, size_C = float(np.linalg.norm(B)), float(np.linalg.norm(C))
+        ratio = np.sqrt(size_C / size_B) if size_B and size_C else 1.0
+        return StateSpace(A, B * ratio, C / ratio, D)
+    reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T)
+    observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C)
+    try:
+        L, K = np.linalg.cholesky(reach), np.linalg.cholesky(observe)
+    except np.linalg.LinAlgError:
+        return model
+    U, s, Vt = np.linalg.svd(K.T @ L)
+    T = L @ Vt.T / np.sqrt(s)
+    Ti = (U / np.sqrt(s)).T @ K.T
+    return StateSpace(Ti @ A @ T, Ti @ B, C @ T, D)
+
+
+def from_plane(model: StateSpace, plane: Plane) -> StateSpace:
+    """Φ, Γ, C, D in z of a model C (wI − Φ̃)⁻¹ (1 + a w) Γ' + D, w = (z − a)/(1 − a z)."""
+    a = plane.a
+    if a == 0:
+        return model
+    A, B, C, D = model
+    n = A.shape[-1]
+    inverse = np.linalg.inv(np.eye(n) + a * A)
+    Phi = (A + a * np.eye(n)) @ inverse
+    # (wI − Φ̃)⁻¹ = (1 − a z)(zI − Φ)⁻¹(I + aΦ̃)⁻¹ and 1 + a w = (1 − a²)/(1 − a z)
+    return StateSpace(Phi, (1 - a**2) * inverse @ B, C, D)

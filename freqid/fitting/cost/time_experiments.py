@@ -1,0 +1,110 @@
+"""One experiment in the time domain: output error, on samples or on the lines of a band."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.fft
+
+from freqid.checks import Array, FloatArray
+from freqid.data.record import Record
+from freqid.fitting.cost.experiments import Evaluation
+from freqid.frf.spectra import Spectra
+from freqid.lti.holds.hold import PeriodicHold, Sampled
+from freqid.lti.realisation import Realisation
+from freqid.lti.sampled import Linearisation
+from freqid.models.simulation import FreeMotion, forcing, propagate
+
+
+class TimeExperiment:
+    """Output error in the time domain, on all samples or on the DFT lines of a band.
+
+    The initial state is either free or that of the sampled model at rest, x(0) = Γ⁺ u(0): under a
+    first-order hold the input then ramps up from zero over the period before the record. Without
+    a hold the matrices are those of a sampled model already.
+    """
+
+    def __init__(
+        self,
+        record: Record,
+        hold: PeriodicHold | None,
+        lines: Spectra | None,
+        free_state: bool,
+    ) -> None:
+        self.factor = record.factor
+        N = len(record.u) // self.factor
+        self.u = record.inputs[: N * self.factor].T
+        self.y = record.outputs[:N].T
+        self.hold, self.free_state = hold, free_state
+        self.lines = None
+        if lines is not None:
+            index = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
+            self.lines = (index, np.sqrt(lines.multiplicity / N))
+        self.n_rows = self.y.size if lines is None else int(lines.multiplicity.sum()) * len(self.y)
+
+    @property
+    def energy(self) -> float:
+        """Energy of the data, the cost of a model that is zero."""
+        return float(np.sum(self.rows(self.y) ** 2))
+
+    def at(self, realisation: Realisation) -> Evaluation:
+        """Evaluate at one trial point."""
+        return _TimeEvaluation(self, realisation.linearisation)
+
+    def rows(self, y: Array) -> FloatArray:
+        """(…, outputs, N) as real rows."""
+        if self.lines is not None:
+            index, scale = self.lines
+            y = np.ascontiguousarray(scipy.fft.rfft(y, axis=-1)[..., index] * scale).view(float)
+        return y.reshape(*y.shape[:-2], -1)
+
+
+class _TimeEvaluation:
+    def __init__(self, experiment: TimeExperiment, lin: Linearisation) -> None:
+        e, self.lin = experiment, lin
+        self.experiment = e
+        at, d = lin
+        if e.hold is None:
+            none = np.zeros_like(at.B)
+            self.sampled = Sampled(at.A, at.B, none)
+            self.change = Sampled(d.A, d.B, np.zeros_like(d.B))
+        else:
+            self.sampled, self.change = e.hold.sampled_derivatives(at.A, at.B, d.A, d.B)
+        every = e.factor
+        self.transient: FloatArray | None = None
+        push = forcing(self.sampled, e.u)
+        if e.free_state:
+            self.free = FreeMotion(self.sampled.phi, e.u.shape[1])
+            self.x = self.free.particular(push)
+            self.mix, self.transient = _independent(
+                e.rows((at.C @ self.free.motions)[..., ::every]), len(at.A)
+            )
+        else:
+            self.x = propagate(self.sampled.phi, push, self.sampled.gamma_next @ e.u[:, 0])
+        self.residual = e.rows((at.C @ self.x + at.D @ e.u)[:, ::every] - e.y)
+
+    def jacobian(self, initial: FloatArray | None) -> FloatArray:
+        e, d, at = self.experiment, self.lin.derivative, self.lin.at
+        x = self.x
+        if initial is not None:
+            x = x + np.tensordot(self.mix @ initial, self.free.motions, 1)
+        push = self.change.phi @ x + forcing(self.change, e.u)
+        if e.free_state:
+            dx = self.free.particular(push)
+        else:
+            dx = propagate(self.sampled.phi, push, self.change.gamma_next @ e.u[:, 0])
+        dy = at.C @ dx + d.C @ x + d.D @ e.u
+        return e.rows(dy[..., :: e.factor])
+
+
+def _independent(motions: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:
+    """Of 2n rows, real parts then imaginary parts of n motions, at most n that span them all.
+
+    Returns the combinations (2n, q) and the combined rows (q, rows). Both parts of a motion are
+    scaled alike, so that a part that is zero up to rounding stays so.
+    """
+    size = np.linalg.norm(motions, axis=1)
+    pair = np.tile(np.hypot(size[:n], size[n:]), 2)
+    pair[pair == 0] = 1
+    U, s, _ = np.linalg.svd(motions / pair[:, None], full_matrices=False)
+    mix = U[:, :n][:, s[:n] > 1e-11 * s[0]] / pair[:, None]
+    return mix, mix.T @ motions

@@ -1,0 +1,231 @@
+"""Estimate: identified parameters, how certain they are, and whether they may be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import FloatArray, choice, unknown
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.lti.holds.hold import Hold
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+# half-width of a 95 % interval of a normal variable, in standard deviations
+Z95 = 1.959963984540054
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The result of ``fit``.
+
+    ``model`` is the model at the estimate; ``cost`` the least weighted sum of squared errors, in
+    units of the output squared; ``n_agreed`` of ``n_starts`` starts
+    ended in the minimum reported; ``fit_percent`` 100·(1 − √(cost / energy of the data fitted));
+    ``warnings`` the reasons for which the result should not be trusted, in sentences.
+    """
+
+    model: Any
+    names: Sequence[str]
+    values: FloatArray
+    nominal: FloatArray
+    units: Sequence[str]
+    # the covariance, or what computes it when it is asked for
+    uncertainty: FloatArray | Callable[[], FloatArray]
+    cost: float
+    fit_percent: float
+    converged: bool
+    message: str
+    n_evaluations: int
+    hold: Hold
+    dt: float
+    n_rows: int
+    n_starts: int = 1
+    n_agreed: int = 1
+    warnings: list[str] = field(default_factory=list)
+    # the cost that was minimised, for what asks for more than its least point
+    problem: Any = field(default=None, repr=False)
+    # the data, the band (Hz), the weights and the call that made the estimate, for reports of it
+    data: Sequence[Any] = ()
+    band: tuple[float, float] | None = None
+    weights: Any = None
+    call: str = ""
+
+    def __getitem__(self, name: str) -> float:
+        if name in self.names:
+            return float(self.values[list(self.names).index(name)])
+        fixed = getattr(self.model, "values", {})
+        if name in fixed:
+            return float(fixed[name])
+        raise KeyError(unknown("parameter", name, self.names))
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.names)
+
+    @property
+    def hold_period(self) -> float | None:
+        """Period of the hold in s; None for a band-limited input."""
+        return getattr(self.hold, "period", None)
+
+    @cached_property
+    def covariance_matrix(self) -> FloatArray:
+        """Covariance of the parameters, (P, P)."""
+        return self.uncertainty() if callable(self.uncertainty) else self.uncertainty
+
+    @cached_property
+    def parameters(self) -> pd.DataFrame:
+        """Value, standard error, 95 % interval, nominal value and unit of each free parameter."""
+        import pandas as pd
+
+        std = np.sqrt(np.diag(self.covariance_matrix))
+        return pd.DataFrame(
+            {
+                "value": self.values,
+                "std": std,
+                "lower": self.values - Z95 * std,
+                "upper": self.values + Z95 * std,
+                "nominal": self.nominal,
+                "unit": list(self.units),
+            },
+            index=pd.Index(list(self.names), name="parameter"),
+        )
+
+    @cached_property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the parameters; infinite where the data do not determine them."""
+        return self._square(self.covariance_matrix)
+
+    @cached_property
+    def correlation(self) -> pd.DataFrame:
+        """Correlation of the parameters."""
+        std = np.sqrt(np.diag(self.covariance_matrix))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self._square(self.covariance_matrix / np.outer(std, std))
+
+    def _square(self, matrix: FloatArray) -> pd.DataFrame:
+        import pandas as pd
+
+        return pd.DataFrame(matrix, index=list(self.names), columns=list(self.names))
+
+    def frequency_response(self, omega: Any = None, hold: Hold | None = None) -> FrequencyResponse:
+        """Response of the estimated model at ``omega`` (rad/s) with its variance.
+
+        ``hold=None`` gives the continuous response of a continuous-time model. Without ``omega``,
+        200 frequencies up to the Nyquist limit. The variance is to first order in the covariance.
+        """
+        if omega is None:
+            omega = np.geomspace(1e-3, 1, 200) * np.pi / self.dt
+        return self.model.response_with_variance(omega, hold, self.names, self.covariance_matrix)
+
+    def to_control(self) -> Any:
+        """The estimated model as a ``control.StateSpace``."""
+        return self.model.to_control()
+
+    def to_continuous(self, hold: Hold | str | None = None) -> Any:
+        """A black-box model in continuous time, by inverting its hold (see ``OutputError``)."""
+        if not hasattr(self.model, "to_continuous"):
+            raise ValueError("the model is in continuous time already; use to_control()")
+        return self.model.to_continuous(self.hold if hold is None else hold)
+
+    def derived(self, function: Any) -> tuple[Any, Any]:
+        """Value and standard error of ``function(model)``, a number or an array, to first order.
+
+        >>> import freqid as fq
+        >>> record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3).with_noise(0.01)
+        >>> est = fq.fit(fq.first_order(), record)
+        >>> gain, std = est.derived(lambda model: model["b"] / model["a"])
+        >>> bool(abs(gain - 1) < 5 * std)
+        True
+        """
+        from freqid.fitting.uncertainty.error_bars import derived
+
+        return derived(self, function)
+
+    def modes(self) -> pd.DataFrame:
+        """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
+        from freqid.fitting.uncertainty.error_bars import modes
+
+        return modes(self)
+
+    def intervals(self, method: str = "linear", level: float = 0.95) -> pd.DataFrame:
+        """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.
+
+        Raises ValueError for an unknown method or a level outside (0, 1).
+        """
+        import pandas as pd
+        from scipy.stats import norm
+
+        from freqid.fitting.uncertainty.error_bars import profile_intervals
+
+        choice("method", method, ("linear", "profile"))
+        if not 0 < level < 1:
+            raise ValueError(f"level={level!r} must lie between 0 and 1")
+        if method == "profile":
+            return profile_intervals(self, level)
+        half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
+        return pd.DataFrame(
+            {"lower": self.values - half, "upper": self.values + half},
+            index=pd.Index(list(self.names), name="parameter"),
+        )
+
+    def bode(self, ax: Any = None, **options: Any) -> Any:
+        """Draw amplitude and phase of the estimate; see ``freqid.bode``."""
+        from freqid.plots.bode_nyquist import bode
+
+        return bode(self, ax=ax, **options)
+
+    def nyquist(self, ax: Axes | None = None, **options: Any) -> Axes:
+        """Draw the Nyquist curve of the estimate; see ``freqid.nyquist``."""
+        from freqid.plots.bode_nyquist import nyquist
+
+        return nyquist(self, ax=ax, **options)
+
+    def report(self, path: str | Path, title: str | None = None) -> None:
+        """Write one self-contained HTML page about the estimate, which works offline.
+
+        A sentence on whether it may be trusted, the parameters with error and bias bars, response
+        and simulation to zoom into, residual tests, warnings, and the call that made it. Raises
+        ValueError for another suffix than .html, or without the extra ``report``.
+        """
+        from freqid.pages.report.page import write_report
+
+        write_report(self, path, title)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that a file needs, in plain numbers and strings."""
+        table = self.parameters.astype(object).where(self.parameters.notna(), None)
+        return {
+            "parameters": table.to_dict(orient="index"),
+            "cost": self.cost,
+            "fit_percent": self.fit_percent,
+            "converged": bool(self.converged),
+            "message": self.message,
+            "warnings": list(self.warnings),
+            "hold": self.hold.name,
+            "hold_period": self.hold_period,
+            "dt": self.dt,
+            "covariance": self.covariance_matrix.tolist(),
+        }
+
+    def __repr__(self) -> str:
+        lines = [f"<Estimate: {self.fit_percent:.2f} % fit, cost {self.cost:.4g}, {self.hold!r}"]
+        rows = self.parameters
+        for name, value, std, unit in zip(
+            rows.index, rows["value"], rows["std"], rows["unit"], strict=True
+        ):
+            lines.append(f"  {name} = {value:.6g} ± {std:.2g} {unit}".rstrip())
+        lines += [f"  warning: {w}" for w in self.warnings]
+        return "\n".join(lines) + ">"
+
+    def _repr_html_(self) -> str:
+        notes = "".join(f"<li>{escape(w)}</li>" for w in self.warnings)
+        head = f"fit {self.fit_percent:.2f} %, {escape(repr(self.hold))}"
+        return f"<p>{head}</p>{self.parameters.to_html(escape=True)}<ul>{notes}</ul>"

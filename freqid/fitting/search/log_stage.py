@@ -1,0 +1,127 @@
+"""The first stage of a search: errors and parameters as logarithms.
+
+Least squares on the response itself is lost once a resonance of the model has moved past that of
+the data. The logarithm of the ratio sees magnitude and phase of every line alike, and logarithms
+of the parameters make gains and frequencies additive, so this stage walks in from far away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.minimum import Structure
+from freqid.lti.holds.hold import PeriodicHold
+from freqid.lti.realisation import Realisation, sampled_response
+
+# lines of the first stage: enough to show every mode, few enough to cost next to nothing
+_LINES = 160
+# nepers from the start that the first stage may go: a parameter that wants to be zero stops here
+_REACH = 16.0
+
+
+class LogResponse:
+    """log(G/Ĝ) on a few lines of an experiment: the residual of the first stage."""
+
+    def __init__(self, omega: FloatArray, response: ComplexArray, hold: Any) -> None:
+        self.omega, self.measured, self.hold = omega, response, hold
+        self.n_rows = 2 * response.size
+
+    @property
+    def energy(self) -> float:
+        """Errors of one neper and one radian at every line."""
+        return float(self.n_rows)
+
+    def at(self, realisation: Realisation) -> _LogEvaluation:
+        """Evaluate at one trial point."""
+        return _LogEvaluation(self, realisation)
+
+
+class _LogEvaluation:
+    def __init__(self, target: LogResponse, realisation: Realisation) -> None:
+        G, self.dG = sampled_response(realisation, target.omega, target.hold)
+        self.G = G
+        ratio = G / target.measured
+        error = np.log(np.abs(ratio)) + 1j * np.angle(ratio)
+        self.residual = error.reshape(-1).view(float)
+        self.transient: FloatArray | None = None
+
+    def jacobian(self, initial: FloatArray | None) -> FloatArray:
+        relative = self.dG / self.G
+        return relative.reshape(len(relative), -1).view(float)
+
+
+class LogStructure:
+    """A structure with every unknown that is not zero at the start replaced by its logarithm."""
+
+    def __init__(self, inner: Structure, start: FloatArray) -> None:
+        self.inner, self.start = inner, start
+        self.log = start != 0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.array([inner.lower, inner.upper]) / np.where(self.log, start, 1)
+            ends = np.where(self.log, np.log(np.maximum(ends, 0)), ends)
+        ends.sort(axis=0)
+        self.lower, self.upper = ends
+
+    def value(self, xi: FloatArray) -> FloatArray:
+        """The inner unknowns at xi."""
+        reach = np.clip(np.where(self.log, xi, 0), -_REACH, _REACH)
+        return np.where(self.log, self.start * np.exp(reach), xi)
+
+    def realise(self, xi: FloatArray) -> Realisation:
+        """The plant and its derivatives by xi."""
+        x = self.value(xi)
+        realisation = self.inner.realise(x)
+        by = np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
+        return realisation.scaled(by)
+
+    def describe(self, xi: FloatArray) -> str:
+        """The trial point in the user's words."""
+        return self.inner.describe(self.value(xi))
+
+
+def log_targets(experiments: Sequence[Experiment]) -> list[LogResponse]:
+    """First-stage experiments, empty where no response can be read off the data."""
+    targets = []
+    for e in experiments:
+        if not isinstance(e, SpectralExperiment):
+            return []
+        response = _empirical(e)
+        if response is None:
+            return []
+        targets.append(LogResponse(*response, e.hold))
+    return targets
+
+
+def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
+    """Frequencies and Ĝ (outputs, inputs, lines) at lines where one input frequency rules."""
+    m, channels, _ = e.U.shape
+    if e.lift > 1 and isinstance(e.hold, PeriodicHold):
+        delays = np.exp(-1j * e.omega[None] * e.hold.period * np.arange(e.lift)[:, None])
+        if m != e.lift or channels != 1:
+            return None
+        U = (e.U[:, 0] * delays).sum(axis=0) / e.lift
+        total = (np.abs(e.U[:, 0]) ** 2).sum(axis=0) / e.lift
+    elif channels == m and m > 1:
+        # a frequency response: unit inputs, one at a time
+        U, total = np.ones(len(e.omega)), np.ones(len(e.omega))
+    elif m == 1 and channels == 1:
+        every = e.U[0, 0].reshape(-1, e.aliases)
+        base = int(np.argmin(np.abs(e.omega_input[0] - e.omega[0])))
+        U, total = every[:, base], (np.abs(every) ** 2).sum(axis=1)
+    else:
+        return None
+    G = e.Y / np.where(U == 0, 1, U)
+    power = np.abs(U) ** 2
+    weight = (np.abs(e.scale) > 0).all(axis=(0, 1))
+    usable = (power > 1e-3 * power.max()) & (power > 0.98 * total) & weight & (e.omega > 0)
+    usable &= (np.abs(G) > 0).all(axis=(0, 1))
+    lines = np.flatnonzero(usable)
+    if len(lines) < 8:
+        return None
+    lines = lines[np.unique(np.linspace(0, len(lines) - 1, _LINES).astype(int))]
+    return e.omega[lines], G[:, :, lines]

@@ -1,0 +1,79 @@
+"""The noise that a fit leaves: its spectrum, weights from it, and the covariance that it makes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.ndimage
+
+from freqid.checks import FloatArray
+from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.minimum import Objective
+from freqid.lti.projection import eliminate
+
+# lines of an experiment that are enough for a covariance
+_LINES = 4000
+
+
+def smoothed_power(error: Any) -> FloatArray:
+    """Local mean of |error|² over neighbouring lines, (…, K), for errors (…, K)."""
+    power = np.abs(error) ** 2
+    K = power.shape[-1]
+    width = min(2 * int(np.sqrt(K)) + 1, K)
+    smooth: FloatArray = scipy.ndimage.uniform_filter1d(power, width, axis=-1, mode="reflect")
+    return smooth
+
+
+def noise_weights(error: Any, n_samples: int) -> FloatArray:
+    """1/variance at each line from the errors (outputs, K) that a fit left there.
+
+    In a record's cost, Σ 2|E|²/N, every real value then adds a half, as it does to a response's
+    under weights of 1/variance.
+    """
+    variance = smoothed_power(error)
+    floor = 1e-12 * variance.max(initial=0)
+    return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
+
+
+def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
+    """Σ σ²(ω) JᵀJ over the lines (P, P): what coloured noise does to the gradient.
+
+    With H = JᵀJ the covariance of the estimate is H⁻¹ M H⁻¹ whatever the noise's colour (Ljung,
+    System Identification, 1999, section 9.4); σ² is the local mean of the squared residual. None
+    where the experiments have no lines, or nothing but rounding is left.
+    """
+    experiments = objective.experiments
+    if not all(isinstance(e, SpectralExperiment) for e in experiments):
+        return None
+    try:
+        realisation = objective.structure.realise(x)
+    except Exception:  # the user's function may raise anything
+        return None
+    P = len(x)
+    total = np.zeros((P, P))
+    rows = unknown = 0
+    with np.errstate(all="ignore"):
+        for e in experiments:
+            assert isinstance(e, SpectralExperiment)
+            step = max(len(e.omega) // _LINES, 1)
+            few = e.thinned(step) if step > 1 else e
+            counted = (few.scale > 0).astype(float).reshape(-1, len(few.omega))
+            evaluation = few.at(realisation)
+            r, T, delta = evaluation.residual, evaluation.transient, None
+            Q = np.zeros((0, len(r)))
+            if T is not None:
+                Q, delta = eliminate(T, r)
+                r = r - (Q @ r) @ Q
+            J = evaluation.jacobian(delta)
+            J = J - (J @ Q.T) @ Q
+            lines = r.view(complex).reshape(-1, len(few.omega))
+            # half of a complex error's power is in each of its parts
+            local = smoothed_power(lines) / np.maximum(smoothed_power(counted), 1e-9)
+            power = np.repeat(local.ravel() / 2, 2)
+            total += (J * power) @ J.T / step
+            rows += e.n_rows
+            unknown += 0 if delta is None else len(delta)
+    if not np.isfinite(total).all():
+        return None
+    return total * rows / max(rows - unknown - P, 1)

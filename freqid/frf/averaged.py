@@ -1,0 +1,287 @@
+"""Averaged responses: H1, H2 and Hv over segments and repeats, in closed loop too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.signal
+
+from freqid.checks import Array, ComplexArray, FloatArray, whole
+from freqid.checks import band as checked_band
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+from freqid.data.record_sets import as_records, references_of
+
+# segments of a single record where none are asked for
+_SEGMENTS = 8
+
+
+def h1(
+    records: Record | Sequence[Record],
+    segment: int | None = None,
+    *,
+    band: tuple[float, float] | None = None,
+    window: Any = "hann",
+    overlap: float | None = None,
+    detrend: Any = "constant",
+    reference: Any = None,
+) -> FrequencyResponse:
+    """S_yu S_uu⁻¹: the least-squares response where the noise is on the output.
+
+    Args:
+        records: one, or repeats and experiments of one plant with one sample time.
+        segment: samples of each segment; by default an eighth of a single record, and the whole of
+            each of several.
+        band: in Hz, None for all above zero.
+        window, overlap, detrend: as scipy.signal.csd takes them, overlap as a part of the segment;
+            half by default, none for a boxcar, which suits whole periods.
+        reference: for closed loop: True for the records' own ``reference``, or its samples (a list
+            of them for several records); the estimate is then S_yr S_ur⁻¹, which feedback leaves
+            unbiased.
+
+    Returns a FrequencyResponse (outputs, inputs, K) with variance, coherence (multiple, for several
+    inputs) and input spectrum. Raises ValueError for records that do not match, too few averages
+    for the inputs, a constant channel, or a reference that has nothing to do with the input.
+
+    Source: Bendat and Piersol, Random Data, 2010, chapters 6, 7 and 9; for closed loop Pintelon and
+    Schoukens, System Identification, 2012, section 2.6.4.
+
+    >>> import freqid as fq
+    >>> record = fq.simulate(fq.first_order(), fq.white_noise(4000), 1e-3)
+    >>> bool(np.median(h1(record, 500).coherence) > 0.99)
+    True
+    """
+    s = _spectral(records, segment, band, window, overlap, detrend, reference)
+    if s.reference is not None:
+        return _joint(s)
+    return _response(s, s.yu @ np.linalg.inv(s.uu))
+
+
+def h2(
+    records: Record | Sequence[Record],
+    segment: int | None = None,
+    *,
+    band: tuple[float, float] | None = None,
+    window: Any = "hann",
+    overlap: float | None = None,
+    detrend: Any = "constant",
+) -> FrequencyResponse:
+    """S_yy S_uy⁻¹: for noise on the input. Arguments, result and errors as in ``h1``.
+
+    It needs as many outputs as inputs.
+    """
+    s = _spectral(records, segment, band, window, overlap, detrend, None)
+    if s.yu.shape[-1] != s.yu.shape[-2]:
+        raise ValueError(
+            f"records have {s.yu.shape[-1]} inputs and {s.yu.shape[-2]} outputs; h2 needs as many "
+            "outputs as inputs: use h1"
+        )
+    uy = s.yu.conj().swapaxes(-1, -2)
+    return _response(s, s.yy @ np.linalg.inv(uy))
+
+
+def hv(
+    records: Record | Sequence[Record],
+    segment: int | None = None,
+    *,
+    band: tuple[float, float] | None = None,
+    window: Any = "hann",
+    overlap: float | None = None,
+    detrend: Any = "constant",
+) -> FrequencyResponse:
+    """Total least squares, for noise on both ends in proportion to the signals.
+
+    With one input it is the geometric mean of H1 and H2. Arguments, result and errors as in ``h1``.
+
+    Source: Rocklin, Crowley and Vold, Proc. 3rd International Modal Analysis Conference, 1985.
+    """
+    s = _spectral(records, segment, band, window, overlap, detrend, None)
+    m, p = s.uu.shape[-1], s.yy.shape[-1]
+    G = np.empty((len(s.frequency), p, m), complex)
+    for o in range(p):
+        joint = np.empty((len(s.frequency), m + 1, m + 1), complex)
+        joint[:, :m, :m], joint[:, m, m] = s.uu, s.yy[:, o, o]
+        joint[:, m, :m] = s.yu[:, o]
+        joint[:, :m, m] = s.yu[:, o].conj()
+        size = np.sqrt(np.einsum("kii->ki", joint).real)
+        size = np.where(size > 0, size, 1)
+        # the direction with the least power holds nothing but noise
+        least = np.linalg.eigh(joint / (size[:, :, None] * size[:, None, :]))[1][:, :, 0] / size
+        G[:, o] = (-least[:, :m] / least[:, m:]).conj()
+    return _response(s, G)
+
+
+@dataclass(frozen=True)
+class _Spectral:
+    """Averaged spectra at K frequencies, matrices last; E[y uᴴ] is ``yu`` (K, outputs, inputs)."""
+
+    frequency: FloatArray
+    uu: ComplexArray
+    yu: ComplexArray
+    yy: ComplexArray
+    averages: float
+    first: Record
+    reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
+
+
+def _spectral(
+    records: Any,
+    segment: int | None,
+    band: tuple[float, float] | None,
+    window: Any,
+    overlap: float | None,
+    detrend: Any,
+    reference: Any,
+) -> _Spectral:
+    sets = as_records(records)
+    first = sets[0]
+    shortest = min(r.n_samples for r in sets)
+    if segment is None:
+        segment = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
+    length = whole("segment", segment, least=2)
+    if length > shortest:
+        raise ValueError(f"segment={length} is longer than the shortest record, {shortest} samples")
+    if overlap is None:
+        named = isinstance(window, str) and window in ("boxcar", "rectangular")
+        overlap = 0.0 if named else 0.5
+    if not 0 <= overlap < 1:
+        raise ValueError(f"overlap={overlap!r} must be a part of the segment, from 0 to below 1")
+    step = length - int(length * overlap)
+    options = {
+        "fs": 1 / first.dt, "window": window, "nperseg": length, "noverlap": length - step,
+        "detrend": detrend,
+    }  # fmt: skip
+    signals = references_of(sets, reference)
+    total: dict[str, Any] = {}
+    count = 0
+    for i, r in enumerate(sets):
+        n = (r.n_samples - length) // step + 1
+        u, y = r.inputs[:: r.factor].T[:, : r.n_samples], r.outputs.T
+        channels = {"u": u, "y": y}
+        if signals is not None:
+            channels["r"] = signals[i].T
+        pairs = ["uu", "yu", "yy"] + (["yr", "ur", "rr"] if signals is not None else [])
+        for pair in pairs:
+            a, b = channels[pair[0]], channels[pair[1]]
+            # scipy's csd(x, y) is E[x* y]: the pair (b, a) gives E[a b*]
+            f, S = scipy.signal.csd(b[None, :], a[:, None], **options)
+            total[pair] = total.get(pair, 0) + n * np.moveaxis(S, -1, 0)
+        count += n
+    keep = np.ones(len(f), bool)
+    if band is not None:
+        low, high = checked_band(band, first.nyquist)
+        keep = (f >= low * (1 - 1e-9)) & (f <= high * (1 + 1e-9))
+    keep &= f > 0
+    if not keep.any():
+        raise ValueError(f"band={band} holds no frequency; lengthen the segments or widen the band")
+    averaged = {pair: S[keep] / count for pair, S in total.items()}
+    averages = _independent(window, length, step, count)
+    m = first.n_inputs
+    if count < m:
+        raise ValueError(
+            f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
+            "segments or more experiments"
+        )
+    _excited(averaged["uu"], first)
+    joint = None
+    if signals is not None:
+        ur, rr = averaged["ur"], averaged["rr"]
+        level = np.abs(ur) ** 2 / (
+            np.einsum("kii->ki", averaged["uu"]).real[:, :, None]
+            * np.einsum("kii->ki", rr).real[:, None, :]
+        )
+        related = np.median(level.max(axis=-1))
+        if related < 2 / max(averages, 1) and averages > 2:
+            raise ValueError(
+                f"reference has a coherence of {related:.2g} with the input, no more than chance; "
+                "it did not drive this experiment"
+            )
+        joint = (averaged["yr"], ur, rr)
+    return _Spectral(
+        f[keep], averaged["uu"], averaged["yu"], averaged["yy"], averages, first, joint
+    )
+
+
+def _excited(uu: ComplexArray, first: Record) -> None:
+    power = np.einsum("kii->ki", uu).real
+    if not (power.max(axis=0) > 0).all():
+        silent = first.input_names[int(np.argmin(power.max(axis=0)))]
+        raise ValueError(f"input {silent!r} is constant in the band; it excites nothing")
+    size = np.sqrt(np.where(power > 0, power, 1))
+    least = np.linalg.eigvalsh(uu / (size[:, :, None] * size[:, None, :]))[:, 0]
+    if uu.shape[-1] > 1 and np.median(least) < 1e-10:
+        raise ValueError(
+            "the inputs move together in every segment, so that their effects cannot be told "
+            "apart; use as many different experiments as inputs"
+        )
+
+
+def _independent(window: Any, length: int, step: int, count: int) -> float:
+    """How many independent averages overlapping segments are worth (Welch, 1967)."""
+    given = isinstance(window, (list, np.ndarray))
+    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
+    total, lag = 1.0, step
+    while lag < length and count > 1:
+        shared = (w[lag:] @ w[:-lag] / (w @ w)) ** 2
+        total += 2 * shared * max(1 - (lag // step) / count, 0)
+        lag += step
+    return count / total
+
+
+def _response(s: _Spectral, G: ComplexArray) -> FrequencyResponse:
+    """The response with the variance and the coherence that the spectra tell."""
+    m = G.shape[-1]
+    inverse = np.linalg.inv(s.uu)
+    explained = np.einsum("kpm,kmn,kpn->kp", s.yu, inverse, s.yu.conj()).real
+    output = np.einsum("kpp->kp", s.yy).real
+    safe = np.where(output > 0, output, 1)
+    coherence = np.clip(explained / safe, 0, 1)
+    noise = np.maximum(output - explained, 0)
+    freedom = s.averages - m
+    spread = np.einsum("kmm->km", inverse).real
+    variance = None
+    if freedom > 0.5:
+        # what is left is too small by the parameters that were fitted to it
+        noise = noise * s.averages / freedom
+        variance = noise[:, :, None] * spread[:, None, :] / s.averages
+    return _packed(s, G, variance, np.broadcast_to(coherence[:, :, None], G.shape))
+
+
+def _joint(s: _Spectral) -> FrequencyResponse:
+    """S_yr S_ur⁻¹ with its variance: what y − G u shows that r does not explain."""
+    assert s.reference is not None
+    yr, ur, rr = s.reference
+    back = np.linalg.inv(ur)
+    G = yr @ back
+    uy = s.yu.conj().swapaxes(-1, -2)
+    Gh = G.conj().swapaxes(-1, -2)
+    error = s.yy - G @ uy - s.yu @ Gh + G @ s.uu @ Gh
+    noise = np.maximum(np.einsum("kpp->kp", error).real, 0)
+    spread = np.einsum("kmn,knl,kml->km", back.conj().swapaxes(-1, -2), rr, back.swapaxes(-1, -2))
+    freedom = max(s.averages - G.shape[-1], 0.5)
+    variance = noise[:, :, None] * np.abs(spread)[:, None, :] / freedom
+    inverse = np.linalg.inv(rr)
+    explained = np.einsum("kpm,kmn,kpn->kp", yr, inverse, yr.conj()).real
+    output = np.einsum("kpp->kp", s.yy).real
+    coherence = np.clip(explained / np.where(output > 0, output, 1), 0, 1)
+    return _packed(s, G, variance, np.broadcast_to(coherence[:, :, None], G.shape))
+
+
+def _packed(
+    s: _Spectral, G: ComplexArray, variance: FloatArray | None, coherence: Array
+) -> FrequencyResponse:
+    first = s.first
+    return FrequencyResponse(
+        s.frequency,
+        np.moveaxis(G, 0, -1),
+        dt=first.dt,
+        hold=first.hold,
+        variance=None if variance is None else np.moveaxis(variance, 0, -1),
+        coherence=np.moveaxis(coherence, 0, -1),
+        input_spectrum=np.einsum("kmm->mk", s.uu).real,
+        input_names=first.input_names,
+        output_names=first.output_names,
+    )

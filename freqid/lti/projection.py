@@ -1,0 +1,127 @@
+"""Tall, thin linear algebra of the fit: triangles, Gram matrices, and the transient taken off.
+
+Matrices have few long rows, one for each unknown, and products are made in pieces that stay in the
+processor's cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.lti.sampled import BLOCK
+
+
+def triangle(matrix: FloatArray) -> FloatArray:
+    """R of the QR decomposition, (min(rows, columns), columns).
+
+    A tall matrix is reduced in blocks of rows, whose triangles are reduced again: as stable as
+    Householder's on the whole (TSQR: Demmel, Grigori, Hoemmen and Langou, SIAM J. Scientific
+    Computing 34, 2012), and in pieces that stay in the cache (see BLOCK).
+    """
+    rows, columns = matrix.shape
+    tall = 8 * columns
+    if rows >= 4 * tall:
+        whole = rows - rows % tall
+        blocks = np.ascontiguousarray(matrix[:whole]).reshape(-1, tall, columns)
+        reduced = np.asarray(np.linalg.qr(blocks, mode="r")).reshape(-1, columns)
+        return triangle(np.concatenate([reduced, matrix[whole:]]))
+    return np.asarray(np.linalg.qr(matrix, mode="r"))
+
+
+# rows for which, from so many columns on, products row by row are faster
+_FEW_ROWS, _SHORT = 6, 2000
+
+
+def inner(A: FloatArray, B: FloatArray) -> FloatArray:
+    """A Bᵀ for few long rows, in blocks; where they are very few, row by row.
+
+    BLAS copies matrices to multiply them, which takes longer than to multiply so few rows.
+    """
+    columns = A.shape[1]
+    if len(B) <= _FEW_ROWS and columns > _SHORT:
+        return np.array([A @ b for b in B]).reshape(len(B), len(A)).T
+    if columns <= 2 * BLOCK:
+        return A @ B.T
+    total = np.zeros((len(A), len(B)))
+    for start in range(0, columns, 2 * BLOCK):
+        part = slice(start, start + 2 * BLOCK)
+        total += A[:, part] @ B[:, part].T
+    return total
+
+
+# least pivot of the scaled Gram matrix below which half of the digits are gone
+_LEAST_PIVOT = 1e-4
+
+
+def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None]]) -> FloatArray:
+    """R of the QR decomposition of stacked [P J, r], from J (P, rows), r and the rows Q of I − P.
+
+    The Cholesky factor of the Gram matrix is R at a fraction of the work, as long as the columns
+    of J, scaled alike, are far from dependent; when they are not, Householder's QR.
+    """
+    P = len(blocks[0][0])
+    G, g, rr = np.zeros((P, P)), np.zeros(P), 0.0
+    size = np.zeros(P)
+    for J, r, Q in blocks:
+        full = inner(J, J)
+        size += full.diagonal()
+        G, g, rr = G + full, g + J @ r, rr + float(r @ r)
+        if Q is not None:
+            seen = inner(J, Q)
+            G = G - seen @ seen.T
+    size = np.sqrt(size)
+    if np.isfinite(G).all() and np.isfinite(rr) and (size > 0).all():
+        try:
+            L = np.linalg.cholesky(G / np.outer(size, size))
+        except np.linalg.LinAlgError:
+            L = np.zeros_like(G)
+        if L.diagonal().min(initial=1.0) > _LEAST_PIVOT:
+            R = np.zeros((P + 1, P + 1))
+            R[:P, :P] = L.T * size
+            R[:P, P] = np.linalg.solve(L, g / size)
+            R[P, P] = np.sqrt(max(rr - float(R[:P, P] @ R[:P, P]), 0.0))
+            return R
+    columns = []
+    for J, r, Q in blocks:
+        projected = J if Q is None else J - (J @ Q.T) @ Q
+        columns.append(np.concatenate([projected, r[None]]))
+    stacked = np.concatenate(columns, axis=1)
+    if not np.isfinite(stacked).all():
+        return np.full((1, P + 1), np.nan)
+    return triangle(stacked.T)
+
+
+def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal rows that span those of T (q, rows), and the δ that makes |r + δ T| least."""
+    size = np.sqrt(np.einsum("ij,ij->i", T, T))
+    delta = np.zeros(len(T))
+    used = size > 1e-200
+    if not used.any() or not np.isfinite(size).all():
+        return np.zeros((0, len(r))), delta
+    if not used.all():
+        T, size = T[used], size[used]
+    gram = inner(T, T) / np.outer(size, size)
+    try:
+        L = np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        L = np.zeros_like(gram)
+    least = L.diagonal().min()
+    if least > _LEAST_PIVOT:
+        first = np.linalg.inv(L) / size
+        Q = first @ T
+        if least < 0.03:
+            # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
+            second = np.linalg.inv(np.linalg.cholesky(inner(Q, Q)))
+            Q, first = second @ Q, second @ first
+        delta[used] = -first.T @ (Q @ r)
+        return Q, delta
+    unit = T / size[:, None]
+    # modes that the output hardly shows: keep the directions that it does
+    U, s, Vt = np.linalg.svd(unit.T, full_matrices=False)
+    strong = s > 1e-11 * s[0]
+    U, s, Vt = U[:, strong], s[strong], Vt[strong]
+    delta[used] = -(Vt.T @ ((U.T @ r) / s)) / size
+    return U.T, delta

@@ -1,0 +1,113 @@
+"""Responses through a hold: where they are taken, their values and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many
+from freqid.lti.holds.hold import BandLimited, Hold, PeriodicHold, ZeroOrderHold
+from freqid.lti.sampled import SampledPlant, StateSpace
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The plane in which the resolvent is taken: z itself, or a Möbius map of it.
+
+    w = (z − a)/(1 − a z) spreads a short arc of the unit circle over all of it, and a sampled
+    plant becomes C (wI − Φ̃)⁻¹ ((1 + a w) Γ u + (w + a) δ) + D u, of the same order.
+    """
+
+    a: float = 0.0
+
+    def points(self, z: ComplexArray) -> ComplexArray:
+        """w at z."""
+        return z if self.a == 0 else (z - self.a) / (1 - self.a * z)
+
+    def input_factor(self, w: ComplexArray) -> ComplexArray | float:
+        """What multiplies Γ u."""
+        return 1.0 if self.a == 0 else 1 + self.a * w
+
+    def free_factor(self, w: ComplexArray) -> ComplexArray:
+        """What multiplies δ."""
+        return w if self.a == 0 else w + self.a
+
+
+def points(omega: FloatArray, hold: Hold) -> ComplexArray:
+    """Where the response is taken: exp(jω·period) of the hold, or jω without one."""
+    return on_circle(hold.period * omega) if isinstance(hold, PeriodicHold) else 1j * omega
+
+
+def on_circle(angle: FloatArray) -> ComplexArray:
+    """exp(j·angle); a cosine and a sine take half of the time of a complex exponential."""
+    z = np.empty(angle.shape, complex)
+    np.cos(angle, out=z.real)
+    np.sin(angle, out=z.imag)
+    return z
+
+
+def transition(basis: Basis, dt: float) -> SampledPlant:
+    """The plant's free motion over ``dt`` (s): exp(A dt) and its derivative, for the transient."""
+    return basis.through(ZeroOrderHold(dt))
+
+
+def transfer(plant: SampledPlant, z: ComplexArray) -> ComplexArray:
+    """Response of a sampled plant, (outputs, inputs, lines)."""
+    m = plant.gamma.shape[-1]
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
+    return plant.output(plant.solve(z, plant.drive(z, U)), U)
+
+
+def response_and_derivatives(
+    plant: SampledPlant, z: ComplexArray, dz: ComplexArray | None = None
+) -> tuple[ComplexArray, ComplexArray]:
+    """Response (…, outputs, inputs, lines) and exact derivatives (…, P, outputs, inputs, lines)."""
+    m = plant.gamma.shape[-1]
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, z.shape[-1]))
+    x = plant.solve(z, plant.drive(z, U))
+    return plant.output(x, U), plant.sensitivity(z, plant.output_rows(z), x, U, dz=dz)
+
+
+def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArray:
+    """Responses of a batch of plants, (S, outputs, inputs, lines); NaN where A is defective."""
+    basis = eigenbasis_of_many(at)
+    plant, z = basis.through(hold), points(omega, hold)
+    m = at.B.shape[-1]
+    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
+    return plant.output(plant.solve(z, plant.drive(z, U)), U)
+
+
+def frequency_response(
+    at: StateSpace,
+    omega: Any,
+    hold: Hold | None = None,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+) -> FrequencyResponse:
+    """Response of the plant at ``omega`` (rad/s), continuous or through a hold."""
+    omega = np.atleast_1d(np.asarray(omega, dtype=float))
+    if omega.ndim != 1 or not np.isfinite(omega).all():
+        raise ValueError(
+            f"omega has shape {omega.shape}; expected finite frequencies (rad/s), (K,)"
+        )
+    if hold is not None and not isinstance(hold, Hold):
+        raise ValueError(
+            f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
+            "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
+        )
+    between = BandLimited() if hold is None else hold
+    plant, z = basis_of(at).through(between), points(omega, between)
+    dt = hold.period if isinstance(hold, PeriodicHold) else 0.0
+    return FrequencyResponse(
+        omega / (2 * np.pi),
+        transfer(plant, z),
+        dt=dt,
+        hold=hold,
+        input_names=inputs,
+        output_names=outputs,
+    )

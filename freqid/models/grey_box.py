@@ -1,0 +1,257 @@
+"""GreyBox: a continuous-time plant whose matrices are functions of physical parameters."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import FloatArray, unknown
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.lti.bases import basis_of
+from freqid.lti.holds.hold import BandLimited, Hold
+from freqid.lti.responses import frequency_response, points, response_and_derivatives
+from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.models.matrices import Jacobian, Matrices, MatrixFunction
+from freqid.models.parameter import Parameter
+from freqid.models.ties import Ties
+
+
+@dataclass(frozen=True)
+class GreyBox:
+    """A continuous-time plant whose matrices are functions of physical parameters.
+
+    Args:
+        matrices: ``matrices(**values)`` returns A (n, n), B (n, inputs), C (outputs, n),
+            D (outputs, inputs); a D of None or 0 is all zeros.
+        parameters: the Parameter objects, in the order in which results list them.
+        outputs, inputs: names of the channels.
+        name: shown in reports.
+        ties: expressions of other parameters by name, ``{"Ja": "2 * Jm"}``: a parameter that is
+            tied takes the expression's value and is not estimated.
+        jacobian: ``jacobian(**values)`` returns for each parameter's name the derivatives
+            (dA, dB, dC, dD) of the matrices; complex steps or differences are taken without it.
+        vectorized: True says that ``matrices`` also takes arrays of values, (batch,), and then
+            returns matrices with that leading axis. It only saves time.
+
+    Raises ValueError when the matrices do not have agreeing shapes or are not finite, or when two
+    parameters share a name.
+
+    >>> lag = GreyBox(lambda tau: ([[-1 / tau]], [[1 / tau]], [[1.0]], None),
+    ...               parameters=[Parameter("tau", 0.01, unit="s")])
+    >>> lag.with_values(tau=0.02).values
+    {'tau': 0.02}
+    """
+
+    matrices: Matrices
+    parameters: Sequence[Parameter]
+    outputs: Sequence[str] | None = None
+    inputs: Sequence[str] | None = None
+    name: str = "grey box"
+    vectorized: bool = False
+    ties: Mapping[str, str] = field(default_factory=dict)
+    jacobian: Jacobian | None = None
+    _function: MatrixFunction = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        parameters = tuple(self.parameters)
+        object.__setattr__(self, "parameters", parameters)
+        for p in parameters:
+            if not isinstance(p, Parameter):
+                raise ValueError(f"parameters holds {p!r}; expected Parameter objects")
+        names = [p.name for p in parameters]
+        if len(set(names)) < len(names):
+            raise ValueError(f"parameters={names} has a name twice; names must differ")
+        ties = Ties(self.ties, names)
+        nominal = ties.resolve({p.name: p.value for p in parameters})
+        function = MatrixFunction(self.matrices, ties, self.vectorized, self.jacobian, nominal)
+        object.__setattr__(self, "_function", function)
+        at = self.state_space()
+        object.__setattr__(self, "outputs", _channels("outputs", self.outputs, at.C.shape[0], "y"))
+        object.__setattr__(self, "inputs", _channels("inputs", self.inputs, at.B.shape[1], "u"))
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Value of every parameter by name, tied ones resolved."""
+        return self._function.ties.resolve({p.name: p.value for p in self.parameters})
+
+    @property
+    def free_parameters(self) -> tuple[Parameter, ...]:
+        """The parameters that a fit moves: neither fixed nor tied."""
+        return tuple(p for p in self.parameters if not p.fixed and p.name not in self.ties)
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.inputs or ())
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return len(self.outputs or ())
+
+    def __getitem__(self, name: str) -> float:
+        self.parameter(name)
+        return self.values[name]
+
+    def parameter(self, name: str) -> Parameter:
+        """The Parameter called ``name``; ValueError if there is none."""
+        for p in self.parameters:
+            if p.name == name:
+                return p
+        raise ValueError(unknown("parameter", name, self.values))
+
+    def with_values(self, **values: float) -> GreyBox:
+        """The same plant at other parameter values. Raises ValueError for an unknown name.
+
+        >>> from freqid import two_mass
+        >>> two_mass().with_values(k=2e5)["k"]
+        200000.0
+        """
+        return self._changed({name: {"value": value} for name, value in values.items()})
+
+    def fix(self, *names: str) -> GreyBox:
+        """The same plant with these parameters held at their values in a fit."""
+        return self._changed({name: {"fixed": True} for name in names})
+
+    def free(self, *names: str) -> GreyBox:
+        """The same plant with these parameters estimated in a fit."""
+        return self._changed({name: {"fixed": False} for name in names})
+
+    def with_bounds(self, **bounds: tuple[float, float]) -> GreyBox:
+        """The same plant with other search bounds, ``with_bounds(k=(1e4, 1e6))``."""
+        return self._changed({n: {"lower": lo, "upper": hi} for n, (lo, hi) in bounds.items()})
+
+    def with_prior(self, **priors: tuple[float, float] | None) -> GreyBox:
+        """The same plant with priors (mean, standard deviation), ``with_prior(k=(1.5e5, 1e4))``."""
+        return self._changed({n: {"prior": prior} for n, prior in priors.items()})
+
+    def tie(self, **expressions: str) -> GreyBox:
+        """The same plant with parameters tied to expressions of others, ``tie(Ja="2 * Jm")``.
+
+        Raises ValueError for an unknown name, an expression that cannot be computed, or a tie to a
+        tied parameter.
+
+        >>> from freqid import two_mass
+        >>> two_mass().tie(Ja="1e4 * Jm")["Ja"]
+        9.0
+        """
+        for name in expressions:
+            self.parameter(name)
+        return dataclasses.replace(self, ties={**self.ties, **expressions})
+
+    def _changed(self, changes: Mapping[str, Mapping[str, Any]]) -> GreyBox:
+        for name in changes:
+            self.parameter(name)
+        for name in self.ties:
+            if "value" in changes.get(name, {}) and changes[name]["value"] != self.values[name]:
+                raise ValueError(
+                    f"parameter {name} is tied to {self.ties[name]!r}; set the parameters it is of"
+                )
+        new = tuple(
+            dataclasses.replace(p, **changes[p.name]) if p.name in changes else p
+            for p in self.parameters
+        )
+        # shapes and names are as they were checked already
+        other = copy.copy(self)
+        object.__setattr__(other, "parameters", new)
+        return other
+
+    def state_space(self, **values: float) -> StateSpace:
+        """A, B, C, D at the parameter values, or at ``values`` where given.
+
+        >>> from freqid import first_order
+        >>> first_order(b=3, a=2).state_space().A
+        array([[-2.]])
+        """
+        return self._function.at(self.values | values)
+
+    def state_spaces(self, **columns: FloatArray) -> StateSpace:
+        """A, B, C, D at many points at once: each argument (S,), each matrix (S, …)."""
+        count = len(next(iter(columns.values())))
+        full = {n: columns.get(n, np.full(count, v)) for n, v in self.values.items()}
+        return self._function.at_many(full)
+
+    def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
+        """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
+
+        Returns a FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega
+        that is not finite or a hold that is not one.
+
+        >>> import freqid as fq
+        >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
+        np.float64(0.7071)
+        """
+        return frequency_response(self.state_space(), omega, hold, self.inputs, self.outputs)
+
+    def response_with_variance(
+        self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
+    ) -> FrequencyResponse:
+        """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``.
+
+        Names that are not the plant's own, such as an estimated hold's period, do not count.
+        """
+        own = [i for i, name in enumerate(names) if name in self.values]
+        names, covariance = [names[i] for i in own], covariance[np.ix_(own, own)]
+        lin = self.linearise(self.values, names)
+        frf = self.frequency_response(omega, hold)
+        between = BandLimited() if hold is None else hold
+        plant = basis_of(*lin).through(between)
+        _, J = response_and_derivatives(plant, points(frf.omega, between))
+        known = np.where(np.isfinite(covariance), covariance, 0)
+        variance = np.einsum("apmk,ab,bpmk->pmk", J.conj(), known, J).real
+        return dataclasses.replace(frf, variance=variance)
+
+    def to_control(self) -> Any:
+        """The plant as a continuous ``control.StateSpace``."""
+        import control
+
+        return control.ss(
+            *self.state_space(), inputs=list(self.inputs or ()), outputs=list(self.outputs or ())
+        )
+
+    def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
+        """Matrices at ``values`` and their derivatives by the parameters ``names``.
+
+        A complex step (Squire and Trapp, SIAM Review 40, 1998) gives the derivative to rounding;
+        where the user's function does not carry complex numbers through, central differences.
+        """
+        return self._function.linearise(values, names)
+
+    def linearise_many(self, points: FloatArray, names: Sequence[str]) -> Linearisation:
+        """Matrices (S, …) at many points (S, len(names)) and their derivatives (S, P, …)."""
+        return self._function.linearise_many(self.values, points, names)
+
+    def __repr__(self) -> str:
+        inside = ", ".join(
+            f"{p.name}={v:g}{' fixed' * p.fixed}{' tied' * (p.name in self.ties)}"
+            for p, v in zip(self.parameters, self.values.values(), strict=True)
+        )
+        return f"<GreyBox {self.name}: {inside}>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(p.name)}</td><td>{p.value:g}</td><td>{escape(p.unit)}</td>"
+            f"<td>{'fixed' if p.fixed else 'free'}</td></tr>"
+            for p in self.parameters
+        )
+        return (
+            f"<table><caption>{escape(self.name)}</caption>"
+            f"<tr><th>parameter</th><th>value</th><th>unit</th><th></th></tr>{rows}</table>"
+        )
+
+
+def _channels(name: str, given: Sequence[str] | None, count: int, letter: str) -> tuple[str, ...]:
+    if given is None:
+        return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if len(names) != count:
+        raise ValueError(
+            f"{name}={list(names)} names {len(names)} channels; the matrices have {count}"
+        )
+    return names

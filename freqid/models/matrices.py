@@ -1,0 +1,218 @@
+"""A user's function of parameters as matrices, and the matrices' exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import Array, FloatArray
+from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.models.ties import Ties
+
+Matrices = Callable[..., Sequence[Any]]
+Jacobian = Callable[..., Mapping[str, Sequence[Any]]]
+
+# small enough that its square vanishes beside any matrix entry
+_COMPLEX_STEP = 1e-100
+
+
+class MatrixFunction:
+    """A, B, C, D and their derivatives at parameter values, ties resolved.
+
+    ``vectorized`` says that the function takes arrays of values; ``jacobian`` gives the derivatives
+    where the user has them; at the ``nominal`` values it is tried whether complex steps do.
+    """
+
+    def __init__(
+        self,
+        matrices: Matrices,
+        ties: Ties,
+        vectorized: bool,
+        jacobian: Jacobian | None,
+        nominal: Mapping[str, float],
+    ) -> None:
+        self.matrices, self.ties, self.nominal = matrices, ties, nominal
+        self.vectorized, self.jacobian = vectorized, jacobian
+        self._carries: dict[tuple[str, ...], bool] = {}
+
+    def at(self, values: Mapping[str, float]) -> StateSpace:
+        """Dense, finite matrices of agreeing shapes; ValueError where there are none."""
+        resolved = self.ties.resolve(values)
+        try:
+            matrices = self.matrices(**resolved)
+        except Exception as error:  # the user's function may raise anything
+            where = ", ".join(f"{k}={v:g}" for k, v in resolved.items())
+            raise ValueError(f"the model cannot be computed at {where}: {error}") from error
+        return _shaped(matrices, resolved)
+
+    def at_many(self, columns: Mapping[str, FloatArray]) -> StateSpace:
+        """Matrices (S, …) at many points, each column (S,)."""
+        full = self.ties.resolve(columns)
+        if self.vectorized:
+            return StateSpace(*(np.asarray(M, dtype=float) for M in self.matrices(**full)))
+        rows = [dict(zip(full, row, strict=True)) for row in np.array(list(full.values())).T]
+        each = [_dense(self.matrices(**{k: float(v) for k, v in r.items()}), float) for r in rows]
+        return StateSpace(*(np.stack(M) for M in zip(*each, strict=True)))
+
+    def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
+        """Matrices at ``values`` and their derivatives by the parameters ``names``.
+
+        A complex step (Squire and Trapp, SIAM Review 40, 1998) gives the derivative to rounding;
+        where the user's function does not carry complex numbers through, central differences.
+        """
+        if self.vectorized and self.jacobian is None:
+            columns = np.array(list(values.values()), dtype=float)[:, None]
+            at, derivative = self._complex_batch(list(values), columns, names)
+            return Linearisation(
+                StateSpace(*(M[0] for M in at)), StateSpace(*(M[0] for M in derivative))
+            )
+        resolved = self.ties.resolve(values)
+        at = _shaped(self.matrices(**resolved), resolved)
+        if self.jacobian is not None:
+            return Linearisation(at, self._by_jacobian(at, values, names))
+        exact = self.takes_complex(names)
+        return Linearisation(at, self._differentiate(at, values, names, exact))
+
+    def _by_jacobian(
+        self, at: StateSpace, values: Mapping[str, float], names: Sequence[str]
+    ) -> StateSpace:
+        """The user's derivatives, carried through the ties by the chain rule."""
+        assert self.jacobian is not None
+        by = self.jacobian(**self.ties.resolve(values))
+        total = [np.zeros((len(names), *M.shape)) for M in at]
+        for i, name in enumerate(names):
+            moved = self.ties.resolve({**values, name: values[name] + _COMPLEX_STEP * 1j})
+            for other, value in moved.items():
+                slope = np.imag(value) / _COMPLEX_STEP
+                if slope == 0:
+                    continue
+                if other not in by:
+                    raise ValueError(f"jacobian returned no derivative by {other!r}")
+                for part, d in zip(total, by[other], strict=True):
+                    part[i] += slope * np.asarray(0.0 if d is None else d, dtype=float)
+        return StateSpace(*total)
+
+    def linearise_many(
+        self, values: Mapping[str, float], points: FloatArray, names: Sequence[str]
+    ) -> Linearisation:
+        """Matrices (S, …) at many points (S, len(names)) and their derivatives (S, P, …)."""
+        if self.vectorized and self.jacobian is None:
+            columns = np.tile(np.array(list(values.values()), dtype=float)[:, None], len(points))
+            for name, column in zip(names, points.T, strict=True):
+                columns[list(values).index(name)] = column
+            return Linearisation(*self._complex_batch(list(values), columns, names))
+        each = [
+            self.linearise({**values, **dict(zip(names, row.tolist(), strict=True))}, names)
+            for row in points
+        ]
+        at, derivative = zip(*each, strict=True)
+        return Linearisation(
+            StateSpace(*(np.stack(M) for M in zip(*at, strict=True))),
+            StateSpace(*(np.stack(M) for M in zip(*derivative, strict=True))),
+        )
+
+    def _complex_batch(
+        self, names: Sequence[str], columns: FloatArray, by: Sequence[str]
+    ) -> tuple[StateSpace, StateSpace]:
+        """Matrices at S points, columns (len(names), S), and derivatives, in one call."""
+        S, count = columns.shape[1], len(by)
+        stacked = np.empty((len(names), S, count + 1), complex)
+        stacked[:] = columns[..., None]
+        row = {name: i for i, name in enumerate(names)}
+        for i, name in enumerate(by):
+            stacked[row[name], :, i + 1] += _COMPLEX_STEP * 1j
+        flat = dict(zip(names, stacked.reshape(len(names), -1), strict=True))
+        matrices = [
+            np.asarray(M).reshape(S, count + 1, *np.shape(M)[1:])
+            for M in self.matrices(**self.ties.resolve(flat))
+        ]
+        return (
+            StateSpace(*(M[:, 0].real for M in matrices)),
+            StateSpace(*(M[:, 1:].imag / _COMPLEX_STEP for M in matrices)),
+        )
+
+    def _differentiate(
+        self,
+        at: StateSpace,
+        values: Mapping[str, float],
+        names: Sequence[str],
+        by_complex_step: bool,
+    ) -> StateSpace:
+        columns = []
+        for name in names:
+            v = values[name]
+            if by_complex_step:
+                stepped = self.ties.resolve({**values, name: v + _COMPLEX_STEP * 1j})
+                moved = _dense(self.matrices(**stepped), complex)
+                columns.append([M.imag / _COMPLEX_STEP for M in moved])
+            else:
+                # the step that balances rounding against the third derivative
+                step = np.finfo(float).eps ** (1 / 3) * max(abs(v), 1e-8)
+                up, down = (
+                    _dense(self.matrices(**self.ties.resolve({**values, name: v + s})), float)
+                    for s in (step, -step)
+                )
+                columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])
+        return StateSpace(
+            *(
+                np.array([c[i] for c in columns]).reshape(len(names), *M.shape)
+                for i, M in enumerate(at)
+            )
+        )
+
+    def takes_complex(self, names: Sequence[str]) -> bool:
+        """Whether complex steps of these go through and agree with differences; tried once."""
+        key = tuple(names)
+        if key not in self._carries:
+            self._carries[key] = self._tried(self.nominal, names)
+        return self._carries[key]
+
+    def _tried(self, values: Mapping[str, float], names: Sequence[str]) -> bool:
+        at = self.at(values)
+        try:
+            exact = self._differentiate(at, values, names, by_complex_step=True)
+        except (
+            TypeError,
+            ValueError,
+            AttributeError,
+            ArithmeticError,
+            np.exceptions.ComplexWarning,
+        ):
+            return False
+        rough = self._differentiate(at, values, names, by_complex_step=False)
+        return all(
+            bool(
+                np.all(np.abs(a - b) <= 1e-4 * np.abs(b).max(axis=(1, 2), keepdims=True, initial=0))
+            )
+            for a, b in zip(exact, rough, strict=True)
+        )
+
+
+def _dense(matrices: Sequence[Any], dtype: type) -> list[Array]:
+    A, B, C, D = matrices
+    A, B, C = (np.asarray(M, dtype=dtype) for M in (A, B, C))
+    if D is None or np.ndim(D) == 0:
+        D = np.full((C.shape[0], B.shape[1]), 0 if D is None else D, dtype)
+    return [A, B, C, np.asarray(D, dtype=dtype)]
+
+
+def _shaped(matrices: Sequence[Any], values: Mapping[str, float]) -> StateSpace:
+    """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
+    if len(matrices) != 4:
+        raise ValueError(f"matrices returned {len(matrices)} items; expected A, B, C, D")
+    shapes = [np.shape(M) for M in matrices]
+    text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
+    expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"
+    if any(len(shape) != 2 for shape in shapes[:3]):
+        raise ValueError(f"{text}; {expected}")
+    out = StateSpace(*_dense(matrices, float))
+    n, m, p = out.A.shape[0], out.B.shape[1], out.C.shape[0]
+    wanted = ((n, n), (n, m), (p, n), (p, m))
+    if any(M.shape != shape for M, shape in zip(out, wanted, strict=True)):
+        raise ValueError(f"{text}; {expected}")
+    if not all(np.isfinite(M).all() for M in out):
+        at = ", ".join(f"{k}={v:g}" for k, v in values.items())
+        raise ValueError(f"matrices are not finite at {at}; change the values or the function")
+    return out

@@ -1,0 +1,231 @@
+"""Black-box models: OutputError, a sampled rational model of any number of channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from freqid.checks import ComplexArray, FloatArray, whole
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.lti.bases import basis_of
+from freqid.lti.holds.hold import (
+    BandLimited,
+    FirstOrderHold,
+    Hold,
+    PeriodicHold,
+    ZeroOrderHold,
+    as_hold,
+)
+from freqid.lti.responses import transfer
+from freqid.lti.sampled import StateSpace
+
+
+@dataclass(frozen=True)
+class OutputError:
+    """Black box: b(z)/a(z) of ``order``, in z = exp(jω·period) of the hold.
+
+    With ``feedthrough`` the output answers to the input of the same sample (b₀ ≠ 0), as every
+    plant does when its input is taken to run in straight lines between samples. Several inputs
+    and outputs share one state space. Raises ValueError for an order that is not a whole number.
+
+    >>> OutputError(order=3)
+    OutputError(order=3, feedthrough=False)
+    """
+
+    order: int
+    feedthrough: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "order", whole("order", self.order))
+
+
+@dataclass(frozen=True, eq=False)
+class DiscreteModel:
+    """A sampled model x(k+1) = Φ x + Γ u, y = C x + D u at the period of its hold (s)."""
+
+    matrices: StateSpace
+    dt: float
+    hold: Hold
+    input_names: Sequence[str]
+    output_names: Sequence[str]
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.matrices.A)
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles in the z plane, (order,)."""
+        return np.linalg.eigvals(self.matrices.A).astype(complex)
+
+    @property
+    def zeros(self) -> ComplexArray:
+        """Transmission zeros in the z plane."""
+        import control
+
+        return np.asarray(control.zeros(self.to_control()))
+
+    def denominator(self) -> FloatArray:
+        """a(z), highest power first, (order + 1,)."""
+        return characteristic(self.matrices.A)
+
+    def numerator(self, output: int = 0, input: int = 0) -> FloatArray:
+        """b(z) from one input to one output, highest power first, (order + 1,)."""
+        return numerator_of(self.matrices, self.denominator(), output, input)
+
+    def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
+        """Response at ``omega`` (rad/s), taken at exp(jω·dt)."""
+        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        plant = basis_of(self.matrices).through(BandLimited())
+        return FrequencyResponse(
+            omega / (2 * np.pi),
+            transfer(plant, np.exp(1j * omega * self.dt)),
+            dt=self.dt,
+            hold=self.hold,
+            input_names=self.input_names,
+            output_names=self.output_names,
+        )
+
+    def coefficients(self) -> tuple[list[str], FloatArray]:
+        """Names and values of the coefficients: b of each channel pair, then a."""
+        p, m = self.matrices.D.shape
+        names = []
+        for o in range(p):
+            for i in range(m):
+                pair = "" if p * m == 1 else f"[{self.output_names[o]},{self.input_names[i]}]"
+                first = 0 if self.matrices.D.any() else 1
+                names += [f"b{k}{pair}" for k in range(first, self.order + 1)]
+        names += [f"a{k}" for k in range(1, self.order + 1)]
+        return names, coefficients_of(self.matrices)
+
+    def response_with_variance(
+        self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
+    ) -> FrequencyResponse:
+        """Response and its variance, to first order in the covariance of the coefficients."""
+        frf = self.frequency_response(omega)
+        p, m, K = frf.response.shape
+        z = np.exp(1j * frf.omega * self.dt)
+        n = self.order
+        a = np.polyval(self.denominator(), z)
+        first = 0 if self.matrices.D.any() else 1
+        per_pair = n + 1 - first
+        variance = np.empty((p, m, K))
+        for o in range(p):
+            for i in range(m):
+                J = np.zeros((len(names), K), complex)
+                begin = (o * m + i) * per_pair
+                for k in range(first, n + 1):
+                    J[begin + k - first] = z ** (n - k) / a
+                for k in range(1, n + 1):
+                    J[p * m * per_pair + k - 1] = -frf.response[o, i] * z ** (n - k) / a
+                variance[o, i] = np.einsum("ak,ab,bk->k", J.conj(), covariance, J).real
+        return FrequencyResponse(
+            frf.frequency,
+            frf.response,
+            dt=frf.dt,
+            hold=frf.hold,
+            variance=variance,
+            input_names=frf.input_names,
+            output_names=frf.output_names,
+        )
+
+    def to_control(self) -> Any:
+        """The model as a discrete ``control.StateSpace``."""
+        import control
+
+        return control.ss(
+            *self.matrices, self.dt, inputs=list(self.input_names), outputs=list(self.output_names)
+        )
+
+    def to_continuous(self, hold: Hold | str | None = None) -> Any:
+        """The continuous plant that this hold samples to the model, a ``control.StateSpace``.
+
+        Raises ValueError where there is none: a pole at zero or on the negative real axis has no
+        real logarithm, and only a band-limited model that is strictly proper has one.
+        """
+        import control
+
+        between = as_hold(self.hold if hold is None else hold, self.dt)
+        if isinstance(between, PeriodicHold) and abs(between.period / self.dt - 1) > 1e-9:
+            raise ValueError(
+                f"hold={between!r} must have the model's own period, {self.dt:g} s; "
+                f"use {type(between).__name__}({self.dt:g})"
+            )
+        continuous = invert_hold(self.matrices, self.dt, between)
+        return control.ss(
+            *continuous, inputs=list(self.input_names), outputs=list(self.output_names)
+        )
+
+    def __repr__(self) -> str:
+        p, m = self.matrices.D.shape
+        return f"<DiscreteModel of order {self.order}, {p}x{m}, dt={self.dt:g} s, {self.hold!r}>"
+
+
+def characteristic(A: FloatArray) -> FloatArray:
+    """det(zI − A), highest power first, (…, n + 1), of matrices (…, n, n)."""
+    roots = np.linalg.eigvals(A)
+    a = np.zeros((*roots.shape[:-1], roots.shape[-1] + 1), complex)
+    a[..., 0] = 1
+    for k in range(roots.shape[-1]):
+        a[..., 1 : k + 2] -= roots[..., k, None] * a[..., : k + 1]
+    return a.real
+
+
+def numerator_of(matrices: StateSpace, a: FloatArray, output: int, input: int) -> FloatArray:
+    """b(z) of a channel pair beside the denominator a(z), (…, n + 1)."""
+    A, B, C, D = matrices
+    # det(zI − A + b c) = a(z) + c adj(zI − A) b
+    closed = characteristic(A - B[..., :, input, None] * C[..., output, None, :])
+    return closed - a + D[..., output, input, None] * a
+
+
+def coefficients_of(matrices: StateSpace) -> FloatArray:
+    """Coefficients of all channel pairs' b(z), then of a(z), in a row, (…, coefficients)."""
+    a = characteristic(matrices.A)
+    p, m = matrices.D.shape[-2:]
+    first = 0 if matrices.D.any() else 1
+    rows = [numerator_of(matrices, a, o, i)[..., first:] for o in range(p) for i in range(m)]
+    return np.concatenate([*rows, a[..., 1:]], axis=-1)
+
+
+def invert_hold(sampled: StateSpace, dt: float, hold: Hold) -> StateSpace:
+    """The continuous plant whose sampled matrices under ``hold`` are these.
+
+    Zero-order hold: the matrix logarithm of [[Φ, Γ], [0, I]]. First-order hold: A from the
+    logarithm of Φ, then B from Γ + ΦΓ⁺ and D from C Γ⁺. Band-limited: the plant whose impulse
+    response, times dt, is the model's (impulse invariance).
+    """
+    Phi, Gamma, C, D = sampled
+    n, m = Gamma.shape
+    poles = np.linalg.eigvals(Phi)
+    bad = (np.abs(poles.imag) <= 1e-9 * np.abs(poles)) & (poles.real <= 1e-12)
+    if bad.any():
+        raise ValueError(
+            f"the model has a pole at z={poles[bad][0].real:.6g}, on the negative real axis or at "
+            f"zero: no real continuous plant samples to it under {hold!r}; lower the order or "
+            "sample faster"
+        )
+    if isinstance(hold, ZeroOrderHold):
+        big = np.block([[Phi, Gamma], [np.zeros((m, n)), np.eye(m)]])
+        generator = _real_log(big) / dt
+        return StateSpace(generator[:n, :n], generator[:n, n:], C, D)
+    A = _real_log(Phi) / dt
+    if isinstance(hold, FirstOrderHold):
+        unit = hold.sampled(A, np.eye(n))
+        B = np.linalg.solve(unit.gamma + Phi @ unit.gamma_next, Gamma)
+        return StateSpace(A, B, C, D - C @ unit.gamma_next @ B)
+    B = np.linalg.solve(Phi, Gamma) / dt
+    # the sampled impulse response counts half of its jump at zero (Poisson summation)
+    return StateSpace(A, B, C, D - C @ B * dt / 2)
+
+
+def _real_log(M: FloatArray) -> FloatArray:
+    logarithm = scipy.linalg.logm(M)
+    if np.abs(np.imag(logarithm)).max() > 1e-8 * max(np.abs(logarithm).max(), 1e-300):
+        raise ValueError("the model has no real logarithm: no real continuous plant samples to it")
+    return np.real(logarithm)

@@ -1,0 +1,167 @@
+"""Time-domain responses of sampled plants, and ``simulate``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.signal
+
+from freqid.checks import Array, FloatArray, positive, samples
+from freqid.data.record import Record
+from freqid.lti.bases import basis_of
+from freqid.lti.holds.hold import Hold, PeriodicHold, Sampled, as_hold
+from freqid.lti.responses import points, transfer
+from freqid.lti.sampled import StateSpace
+
+
+def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
+    """States x(0) … x(N−1), (…, n, N), of x(k+1) = Φ x(k) + f(k) from x(0).
+
+    Args: phi (n, n), forcing (…, n, N), initial (…, n).
+    """
+    S, Q = scipy.linalg.schur(phi, output="complex")
+    f = np.einsum("ji,...jk->...ik", Q.conj(), forcing)
+    forward = np.ones(len(S), bool)
+    return np.einsum("ij,...jk->...ik", Q, _chain(S, f, initial @ Q.conj(), forward)).real
+
+
+class FreeMotion:
+    """All motions of x(k+1) = Φ x(k) + f(k), growing modes run backwards from their end.
+
+    A mode that grows by 1e10 over the record leaves nothing of the others when it is run from an
+    initial state; told by its final state it is as harmless as a decaying one.
+    """
+
+    def __init__(self, phi: FloatArray, n_samples: int) -> None:
+        self.S, self.Q = scipy.linalg.schur(phi, output="complex")
+        self.forward = np.abs(np.diag(self.S)) <= 1
+        n = len(phi)
+        quiet = np.zeros((n, n, n_samples), complex)
+        motions = self.Q @ _chain(self.S, quiet, np.eye(n, dtype=complex), self.forward)
+        # real and imaginary parts of n complex motions: 2n real ones that span n dimensions
+        self.motions = np.concatenate([motions.real, motions.imag])
+
+    def particular(self, forcing: Array) -> FloatArray:
+        """One motion, (…, n, N), under the forcing (…, n, N); all others differ by ``motions``."""
+        f = np.einsum("ji,...jk->...ik", self.Q.conj(), forcing)
+        x = _chain(self.S, f, np.zeros(f.shape[:-1], complex), self.forward)
+        return np.einsum("ij,...jk->...ik", self.Q, x).real
+
+
+def _chain(S: Array, f: Array, boundary: Array, forward: Array) -> Array:
+    """x(k+1) = S x(k) + f(k) for upper triangular S: first-order filters from the last state up.
+
+    ``boundary`` (…, n) is x(0) of a state that runs forward and x(N) of one that runs backward.
+    """
+    n, N = f.shape[-2:]
+    x = np.empty((*f.shape[:-1], N), complex)
+    for i in reversed(range(n)):
+        drive = f[..., i, :] + np.einsum("j,...jk->...k", S[i, i + 1 :], x[..., i + 1 :, :])
+        s, edge = S[i, i], boundary[..., i, None]
+        if forward[i]:
+            x[..., i, 0] = edge[..., 0]
+            later = scipy.signal.lfilter([1.0], [1.0, -s], drive[..., :-1], zi=s * edge)[0]
+            x[..., i, 1:] = later
+        else:
+            back = drive[..., ::-1]
+            x[..., i, ::-1] = scipy.signal.lfilter([-1 / s], [1.0, -1 / s], back, zi=edge / s)[0]
+    return x
+
+
+def forcing(sampled: Sampled, u: FloatArray) -> FloatArray:
+    """Γ u(k) + Γ⁺ u(k+1), (…, n, N), for u (m, N); the input keeps its last value after the end."""
+    following = np.concatenate([u[:, 1:], u[:, -1:]], axis=1)
+    return sampled.gamma @ u + sampled.gamma_next @ following
+
+
+def simulate(
+    model: Any,
+    u: Any,
+    dt: float,
+    hold: Hold | str | None = None,
+    initial_state: Any = None,
+    input_names: Any = None,
+    output_names: Any = None,
+) -> Record:
+    """Response of a model to an input, exact at the samples.
+
+    Args:
+        model: a GreyBox, an Estimate, a rational model or a control system. A discrete one must
+            have ``dt`` as its sample time.
+        u: input samples, (N,) or (N, inputs), ``dt`` seconds apart.
+        hold: what the input does between its samples: None or ``"zoh"``, ``"foh"``, ``"bl"``
+            (then the response is the periodic one, the input repeating for ever).
+        initial_state: state of the plant at the first sample, (n,); None starts from rest.
+
+    Returns a Record with that hold. Raises ValueError for wrong shapes or a hold whose period is
+    not ``dt``.
+
+    >>> import freqid as fq
+    >>> fq.simulate(fq.first_order(), fq.sine(8, 1, 1e-3), dt=1e-3)
+    <Record u -> y: 1000 samples at 0.001 s, ZeroOrderHold(period=0.001)>
+    """
+    dt = positive("dt", dt, "s")
+    u = samples("u", u)
+    between = as_hold("zoh" if hold is None else hold, dt)
+    if isinstance(between, PeriodicHold) and abs(between.period - dt) > 1e-9 * dt:
+        raise ValueError(
+            f"hold={between!r} must have the period dt={dt:g} s of the input's samples"
+        )
+    if getattr(getattr(model, "model", model), "delay", 0):
+        raise ValueError("model has a delay; simulate it without and shift the input by hand")
+    system, discrete_dt = _state_space(model)
+    inputs = u.reshape(len(u), -1)
+    n, m = system.B.shape
+    if inputs.shape[1] != m:
+        raise ValueError(f"u has {inputs.shape[1]} channels and the model {m} inputs; give as many")
+    x0 = np.zeros(n) if initial_state is None else np.asarray(initial_state, dtype=float)
+    if x0.shape != (n,):
+        raise ValueError(f"initial_state has shape {x0.shape}; the model has {n} states")
+    if discrete_dt and abs(discrete_dt - dt) > 1e-9 * dt:
+        raise ValueError(f"dt={dt:g} s, but the model is discrete with dt={discrete_dt:g} s")
+
+    sampled = None
+    if discrete_dt:
+        sampled = Sampled(system.A, system.B, np.zeros_like(system.B))
+    elif isinstance(between, PeriodicHold):
+        sampled = between.sampled(system.A, system.B)
+    if sampled is not None:
+        x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
+        y = (system.C @ x + system.D @ inputs.T).T
+    else:
+        if initial_state is not None:
+            raise ValueError("initial_state has no meaning for a band-limited, periodic input")
+        omega = 2 * np.pi * np.fft.rfftfreq(len(u), dt)
+        G = transfer(basis_of(system).through(between), points(omega, between))
+        U = np.fft.rfft(inputs, axis=0)
+        y = np.fft.irfft(np.einsum("pmk,km->kp", G, U), n=len(u), axis=0)
+    return Record(
+        u,
+        y[:, 0] if y.shape[1] == 1 and u.ndim == 1 else y,
+        dt,
+        hold=between,
+        input_names=input_names,
+        output_names=output_names,
+    )
+
+
+def _state_space(model: Any) -> tuple[StateSpace, float]:
+    """Matrices of anything that simulates, and its sample time (0 for continuous time)."""
+    model = getattr(model, "model", model)
+    if hasattr(model, "state_space"):
+        return model.state_space(), 0.0
+    if hasattr(model, "to_control"):
+        model = model.to_control()
+    import control
+
+    if not isinstance(model, control.lti.LTI):
+        raise ValueError(
+            f"model={type(model).__name__} is not a model, an estimate or a control system"
+        )
+    system = control.ss(model)
+    dt = 1.0 if system.dt is True else float(system.dt or 0.0)
+    return StateSpace(
+        *(np.asarray(M, dtype=float) for M in (system.A, system.B, system.C, system.D))
+    ), dt

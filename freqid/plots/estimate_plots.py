@@ -1,0 +1,160 @@
+"""Pictures of estimates and records beyond Bode: poles, parameters, spectrograms, responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import FloatArray, choice
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+from freqid.fitting.estimate import Estimate
+from freqid.plots.bode_nyquist import bode
+from freqid.plots.style import COLOURS, context, line
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# squared radius of a 95 % ellipse of two normal variables
+_CHI2 = 5.991464547107979
+
+
+def plot_response(*responses: Any, labels: Sequence[str] | None = None, unit: str = "Hz") -> Any:
+    """Bode with its bands, and under it the coherence and the input's spectrum, where known.
+
+    Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them.
+    Returns the axes: amplitude, phase, then coherence and spectrum as far as there are any.
+    """
+    import matplotlib.pyplot as plt
+
+    measured = [r for r in responses if isinstance(r, FrequencyResponse)]
+    coherent = [r for r in measured if r.coherence is not None]
+    driven = [r for r in measured if r.input_spectrum is not None]
+    rows = 2 + bool(coherent) + bool(driven)
+    scale = 1.0 if unit == "Hz" else 2 * np.pi
+    with context():
+        heights = [2.2, 1.6, *[0.9] * (rows - 2)]
+        _, axes = plt.subplots(
+            rows, 1, sharex=True, figsize=(6.4, 1.2 * sum(heights)), height_ratios=heights
+        )
+        bode(*responses, labels=labels, ax=axes[:2], unit=unit)
+        place = 2
+        for group, name, limits in ((coherent, "coherence", (0, 1.05)), (driven, "input", None)):
+            if not group:
+                continue
+            axis = axes[place]
+            place += 1
+            for r in group:
+                style = line(list(responses).index(r))
+                values = r.coherence[0, 0] if name == "coherence" else r.input_spectrum[0]  # type: ignore[index]
+                axis.plot(r.frequency * scale, values, **style)
+            axis.set_ylabel(name if limits else "input |U|²")
+            axis.set_yscale("linear" if limits else "log")
+            if limits:
+                axis.set_ylim(*limits)
+        axes[1].set_xlabel("")
+        axes[-1].set_xlabel(f"frequency / {'Hz' if unit == 'Hz' else '(rad/s)'}")
+    return axes
+
+
+def plot_poles(
+    *estimates: Estimate, labels: Sequence[str] | None = None, ax: Axes | None = None
+) -> Axes:
+    """Poles in the s plane (rad/s) with their 95 % ellipses. Returns the axes.
+
+    Raises ValueError for labels of another number than estimates.
+
+    >>> import freqid as fq
+    >>> record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 5, 1e-3), 1e-3).with_noise(0.1)
+    >>> ax = plot_poles(fq.fit(fq.two_mass(), record, band=(10, 80)))
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.patches import Ellipse
+
+    from freqid.fitting.uncertainty.error_bars import pole_scatter
+
+    if labels is not None and len(labels) != len(estimates):
+        raise ValueError(f"labels has {len(labels)} entries for {len(estimates)} estimates")
+    with context():
+        if ax is None:
+            _, ax = plt.subplots()
+        for index, est in enumerate(estimates):
+            colour = COLOURS[index % len(COLOURS)]
+            poles, scatter = pole_scatter(est)
+            label = None if labels is None else labels[index]
+            ax.plot(poles.real, poles.imag, "x", color=colour, markersize=8, label=label)
+            for pole, covariance in zip(poles, scatter, strict=True):
+                if not np.isfinite(covariance).all():
+                    continue
+                sizes, axes = np.linalg.eigh(covariance)
+                width, height = 2 * np.sqrt(_CHI2 * np.maximum(sizes[::-1], 0))
+                angle = np.rad2deg(np.arctan2(axes[1, 1], axes[0, 1]))
+                shape = Ellipse((pole.real, pole.imag), width, height, angle=angle)
+                shape.set(facecolor=colour, alpha=0.25, linewidth=0)
+                ax.add_patch(shape)
+        ax.axvline(0, color="#999999", linewidth=0.8)
+        ax.set(xlabel="real part / (rad/s)", ylabel="imaginary part / (rad/s)")
+        if labels is not None:
+            ax.legend()
+    return ax
+
+
+def plot_parameters(est: Estimate, ax: Axes | None = None) -> Axes:
+    """The parameters as a table in a figure: value, standard error, interval, unit."""
+    import matplotlib.pyplot as plt
+
+    table = est.parameters
+    rows = [
+        [f"{p['value']:.5g}", f"{p['std']:.2g}", f"{p['lower']:.5g} to {p['upper']:.5g}", p["unit"]]
+        for _, p in table.iterrows()
+    ]
+    with context():
+        if ax is None:
+            _, ax = plt.subplots(figsize=(6.4, 0.5 + 0.32 * (len(rows) + 1)))
+        ax.axis("off")
+        drawn = ax.table(
+            rows,
+            rowLabels=[str(n) for n in table.index],
+            colLabels=["value", "± std", "95 % interval", "unit"],
+            loc="center",
+            cellLoc="right",
+            edges="horizontal",
+        )
+        drawn.auto_set_font_size(False)
+        drawn.set_fontsize(9)
+        drawn.auto_set_column_width(list(range(4)))
+        drawn.scale(1, 1.3)
+    return ax
+
+
+def plot_spectrogram(
+    record: Record, channel: str | None = None, segment: int | None = None, ax: Axes | None = None
+) -> Axes:
+    """Power of a channel over time and frequency, in dB; the first output where none is named.
+
+    ``segment`` is the length of the pieces in samples, by default a fiftieth of the record. Raises
+    ValueError for an unknown channel.
+    """
+    import matplotlib.pyplot as plt
+    import scipy.signal
+
+    name = record.output_names[0] if channel is None else channel
+    choice("channel", name, [*record.input_names, *record.output_names])
+    x: FloatArray
+    if name in record.input_names:
+        x, dt = record.inputs[:, list(record.input_names).index(name)], record.input_dt
+    else:
+        x, dt = record.outputs[:, list(record.output_names).index(name)], record.dt
+    length = max(len(x) // 50, 16) if segment is None else segment
+    f, t, power = scipy.signal.spectrogram(x, 1 / dt, nperseg=length, noverlap=length // 2)
+    level = 10 * np.log10(np.maximum(power, power.max() * 1e-12))
+    with context():
+        if ax is None:
+            _, ax = plt.subplots()
+        image = ax.pcolormesh(t, f, level, vmin=level.max() - 80, shading="auto", cmap="viridis")
+        ax.figure.colorbar(image, ax=ax, label=f"power of {name} / dB")
+        ax.set(xlabel="time / s", ylabel="frequency / Hz")
+        ax.grid(False)
+    return ax

@@ -1,0 +1,71 @@
+"""Pictures of validation: simulation beside measurement, and residuals beside their limits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.plots.style import COLOURS, context, line
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from freqid.validation.comparison import Comparison
+
+
+def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
+    """Measured and simulated above their difference, two axes for each output. Returns the axes."""
+    import matplotlib.pyplot as plt
+
+    record = comparison.record
+    count = record.n_outputs
+    simulated = comparison.simulated.reshape(len(comparison.simulated), -1)
+    residuals = comparison.residuals.reshape(simulated.shape)
+    time = record.time[: len(simulated)]
+    with context():
+        if ax is None:
+            _, ax = plt.subplots(
+                2 * count, 1, sharex=True, figsize=(7.2, 4.2 * count), squeeze=False,
+                height_ratios=[2.5, 1] * count,
+            )  # fmt: skip
+            ax = ax[:, 0]
+        for o, name in enumerate(record.output_names):
+            unit = (record.units or {}).get(name, "")
+            label = f"{name} / {unit}" if unit else name
+            above, below = ax[2 * o], ax[2 * o + 1]
+            above.plot(time, comparison.measured[:, o], label="measured", **line(0))
+            text = f"simulated, {comparison.fit_percent[o]:.1f} %"
+            above.plot(time, simulated[:, o], label=text, **line(2))
+            above.set_ylabel(label)
+            above.legend(loc="upper right", ncols=2)
+            below.plot(time, residuals[:, o], color=COLOURS[1], linewidth=0.8)
+            below.set_ylabel("difference")
+        ax[-1].set_xlabel("time / s")
+    return ax
+
+
+def plot_residuals(table: pd.DataFrame, ax: Any = None) -> Any:
+    """Correlations of ``residual_test`` with their 99 % limits; returns one axes a test."""
+    import matplotlib.pyplot as plt
+
+    curves = table.attrs["correlations"]
+    with context():
+        if ax is None:
+            size = (7.2, 1.2 + 1.7 * len(curves))
+            _, ax = plt.subplots(len(curves), 1, figsize=size, squeeze=False)
+            ax = ax[:, 0]
+        for axis, curve in zip(ax, curves, strict=True):
+            values = np.asarray(curve["values"])
+            white = curve["test"] == "whiteness"
+            lags = np.arange(1, len(values) + 1) if white else np.arange(len(values))
+            lags = lags if white else lags - len(values) // 2
+            limit = curve["limit"]
+            axis.axhspan(-limit, limit, color=COLOURS[6], alpha=0.25, linewidth=0)
+            axis.vlines(lags, 0, values, color=COLOURS[0], linewidth=1)
+            axis.plot(lags, values, "o", markersize=3, color=COLOURS[0])
+            pair = curve["output"] if white else f"{curve['output']} and {curve['input']}"
+            axis.set_title(f"{curve['test']}: {pair} (99 % limits shaded)", loc="left")
+            axis.set_ylabel("correlation")
+        ax[-1].set_xlabel("lag / samples")
+    return ax

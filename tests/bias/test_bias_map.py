@@ -1,0 +1,226 @@
+"""Maps of bias: against single fits, resumed, on a cluster that loses a worker, and drawn."""
+
+import importlib
+import os
+import signal
+import threading
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+
+T1 = 0.5e-3
+TRUE = fq.ZeroOrderHold(T1)
+# the function goes by the name of its module
+module = importlib.import_module("freqid.bias.maps")
+
+
+def chirps(count=6, low=10):
+    return {f"{low}-{u:g}": fq.ChirpSpectrum(low, u) for u in np.linspace(40, 90, count)}
+
+
+@pytest.fixture(scope="module")
+def table(plant):
+    return fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], base_dt=T1)
+
+
+def test_rows_equal_single_fits(plant, table):
+    assert list(table.columns) == [
+        "spectrum", "factor", "hold", "parameter", "true", "estimate", "relative_bias", "cost",
+        "converged", "message",
+    ]  # fmt: skip
+    assert len(table) == 6 * 3 * 3 * 5
+    assert table["converged"].all()
+    spectra = chirps()
+    for (name, factor, hold), part in list(table.groupby(["spectrum", "factor", "hold"]))[::4]:
+        est = fq.asymptotic_fit(
+            plant, spectra[name], factor * T1, None if hold == "remembered" else hold, TRUE
+        )
+        values = part.set_index("parameter")["estimate"][list(est.names)]
+        assert np.allclose(values, est.values, rtol=1e-6)
+
+
+def test_the_remembered_hold_stays_at_zero(table):
+    remembered = table[table["hold"] == "remembered"]
+    assert remembered["relative_bias"].abs().max() < 1e-6
+
+
+def test_plants_of_several_kinds_and_other_holds():
+    plants = {"axis": fq.two_mass(), "stiff": fq.two_mass(k=4e5), "lag": fq.first_order()}
+    spectra = {"noise": fq.FilteredSpectrum(([0.1], [1, -0.9])), "lines": fq.MultisineSpectrum(
+        (5, 90), 1.0)}  # fmt: skip
+    holds = ["bl", fq.FirstOrderHold(2e-3), "zoh"]
+    table = fq.bias_map(plants, spectra, [4], holds, true_hold=fq.FirstOrderHold(T1))
+    assert next(iter(table.columns)) == "plant"
+    assert table["converged"].all()
+    row = table.query("plant == 'stiff' and spectrum == 'lines' and hold == 'bl'")
+    est = fq.asymptotic_fit(plants["stiff"], spectra["lines"], 4 * T1, "bl", fq.FirstOrderHold(T1))
+    assert np.allclose(row["estimate"], est.values, rtol=1e-6)
+
+
+def test_a_row_that_fails_leaves_the_rest(plant):
+    spectra = {**chirps(2), "above": fq.ChirpSpectrum(10, 1500), "one": fq.LineSpectrum([20], [1])}
+    table = fq.bias_map(plant, spectra, [10], ["zoh"], base_dt=T1)
+    by = table.groupby("spectrum", sort=False)[["converged", "message"]].first()
+    assert by["converged"].tolist() == [True, True, False, False]
+    assert "Nyquist" in by.loc["above", "message"]
+    assert "free parameters" in by.loc["one", "message"]
+    assert table.loc[~table["converged"], "estimate"].isna().all()
+    assert "not physical: d" in by.iloc[0]["message"]
+
+
+def test_progress_in_a_log_file_is_a_line_a_tenth(plant, capsys):
+    fq.bias_map(plant, chirps(20), [10], ["zoh"], base_dt=T1, chunk=1, progress=True)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == "bias map: 20 of 20"
+    assert len(lines) == 10
+    fq.bias_map(plant, chirps(1), [10], ["zoh"], base_dt=T1)
+    assert capsys.readouterr().err == ""
+
+
+def test_bounds_hold(plant):
+    bounded = plant.with_bounds(d=(0, 100))
+    table = fq.bias_map(bounded, chirps(1), [10], ["zoh"], base_dt=T1)
+    assert table.set_index("parameter").loc["d", "estimate"] >= 0
+
+
+def test_an_interrupted_map_goes_on_where_it_was(plant, tmp_path, monkeypatch, table):
+    path = tmp_path / "map.parquet"
+    ask = {"base_dt": T1, "path": path, "chunk": 6}
+    real, calls = module.answer_chunk, []
+
+    def failing(*arguments):
+        calls.append(1)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(module, "answer_chunk", failing)
+    with pytest.raises(KeyboardInterrupt):
+        fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
+    assert not path.exists()
+    assert len(list(tmp_path.rglob("0*.parquet"))) == 4
+    resumed = fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
+    assert len(calls) == 5 + 5
+    pd.testing.assert_frame_equal(resumed, table, rtol=1e-7, atol=1e-20)
+    assert list(tmp_path.iterdir()) == [path]
+    again = fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
+    assert len(calls) == 10
+    pd.testing.assert_frame_equal(again, resumed)
+    with pytest.raises(ValueError, match="another path"):
+        fq.bias_map(plant, chirps(), [2, 5], ["zoh", "foh", None], **ask)
+    for other in ({"prefilter": ([0.1], [1, -0.9])}, {"band": (10, 30)}):
+        with pytest.raises(ValueError, match="another path"):
+            fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], **ask, **other)
+    with pytest.raises(ValueError, match="another path"):
+        fq.bias_map(plant.fix("fm"), chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
+
+
+def test_a_cluster_that_loses_a_worker_gives_the_same_table(plant):
+    joblib = pytest.importorskip("joblib")
+    distributed = pytest.importorskip("distributed")
+    spectra = chirps(60)
+    ask = {"base_dt": T1, "chunk": 4}
+    alone = fq.bias_map(plant, spectra, [5, 10], ["zoh", "foh"], **ask)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        before = set(client.run(os.getpid).values())
+        assert len(before) == 2
+        victim = min(before)
+        threading.Timer(0.7, os.kill, (victim, signal.SIGKILL)).start()
+        with joblib.parallel_config(backend="dask"):
+            together = fq.bias_map(plant, spectra, [5, 10], ["zoh", "foh"], **ask)
+        client.wait_for_workers(2, timeout=30)
+        assert victim not in set(client.run(os.getpid).values())
+    pd.testing.assert_frame_equal(together, alone, rtol=1e-7, atol=1e-20)
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"factors": [2.5]}, "whole number"),
+        ({"factors": []}, "at least one"),
+        ({"spectra": {}}, "spectra is empty"),
+        ({"spectra": [fq.WhiteSpectrum()]}, "mapping"),
+        ({"holds": ["zho"]}, "not a hold"),
+        ({"holds": ["estimate"]}, "estimate"),
+        ({"base_dt": None}, "base_dt is missing"),
+        ({"plant": {"a": 3}}, "GreyBox"),
+        ({"path": "map.csv"}, "parquet"),
+    ],
+)
+def test_bad_input(plant, changes, match):
+    usual = {"plant": plant, "spectra": chirps(1), "factors": [2], "holds": ["zoh"], "base_dt": T1}
+    with pytest.raises(ValueError, match=match):
+        fq.bias_map(**{**usual, **changes})
+
+
+def test_pictures_say_what_the_table_says(table, plant):
+    axes = fq.plot_bias_map(table, "d", mark=["10-80"])
+    assert [a.get_title() for a in axes] == ["ZOH", "FOH", "remembered hold"]
+    cells = [t.get_text() for t in axes[0].texts]
+    part = table.query("parameter == 'd' and hold == 'zoh' and factor == 10")
+    assert f"{100 * part['relative_bias'].iloc[0]:+.0f}" in cells
+    with pytest.raises(ValueError, match="not one of"):
+        fq.plot_bias_map(table, "mass")
+    curves = fq.plot_bias_curves(table, 10, ["Jm", "d"])
+    x, y = curves[1].lines[1].get_data()
+    assert np.allclose(x, np.linspace(40, 90, 6))
+    assert np.allclose(y * 10, part["estimate"])
+    amplitude, _, plane = fq.plot_bias(plant, fq.ChirpSpectrum(10, 80), 5e-3, "zoh", TRUE)
+    assert "d = -231.4" in amplitude.figure.get_suptitle()
+    assert len(plane.lines) == 3
+
+
+def test_experiment_design_finds_what_the_noise_and_the_hold_ask_for(plant):
+    table = fq.experiment_design(
+        plant, T1, noise_std=0.05, factors=[1, 10], holds=[None, "zoh"], d_optimal=True
+    )
+    best = table.attrs["best"]
+    assert best["excitation"].startswith("D-optimal")
+    assert best["factor"] == 1
+    names = [p.name for p in plant.free_parameters]
+    errors = table[[f"error {n}" for n in names]].to_numpy()
+    assert np.allclose(errors.max(axis=1), table["error"])
+    slow = table[table["factor"] == 10]
+    remembered, assumed = slow[slow["hold"] == "remembered"], slow[slow["hold"] == "zoh"]
+    assert remembered["error"].median() < 0.05 < assumed["error"].min()
+    below = remembered[remembered["high"] < 100]
+    assert (below[[f"bias {n}" for n in names]].abs() < 1e-6).all(axis=None)
+    # noise twice as strong doubles what is left without bias
+    twice = fq.experiment_design(plant, T1, noise_std=0.1, factors=[1], bands=[(10, 80)])
+    once = fq.experiment_design(plant, T1, noise_std=0.05, factors=[1], bands=[(10, 80)])
+    assert np.allclose(twice["error"], 2 * once["error"])
+    axes = fq.plot_design(table)
+    assert axes.shape == (2, 2)
+    with pytest.raises(ValueError, match="noise_std"):
+        fq.experiment_design(plant, T1, noise_std=0)
+
+
+def test_a_d_optimal_spectrum_satisfies_the_equivalence_theorem(plant):
+    """Kiefer and Wolfowitz: the variance of the response is at most P, and P where power is."""
+    best = fq.d_optimal_spectrum(plant, (2, 80), 10.0, 5e-3, TRUE)
+    assert best.power(5e-3) == pytest.approx(1)
+    assert len(best.frequencies) < 15
+    names = [p.name for p in plant.free_parameters]
+    f = np.arange(20, 801) / 10
+    step = 1e-5
+    J = []
+    for n in names:
+        up = plant.with_values(**{n: plant[n] * (1 + step)})
+        down = plant.with_values(**{n: plant[n] * (1 - step)})
+        at = [m.frequency_response(2 * np.pi * f, TRUE).response[0, 0] for m in (up, down)]
+        J.append((at[0] - at[1]) / (2 * step))
+    J = np.array(J)
+    each = np.real(J[:, None].conj() * J[None])
+    place = np.round(np.array(best.frequencies) * 10).astype(int) - 20
+    H = np.tensordot(each[:, :, place], best.powers, (2, 0))
+    variance = np.einsum("ijk,ji->k", each, np.linalg.inv(H))
+    assert variance.max() < 5 * 1.02
+    assert np.allclose(variance[place], 5, rtol=0.03)

@@ -1,0 +1,313 @@
+"""The explorer and the report as a reader meets them: in the system's Chromium, headless."""
+
+import contextlib
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import freqid as fq
+from freqid.pages.explorer.page import application, explore, free_port
+from freqid.pages.explorer.state import State, presets, scene
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+DRIVER = shutil.which("chromedriver")
+SHOTS = Path(__file__).parents[2] / "artefacts"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if not (CHROMIUM and DRIVER):
+        pytest.skip("no Chromium and ChromeDriver on this machine: apt install chromium-driver")
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic",
+                 "--no-first-run", "--disable-background-networking", "--disable-sync",
+                 "--disable-component-update", "--disable-dev-shm-usage",
+                 "--window-size=1400,1200", "--hide-scrollbars"):  # fmt: skip
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options, Service(DRIVER))
+    driver.set_page_load_timeout(60)
+    yield driver
+    driver.quit()
+
+
+@pytest.fixture(scope="module")
+def address():
+    """The explorer as its own process, on a port that turned out to be free."""
+    taken = socket.socket()
+    taken.bind(("127.0.0.1", 0))
+    taken.listen()
+    port = taken.getsockname()[1]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "freqid.cli", "explore", "--port", str(port)],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )  # fmt: skip
+    lines = []
+    while not lines or "http" not in lines[-1]:
+        lines.append(process.stdout.readline())
+        assert process.poll() is None, lines
+    assert f"port {port} is busy" in lines[0]
+    url = re.search(r"http://[^ ]+", lines[-1]).group()
+    for _ in range(100):
+        with contextlib.suppress(OSError):
+            urllib.request.urlopen(url, timeout=1).read()
+            break
+        time.sleep(0.1)
+    yield url
+    process.terminate()
+    process.wait(10)
+    process.stdout.close()
+    taken.close()
+
+
+def shot(browser, name):
+    SHOTS.mkdir(exist_ok=True)
+    browser.save_screenshot(str(SHOTS / f"{name}.png"))
+
+
+def errors(browser):
+    return [e for e in browser.get_log("browser") if e["level"] == "SEVERE"]
+
+
+def until(browser, condition, what):
+    for _ in range(150):
+        with contextlib.suppress(Exception):
+            found = browser.execute_script(condition)
+            if found:
+                return found
+        time.sleep(0.1)
+    raise AssertionError(f"waited 15 s for {what}")
+
+
+VERDICT = "return document.getElementById('verdict').textContent"
+CURVE = """
+const plot = document.querySelector('#bode .js-plotly-plot');
+return plot.data.filter(t => !t.yaxis || t.yaxis === 'y').map(t => [t.name, Array.from(t.x), Array.from(t.y)])
+"""  # noqa: E501
+
+
+def notch(curve):
+    f, magnitude = np.array(curve[1]), np.array(curve[2])
+    inside = (f > 12) & (f < 22)
+    return f[inside][magnitude[inside].argmin()]
+
+
+def eventually(browser, condition, what):
+    """The curves once they meet a condition: the figure follows the sentence by a moment."""
+    for _ in range(150):
+        curves = {c[0]: c for c in browser.execute_script(CURVE)}
+        if "estimate" in curves and condition(curves):
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"waited 15 s for {what}")
+
+
+def left_notch(curves):
+    return notch(curves["estimate"]) < notch(curves["true, ZOH at 0.5 ms"]) - 0.4
+
+
+def together(curves):
+    estimate, true = (np.array(curves[n][2]) for n in ("estimate", "true, ZOH at 0.5 ms"))
+    return len(estimate) == len(true) and np.abs(estimate / true - 1).max() < 0.02
+
+
+def press(browser, element_id, key, count):
+    from selenium.webdriver.common.by import By
+
+    handle = browser.find_element(By.CSS_SELECTOR, f"#{element_id} [role=slider]")
+    for _ in range(count):
+        handle.send_keys(key)
+
+
+def test_the_slider_shows_a_negative_damping_and_the_cure(browser, address):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    browser.get(address)
+    until(browser, f"{VERDICT}.includes('true to a tenth')", "the page")
+    shot(browser, "explorer_start")
+    press(browser, "factor", Keys.ARROW_RIGHT, 9)
+    until(browser, f"{VERDICT}.startsWith('d = -2')", "the negative damping")
+    eventually(browser, left_notch, "the notch to the left of the true one")
+    shot(browser, "explorer_zoh")
+    browser.find_elements(By.CSS_SELECTOR, "#hold input")[2].click()
+    until(browser, f"{VERDICT}.includes('not physical') ? null : true", "the remembered hold")
+    eventually(browser, together, "the curves to come together")
+    shot(browser, "explorer_remembered")
+    link = browser.find_element(By.ID, "link").get_attribute("href")
+    assert "factor=10" in link
+    assert "hold=remembered" in link
+    browser.get(link)
+    until(browser, "return document.getElementById('link').href.includes('hold=remembered')", "it")
+    code = until(browser, "return document.getElementById('code').textContent", "the code")
+    assert "decimate(10)" in code
+    assert not errors(browser)
+
+
+@pytest.mark.parametrize("look", ["phone", "dark", "zoom"])
+def test_other_screens(browser, address, look):
+    size = {"phone": (390, 844), "dark": (1400, 1200), "zoom": (700, 600)}[look]
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+        "width": size[0], "height": size[1], "deviceScaleFactor": 2 if look == "zoom" else 1,
+        "mobile": look == "phone"})  # fmt: skip
+    scheme = "dark" if look == "dark" else "light"
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {
+        "features": [{"name": "prefers-color-scheme", "value": scheme}]})  # fmt: skip
+    try:
+        browser.get(address + "?factor=10&hold=zoh")
+        until(browser, f"{VERDICT}.startsWith('d = -2')", "the page")
+        wide = browser.execute_script("return document.documentElement.scrollWidth")
+        assert wide <= size[0] + 2
+        shot(browser, f"explorer_{look}")
+        if look == "dark":
+            paper = "return getComputedStyle(document.body).backgroundColor"
+            assert browser.execute_script(paper) == "rgb(22, 24, 27)"
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def unplug(browser, offline):
+    rate = 0 if offline else -1
+    conditions = {"offline": offline, "latency": 0}
+    conditions |= {"downloadThroughput": rate, "uploadThroughput": rate}
+    browser.execute_cdp_cmd("Network.emulateNetworkConditions", conditions)
+
+
+def test_the_report_opens_offline(browser, plant, slow, tmp_path):
+    est = fq.fit(plant, slow.with_noise(0.3, seed=1), hold="zoh", band=(10, 80))
+    est.report(tmp_path / "report.html")
+    browser.execute_cdp_cmd("Network.enable", {})
+    unplug(browser, True)
+    browser.get_log("browser")
+    try:
+        browser.get((tmp_path / "report.html").as_uri())
+        until(browser, "return document.querySelectorAll('.plot .main-svg').length >= 4", "plots")
+        assert "Not to be trusted" in browser.execute_script(VERDICT)
+        shot(browser, "report")
+        assert not errors(browser)
+    finally:
+        unplug(browser, False)
+
+
+def test_names_are_escaped_in_the_report(browser, tmp_path):
+    evil = "<img src=x onerror=\"document.title='pwned'\">"
+    model = fq.GreyBox(
+        lambda **v: ([[-v[evil]]], [[v[evil]]], [[1.0]], None), [fq.Parameter(evil, 50.0)],
+        inputs=[evil], outputs=["</script><script>document.title='pwned'</script>"], name=evil,
+    )  # fmt: skip
+    record = fq.simulate(model, fq.white_noise(500), 1e-3, input_names=model.inputs,
+                         output_names=model.outputs).with_noise(0.01)  # fmt: skip
+    fq.fit(model, record).report(tmp_path / "evil.html")
+    browser.get((tmp_path / "evil.html").as_uri())
+    until(browser, "return document.querySelectorAll('.plot .main-svg').length >= 2", "plots")
+    time.sleep(0.3)
+    assert "pwned" not in browser.title.replace(evil, "")
+    assert browser.execute_script("return document.images.length") == 0
+
+
+def test_reports_of_odd_estimates(plant, slow, tmp_path):
+    import dataclasses
+
+    est = fq.fit(plant, slow, band=(10, 80))
+    broken = dataclasses.replace(est, converged=False, message="gave up")
+    broken.report(tmp_path / "broken.html", title="a & b")
+    text = (tmp_path / "broken.html").read_text()
+    assert "Do not use these numbers" in text
+    assert "a &amp; b" in text
+    n = 10_000
+    many = dataclasses.replace(
+        est, names=[f"p{i}" for i in range(n)], values=np.ones(n), nominal=np.ones(n),
+        units=[""] * n, uncertainty=np.eye(n), data=(), problem=None,
+    )  # fmt: skip
+    many.report(tmp_path / "many.html")
+    text = (tmp_path / "many.html").read_text()
+    assert "p499" in text
+    assert "9500 more" in text
+    nothing = fq.asymptotic_fit(plant, fq.ChirpSpectrum(10, 80), 5e-3, "zoh",
+                                fq.ZeroOrderHold(0.5e-3))  # fmt: skip
+    nothing.report(tmp_path / "asymptotic.html")
+    assert "made without fit" in (tmp_path / "asymptotic.html").read_text()
+    with pytest.raises(ValueError, match="html"):
+        est.report(tmp_path / "est.pdf")
+
+
+def test_states_survive_links_and_nonsense():
+    state = State("first-order", 7, "foh", 2, 30, 0.05, 0.0, {"a": 1.5})
+    assert State.of(state.query()) == state
+    for query in (
+        "?factor=1e9&hold=<script>",
+        "?low=nan&high=-3",
+        "?x.k=99&x.evil=2",
+        "?=&&",
+        None,
+    ):
+        odd = State.of(query)
+        assert 1 <= odd.factor <= 40
+        assert odd.low < odd.high
+        assert "evil" not in odd.factors
+        assert scene(odd).slow.n_samples > 1
+
+
+def test_every_preset_and_every_code_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert len(presets()) == 10
+    for state in presets().values():
+        shown = scene(state)
+        assert shown.estimate is not None, shown.message
+        names: dict = {}
+        exec(compile(state.code(), "explorer", "exec"), names)
+        assert np.allclose(names["est"].values, shown.estimate.values, rtol=1e-6)
+    figure4 = scene(presets()["Figure 4: the lag estimated at 50 rad/s"]).estimate
+    assert figure4["b"] == pytest.approx(135.1, rel=0.01)
+
+
+def test_an_own_record_takes_the_place_of_the_simulated_one():
+    record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 2, 0.5e-3), 0.5e-3)
+    app = application(record)
+    assert repr(record)[1:-1] in str(app.layout)
+    shown = scene(State(factor=10), record)
+    assert shown.slow.n_samples == 400
+    assert shown.estimate["d"] < 0
+    # nobody knows what is true of somebody's own record
+    assert all(name.startswith(("nominal", "estimate")) for name in shown.responses())
+    assert "fq.read(" in shown.state.code(record)
+    assert "simulate" not in shown.state.code(record)
+
+
+def test_a_record_of_one_sample_is_no_crash():
+    from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
+
+    tiny = fq.Record([1.0], [2.0], dt=0.01)
+    assert "1" in tiny._repr_html_()
+    assert fq.check_record(tiny)["finding"].tolist() == ["constant", "constant"]
+    for state in (State(), State(factor=10, hold="remembered")):
+        shown = scene(state, tiny)
+        assert shown.estimate is None
+        assert shown.message
+        for figure in (bias_figure, bode_figure, nyquist_figure, time_figure):
+            assert "layout" in figure(shown)
+
+
+def test_only_loopback_unless_told_otherwise():
+    with pytest.raises(ValueError, match="allow-remote"):
+        explore(host="0.0.0.0")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert free_port("127.0.0.1", port) > port
