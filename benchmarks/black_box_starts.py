@@ -14,15 +14,15 @@ refined by a few Sanathanan-Koerner and then Gauss-Newton steps in orthonormal p
 import numpy as np
 import scipy.interpolate
 import scipy.linalg
+from freqid.fitting.cost.minimum import Objective
 
 import freqid as fq
 from freqid.fitting.black_box.output_error import _descend, lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.subspace import identify, inputs_of
 from freqid.fitting.cost.charts import Chart
-from freqid.fitting.cost.minimum import Objective
 from freqid.fitting.preparation import Options
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
 
 
 def modes(frequencies, dampings):

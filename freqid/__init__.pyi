@@ -35,7 +35,6 @@ from .excitation.signals import sine as sine
 from .excitation.signals import white_noise as white_noise
 from .fitting.entry import fit as fit
 from .fitting.estimate import Estimate as Estimate
-from .fitting.order_selection import plot_orders as plot_orders
 from .fitting.order_selection import select_order as select_order
 from .frf.averaged import h1 as h1
 from .frf.averaged import h2 as h2
@@ -44,9 +43,9 @@ from .frf.empirical import etfe as etfe
 from .frf.local_models import local_polynomial as local_polynomial
 from .frf.local_models import local_rational as local_rational
 from .frf.periodic import distortion as distortion
-from .lti.holds.hold import BandLimited as BandLimited
-from .lti.holds.hold import FirstOrderHold as FirstOrderHold
-from .lti.holds.hold import ZeroOrderHold as ZeroOrderHold
+from .lti.holds import BandLimited as BandLimited
+from .lti.holds import FirstOrderHold as FirstOrderHold
+from .lti.holds import ZeroOrderHold as ZeroOrderHold
 from .models.grey_box import GreyBox as GreyBox
 from .models.output_error import OutputError as OutputError
 from .models.parameter import Parameter as Parameter
@@ -67,12 +66,13 @@ from .plots.estimate_plots import plot_parameters as plot_parameters
 from .plots.estimate_plots import plot_poles as plot_poles
 from .plots.estimate_plots import plot_response as plot_response
 from .plots.estimate_plots import plot_spectrogram as plot_spectrogram
+from .plots.validation_plots import plot_orders as plot_orders
 from .plots.validation_plots import plot_residuals as plot_residuals
-from .validation.comparison import bootstrap as bootstrap
 from .validation.comparison import compare as compare
-from .validation.comparison import cost_test as cost_test
-from .validation.comparison import cross_validate as cross_validate
-from .validation.comparison import hold_bias as hold_bias
-from .validation.comparison import residual_test as residual_test
+from .validation.repeats import bootstrap as bootstrap
+from .validation.repeats import cross_validate as cross_validate
+from .validation.repeats import hold_bias as hold_bias
+from .validation.residual_tests import cost_test as cost_test
+from .validation.residual_tests import residual_test as residual_test
 
 __version__: str

@@ -11,17 +11,26 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-# what an array holds is said by its name here; numpy's own types follow precision too closely
+# what an array holds is said by its name here: numpy's own types follow precision too closely, so
+# that only the element kind of public results is checked
 Array = npt.NDArray[Any]
 FloatArray = npt.NDArray[Any]
 ComplexArray = npt.NDArray[Any]
+BoolArray = npt.NDArray[np.bool_]
+IntArray = npt.NDArray[np.int64]
+
+
+class InputError(ValueError):
+    """What was given cannot be used. Caught where another way is tried, so that the errors of
+    numpy and scipy, which are ValueErrors too, do not vanish with it.
+    """
 
 
 def positive(name: str, value: Any, unit: str = "") -> float:
     """Return ``value`` as a float; ValueError unless it is finite and above zero."""
     number = finite(name, value)
     if number <= 0:
-        raise ValueError(
+        raise InputError(
             f"{name}={value!r} must be a positive number{f' ({unit})' if unit else ''}"
         )
     return number
@@ -30,7 +39,7 @@ def positive(name: str, value: Any, unit: str = "") -> float:
 def finite(name: str, value: Any) -> float:
     """Return ``value`` as a float; ValueError unless it is a finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise ValueError(f"{name}={value!r} must be a finite real number")
+        raise InputError(f"{name}={value!r} must be a finite real number")
     return float(value)
 
 
@@ -38,7 +47,7 @@ def whole(name: str, value: Any, least: int = 1) -> int:
     """Return ``value`` as an int; ValueError unless it is a whole number of at least ``least``."""
     number = finite(name, value)
     if not number.is_integer() or number < least:
-        raise ValueError(f"{name}={value!r} must be a whole number of at least {least}")
+        raise InputError(f"{name}={value!r} must be a whole number of at least {least}")
     return int(number)
 
 
@@ -47,17 +56,17 @@ def samples(name: str, values: Any) -> FloatArray:
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(
+        raise InputError(
             f"{name} must be an array of real numbers, (N,) or (N, channels)"
         ) from None
     if array.ndim not in (1, 2) or array.size == 0:
-        raise ValueError(
+        raise InputError(
             f"{name} has shape {array.shape}; expected (N,) or (N, channels) at least one sample"
         )
     bad = ~np.isfinite(array)
     if bad.any():
         first = int(np.argwhere(bad)[0, 0])
-        raise ValueError(
+        raise InputError(
             f"{name} has {int(bad.sum())} NaN or infinite samples, the first in row {first}; "
             "cut the record there with slice() or repair the samples first"
         )
@@ -65,26 +74,11 @@ def samples(name: str, values: Any) -> FloatArray:
     return array
 
 
-def band(value: Any, nyquist: float, name: str = "band") -> tuple[float, float]:
-    """Return (low, high) in Hz; ValueError unless 0 <= low < high <= ``nyquist`` (Hz)."""
-    try:
-        low, high = (float(v) for v in value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}={value!r} must be two frequencies in Hz, (low, high)") from None
-    # a band that ends at the Nyquist limit is computed as 1/(2 dt) and may be off by rounding
-    if not (0 <= low < high <= nyquist * (1 + 1e-9)):
-        raise ValueError(
-            f"{name}=({low:g}, {high:g}) Hz must satisfy 0 <= low < high <= {nyquist:g} Hz, "
-            "the Nyquist limit of this record"
-        )
-    return low, high
-
-
 def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
     """Return ``value`` if it is one of ``allowed``; ValueError with the nearest name."""
     if isinstance(value, str) and value in allowed:
         return value
-    raise ValueError(unknown(name, value, allowed))
+    raise InputError(unknown(name, value, allowed))
 
 
 def unknown(name: str, value: Any, allowed: Iterable[str]) -> str:
@@ -94,3 +88,15 @@ def unknown(name: str, value: Any, allowed: Iterable[str]) -> str:
     near = difflib.get_close_matches(str(value).casefold(), folded, n=1, cutoff=0.5)
     hint = f"; did you mean {folded[near[0]]!r}?" if near else ""
     return f"{name}={value!r} is not one of {', '.join(map(repr, names))}{hint}"
+
+
+def channel_names(
+    argument: str, given: Sequence[str] | None, count: int, letter: str
+) -> tuple[str, ...]:
+    """Names of ``count`` channels, u or u1, u2, … where none are given; ValueError for others."""
+    if given is None:
+        return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if len(names) != count:
+        raise InputError(f"{argument}={list(names)} names {len(names)} of {count} channels")
+    return names

@@ -16,14 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray, positive
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
 from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.excitation.input_spectra import InputSpectrum, power_gain
 from freqid.lti.bases import basis_of
-from freqid.lti.holds.hold import Hold, PeriodicHold, ZeroOrderHold
+from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold
 from freqid.lti.responses import points, transfer
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
+from freqid.models.conversion import as_model
+from freqid.models.model import Model
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Sampling:
         positive("dt", dt, "s")
         hold = ZeroOrderHold(base_dt or dt) if true_hold is None else true_hold
         if not isinstance(hold, Hold):
-            raise ValueError(
+            raise InputError(
                 f"true_hold={true_hold!r} is not a hold; give ZeroOrderHold(period), "
                 "FirstOrderHold(period) or BandLimited()"
             )
@@ -56,7 +58,7 @@ class Sampling:
         ratio = dt / positive("base_dt", base_dt, "s")
         factor = round(ratio)
         if factor < 1 or abs(ratio - factor) > 1e-6 * ratio:
-            raise ValueError(
+            raise InputError(
                 f"dt={dt:g} s is {ratio:g} times base_dt={base_dt:g} s; only a whole number of "
                 "samples can be left out"
             )
@@ -88,17 +90,15 @@ class Apparent:
     coherence: FloatArray
 
 
-def state_space_of(plant: Any) -> StateSpace:
-    """Matrices of a model or of a continuous control system; ValueError for anything else."""
-    if hasattr(plant, "state_space"):
-        at: StateSpace = plant.state_space()
-        return at
-    if all(hasattr(plant, n) for n in "ABCD") and getattr(plant, "dt", 1) in (0, None):
-        return StateSpace(*(np.asarray(getattr(plant, n), dtype=float) for n in "ABCD"))
-    raise ValueError(
-        f"plant={type(plant).__name__} is not a continuous-time plant; expected a GreyBox or a "
-        "control.StateSpace with dt=0"
-    )
+def true_plant(plant: Any) -> Model:
+    """The plant as a model in continuous time; ValueError for anything else."""
+    model = as_model(plant)
+    if model.dt:
+        raise InputError(
+            f"plant={type(plant).__name__} is not a continuous-time plant; expected a GreyBox or a "
+            "control.StateSpace with dt=0"
+        )
+    return model
 
 
 # a response through a hold, (outputs, inputs, K), at signed frequencies in Hz
@@ -190,7 +190,7 @@ def apparent_response(
     >>> bool(seen.coherence.min() < 0.5)
     True
     """
-    at = state_space_of(plant)
+    at = true_plant(plant).state_space()
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
     held = held_response(at, sampling.hold)
     if frequency is None and len(spectrum.edges(sampling.base_dt)) == 0:
@@ -201,7 +201,7 @@ def apparent_response(
         seen = apparent_density(held, spectrum, sampling, np.asarray(frequency, dtype=float))
     keep = seen.power > 1e-12 * seen.power.max(initial=0)
     if not keep.any():
-        raise ValueError("spectrum has no energy at these frequencies; it identifies nothing there")
+        raise InputError("spectrum has no energy at these frequencies; it identifies nothing there")
     inputs = at.B.shape[1]
     return FrequencyResponse(
         seen.frequency[keep],

@@ -9,30 +9,27 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from freqid.bias.apparent import (
-    Sampling,
-    state_space_of,
-)
+from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.conditions import Conditions, Expected, Responses
-from freqid.checks import Array, FloatArray, positive, whole
+from freqid.checks import Array, FloatArray, InputError, positive, whole
 from freqid.excitation.input_spectra import InputSpectrum
-from freqid.fitting.black_box.output_error import fit_black_box
-from freqid.fitting.black_box.transfer_function import fit_transfer_function
-from freqid.fitting.cost.minimum import Objective, settled
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.findings import Evidence, findings
+from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.grey_box import fit_grey_box
-from freqid.fitting.preparation import Options
-from freqid.fitting.trust import physical_warnings, uncertainty
-from freqid.lti.holds.hold import Hold, as_hold
+from freqid.fitting.search.descent import settled
+from freqid.fitting.uncertainty.covariance import determined
+from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.lti.holds import Hold, as_hold
 from freqid.lti.projection import triangle
 from freqid.lti.realisation import sampled_response
 from freqid.lti.responses import points, response_and_derivatives
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
 from freqid.models.grey_box import GreyBox
 from freqid.models.output_error import OutputError
 from freqid.models.transfer_function import TransferFunction
@@ -93,8 +90,8 @@ def asymptotic_fit(
     -231.4
     """
     if not isinstance(spectrum, InputSpectrum):
-        raise ValueError(f"spectrum={type(spectrum).__name__} is not a spectrum of an input")
-    at = state_space_of(plant)
+        raise InputError(f"spectrum={type(spectrum).__name__} is not a spectrum of an input")
+    at = true_plant(plant).state_space()
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
     conditions = Conditions(spectrum, sampling, band, prefilter, noise_model)
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
@@ -102,14 +99,14 @@ def asymptotic_fit(
     if duration is not None:
         positive("duration", duration, "s")
     if not np.isfinite(noise_std) or noise_std < 0:
-        raise ValueError(f"noise_std={noise_std!r} must be finite and not negative")
+        raise InputError(f"noise_std={noise_std!r} must be finite and not negative")
     fitted = plant if model is None else model
     if isinstance(fitted, GreyBox):
         est, expected, structure = _grey(fitted, at, conditions, hold, start, count, seed)
         return _with_errors(est, structure, expected, sampling, noise_std, duration)
     if isinstance(fitted, (OutputError, TransferFunction)):
         return _black(fitted, plant, at, conditions, hold)
-    raise ValueError(
+    raise InputError(
         f"model={type(fitted).__name__} is not a model; expected a GreyBox, OutputError or "
         "TransferFunction"
     )
@@ -140,7 +137,7 @@ def _grey(
     assumed = as_hold("zoh" if estimated else hold, sampling.dt, sampling.hold)
     plain = GreyStructure(model)
     if not plain.physical_names:
-        raise ValueError("model has no free parameter; free one with model.free(name)")
+        raise InputError("model has no free parameter; free one with model.free(name)")
     count_physical = len(plain.physical_names)
     known = [model_responses(plain, plain.start, assumed)]
 
@@ -148,8 +145,8 @@ def _grey(
         return np.concatenate([r(f) for r in known])
 
     def solve(expected: Expected, begin: Mapping[str, float] | None, n: int | None) -> Estimate:
-        data, options = expected.as_response(sampling, model), Options(assumed)
-        return fit_grey_box(model, [data], [expected.weight], options, n, seed, estimated, begin)
+        reading = expected.as_reading(sampling, model, assumed)
+        return fit_grey_box(model, [reading], SearchOptions(n, seed, begin, estimated))
 
     expected = conditions.expected(at, responses)
     first = solve(expected, start, count)
@@ -162,16 +159,20 @@ def _grey(
             break
         expected = finer
         est = solve(expected, {n: est[n] for n in plain.physical_names}, 1)
-    objective: Objective = est.problem.objective
-    structure: Any = objective.structure
-    values = settled(objective, est.problem.x) * structure.scale
+    minimum = est.minimum
+    x = settled(minimum.objective, minimum.x)
+    minimum = Minimum(minimum.objective, dataclasses.replace(minimum.solution, x=x))
+    structure = cast(GreyStructure, minimum.structure)
+    values = x * structure.scale
     # what is left of the cost is no noise: no parameter is unphysical by chance
-    kept = [w for w in est.warnings if not w.startswith(("not physical", "edge"))]
+    kept = [w for w in est.warnings if w.kind not in ("not physical", "edge of a bound")]
+    certain = Evidence(plain.parameters, values[:count_physical], np.zeros(count_physical))
     est = dataclasses.replace(
         est,
         values=values,
-        warnings=kept + physical_warnings(plain.parameters, values[:count_physical]),
-        model=est.model.with_values(**dict(zip(plain.physical_names, values, strict=False))),
+        warnings=kept + findings(certain),
+        model=structure.at(x),
+        problem=minimum,
         nominal=first.nominal,
         n_starts=first.n_starts,
         n_agreed=first.n_agreed,
@@ -188,11 +189,10 @@ def _black(
 ) -> Estimate:
     sampling = conditions.sampling
     assumed = as_hold(hold, sampling.dt, sampling.hold)
-    work = fit_black_box if isinstance(spec, OutputError) else fit_transfer_function
 
     def solve(expected: Expected) -> Estimate:
-        data = expected.as_response(sampling, plant)
-        return work(spec, [data], [expected.weight], Options(assumed))  # type: ignore[arg-type]
+        reading = expected.as_reading(sampling, plant, assumed)
+        return fitter_of(spec)(spec, [reading], SearchOptions())
 
     expected = conditions.expected(at)
     est = solve(expected)
@@ -202,7 +202,9 @@ def _black(
             break
         expected = finer
         est = solve(expected)
-    return dataclasses.replace(est, uncertainty=np.zeros_like(est.covariance_matrix))
+    minimum = est.minimum
+    none = np.zeros((len(minimum.x),) * 2)
+    return dataclasses.replace(est, uncertainty=dataclasses.replace(est.spread, given=none))
 
 
 def _responses_of(model: Any, hold: Hold) -> Responses:
@@ -225,31 +227,30 @@ def _with_errors(
     duration: float | None,
 ) -> Estimate:
     N = None if duration is None else duration / sampling.dt
-    covariance = error_covariance(est.values, structure, expected, est.hold, noise_std, N)
-    return dataclasses.replace(est, uncertainty=covariance)
+    x = est.values / structure.scale
+    covariance = error_covariance(x, structure, expected, est.hold, noise_std, N)
+    return dataclasses.replace(est, uncertainty=Spread(structure.scale, est.minimum, covariance))
 
 
 def error_covariance(
-    values: FloatArray,
+    x: FloatArray,
     structure: GreyStructure,
     expected: Expected,
     hold: Hold,
     noise_std: float,
     n_samples: float | None,
 ) -> FloatArray:
-    """H⁻¹ M H⁻¹ / N at ``values`` (P,): what noise and aliasing scatter, (P, P).
+    """H⁻¹ M H⁻¹ / N of the unknowns at ``x`` (P,): what noise and aliasing scatter, (P, P).
 
     Zero without ``n_samples``; infinite for what the spectrum does not determine.
     """
-    realisation = structure.realise(values / structure.scale)
-    _, dG = sampled_response(realisation, 2 * np.pi * expected.frequency, hold)
-    rows = dG * np.sqrt(expected.weight) / structure.scale[:, None, None, None]
+    _, dG = sampled_response(structure.realise(x), 2 * np.pi * expected.frequency, hold)
+    rows = dG * np.sqrt(expected.weight)
     J = np.ascontiguousarray(rows.reshape(len(rows), -1)).view(float)
-    size = float(np.linalg.norm(J * values[:, None]))
-    inverse = uncertainty(triangle(J.T), values, structure.names, 1.0, size).covariance
-    known = np.isfinite(inverse)
+    size = float(np.linalg.norm(J * x[:, None]))
+    told = determined(triangle(J.T), x, structure.names, size)
     if n_samples is None:
-        return np.where(known, 0.0, np.inf)
+        return told.scatter(np.zeros_like(told.inverse))
     each = expected.gain * (noise_std**2 + expected.error_power)
-    half = np.where(known, inverse, 0) @ (J * np.sqrt(np.repeat(each.ravel(), 2)))
-    return np.where(known, half @ half.T / n_samples, np.inf)
+    half = told.inverse @ (J * np.sqrt(np.repeat(each.ravel(), 2)))
+    return told.scatter(half @ half.T / n_samples)

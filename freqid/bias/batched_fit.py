@@ -14,10 +14,10 @@ import numpy as np
 
 from freqid.checks import Array, FloatArray
 from freqid.lti.bases import eigenbasis_of_many
-from freqid.lti.holds.hold import BandLimited, FirstOrderHold, Hold, PeriodicHold, ZeroOrderHold
+from freqid.lti.holds import BandLimited, Hold, PeriodicHold
 from freqid.lti.quadrature import NODES, unresolved
 from freqid.lti.responses import response_and_derivatives
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
 from freqid.models.grey_box import GreyBox
 
 # a step of this size, relative to the parameters, is the last
@@ -63,8 +63,7 @@ class Batch:
         self.period = np.array([getattr(p.hold, "period", 1.0) for p in problems])
         self.hold: Hold = BandLimited()
         if periodic:
-            kind = ZeroOrderHold if problems[0].hold.name == "zoh" else FirstOrderHold
-            self.hold = kind(1.0)
+            self.hold = type(problems[0].hold).at(1.0)
         omega = np.zeros((S, K))
         self.root = np.zeros((S, K))
         self.target = np.zeros((S, p, m, K), complex)

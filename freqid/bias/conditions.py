@@ -21,11 +21,15 @@ from freqid.bias.apparent import (
     slow_edges,
     weight_of,
 )
-from freqid.checks import Array, ComplexArray, FloatArray, band
+from freqid.checks import Array, ComplexArray, FloatArray, InputError
+from freqid.data.band import as_band
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.excitation.input_spectra import InputSpectrum
+from freqid.fitting.noise_models import GivenWeights
+from freqid.fitting.reading import Reading
+from freqid.lti.holds import Hold
 from freqid.lti.quadrature import panel_nodes, resolved
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
 
 Responses = Callable[[FloatArray], Array]
 
@@ -57,6 +61,11 @@ class Expected:
             output_names=getattr(plant, "outputs", None),
         )
 
+    def as_reading(self, sampling: Sampling, plant: Any, hold: Hold) -> Reading:
+        """What a fit under ``hold`` minimises."""
+        response = self.as_response(sampling, plant)
+        return Reading.of(response, hold, noise=GivenWeights(self.weight))
+
 
 @dataclass(frozen=True)
 class Conditions:
@@ -75,7 +84,7 @@ class Conditions:
         """
         s, held = self.sampling, held_response(at, self.sampling.hold)
         nyquist = 0.5 / s.dt
-        low, high = (0.0, nyquist) if self.band is None else band(self.band, nyquist)
+        low, high = as_band(self.band, nyquist) or (0.0, nyquist)
         edges = slow_edges(self.spectrum, s)
         edges = np.unique(np.clip(edges, low, high)) if len(edges) else edges
         panels = np.column_stack([edges[:-1], edges[1:]])
@@ -95,7 +104,7 @@ class Conditions:
         inside &= np.isfinite(lines.response).all(axis=(0, 1))
         power = np.concatenate([dense.power * weights, lines.power[inside]])
         if not power.any():
-            raise ValueError(
+            raise InputError(
                 f"spectrum has no energy between {low:g} and {high:g} Hz at dt={s.dt:g} s; it "
                 "identifies nothing there"
             )

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.bias.apparent import Sampling, state_space_of
+from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
-from freqid.checks import FloatArray, choice, positive, whole
+from freqid.checks import FloatArray, InputError, choice, positive, whole
 from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum
 from freqid.excitation.signal_spectra import multisine_lines
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.lti.holds.hold import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 from freqid.lti.realisation import sampled_response
 from freqid.models.grey_box import GreyBox
 
@@ -142,10 +142,11 @@ def _bias_and_scatter(
         return np.full(len(true), np.inf), np.full(len(true), np.inf)
     assumed = as_hold(hold, sampling.dt, sampling.hold)
     seen = model_responses(structure, values / structure.scale, assumed)
-    expected = Conditions(spectrum, sampling).expected(state_space_of(plant), seen)
+    expected = Conditions(spectrum, sampling).expected(true_plant(plant).state_space(), seen)
     count = duration / sampling.dt
-    covariance = error_covariance(values, structure, expected, assumed, noise_std, count)
-    return (values - true) / size, np.sqrt(np.diag(covariance)) / size
+    x = values / structure.scale
+    covariance = error_covariance(x, structure, expected, assumed, noise_std, count)
+    return (values - true) / size, np.sqrt(np.diag(covariance)) * structure.scale / size
 
 
 def _score(
@@ -204,7 +205,7 @@ def d_optimal_spectrum(
     between = ZeroOrderHold(dt) if hold is None else hold
     omega = 2 * np.pi * k / period
     if isinstance(between, PeriodicHold) and omega[-1] * dt > np.pi * (1 + 1e-9):
-        raise ValueError(f"band={band} Hz reaches beyond {0.5 / dt:g} Hz, the Nyquist limit")
+        raise InputError(f"band={band} Hz reaches beyond {0.5 / dt:g} Hz, the Nyquist limit")
     _, dG = sampled_response(structure.realise(structure.start), omega, between)
     P = len(structure.names)
     rows = np.moveaxis(dG, -1, 0).reshape(len(k), P, -1)
@@ -216,7 +217,7 @@ def d_optimal_spectrum(
         try:
             inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
         except np.linalg.LinAlgError:
-            raise ValueError(
+            raise InputError(
                 f"band={band} Hz with a period of {period:g} s does not determine the parameters"
             ) from None
         gain = np.einsum("kij,ji->k", each, inverse) / P

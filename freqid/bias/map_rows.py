@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from freqid.bias.apparent import Sampling, state_space_of
+from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.asymptotic import asymptotic_fit, model_responses
 from freqid.bias.batched_fit import Answers, Batch, Problem, descend, solve
 from freqid.bias.conditions import Conditions
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, InputError
 from freqid.excitation.input_spectra import InputSpectrum
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.trust import physical_warnings
-from freqid.lti.holds.hold import Hold, as_hold
+from freqid.fitting.findings import Evidence, findings
+from freqid.lti.holds import Hold, as_hold
 from freqid.lti.quadrature import TOLERANCE
 from freqid.models.grey_box import GreyBox
 
@@ -89,7 +89,8 @@ def answer_chunk(model: GreyBox, rows: Sequence[Row], setting: Setting) -> list[
         answers[i] = _alone(model, rows[i], setting)
     for i in kept:
         if answers[i].converged and not answers[i].message:
-            notes = physical_warnings(model.free_parameters, answers[i].values)
+            certain = Evidence(model.free_parameters, answers[i].values, np.zeros(count))
+            notes = findings(certain)
             answers[i].message = "; ".join(notes)
     return answers
 
@@ -101,11 +102,11 @@ def _problem(model: GreyBox, row: Row, setting: Setting, at: FloatArray | None =
     points = [structure.start] if at is None else [structure.start, at]
     seen = [model_responses(structure, x, hold) for x in points]
     expected = setting.conditions(row).expected(
-        state_space_of(model), lambda f: np.concatenate([r(f) for r in seen])
+        true_plant(model).state_space(), lambda f: np.concatenate([r(f) for r in seen])
     )
     count = 2 * expected.response.size
     if count < len(structure.names):
-        raise ValueError(
+        raise InputError(
             f"spectrum has {count} real values for {len(structure.names)} free parameters; it does "
             "not determine them: add lines or fix parameters"
         )

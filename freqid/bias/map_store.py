@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from freqid.checks import InputError
 from freqid.data.files import whole_file
 
 if TYPE_CHECKING:
@@ -23,11 +24,11 @@ class MapStore:
     def __init__(self, path: str | Path, identity: str) -> None:
         self.path, self.identity = Path(path), identity
         if self.path.suffix != ".parquet":
-            raise ValueError(f"path={str(path)!r} must end in .parquet")
+            raise InputError(f"path={str(path)!r} must end in .parquet")
         try:
             import pyarrow  # noqa: F401
         except ImportError:
-            raise ValueError(
+            raise InputError(
                 "path needs pyarrow to write Parquet; pip install 'freqid[parquet]'"
             ) from None
         self.parts = self.path.with_name(f".{self.path.name}.parts")
@@ -64,7 +65,7 @@ class MapStore:
 
         table = pd.read_parquet(path)
         if table.attrs.pop(_KEY, None) != self.identity:
-            raise ValueError(
+            raise InputError(
                 f"{path} holds a map of other plants, spectra, factors or holds; give another path "
                 "or remove it"
             )

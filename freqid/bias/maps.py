@@ -12,9 +12,9 @@ import numpy as np
 from freqid.bias.apparent import weight_of
 from freqid.bias.map_rows import Answer, Row, Setting, answer_chunk
 from freqid.bias.map_store import MapStore
-from freqid.checks import whole
+from freqid.checks import InputError, whole
 from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum
-from freqid.lti.holds.hold import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 from freqid.models.grey_box import GreyBox
 
 if TYPE_CHECKING:
@@ -115,34 +115,34 @@ def _asked(
     """The checked arguments as rows, spectra running fastest: neighbours resemble one another."""
     for name, model in plants.items():
         if not isinstance(model, GreyBox):
-            raise ValueError(f"plant {name!r} is a {type(model).__name__}; expected a GreyBox")
+            raise InputError(f"plant {name!r} is a {type(model).__name__}; expected a GreyBox")
         if not model.free_parameters:
-            raise ValueError("plant has no free parameter; free one with plant.free(name)")
+            raise InputError("plant has no free parameter; free one with plant.free(name)")
     if not isinstance(spectra, Mapping):
-        raise ValueError("spectra must be a mapping from names to spectra, {'10-80': ...}")
+        raise InputError("spectra must be a mapping from names to spectra, {'10-80': ...}")
     for name, spectrum in spectra.items():
         if not isinstance(spectrum, InputSpectrum):
-            raise ValueError(f"spectra[{name!r}] is a {type(spectrum).__name__}, not a spectrum")
+            raise InputError(f"spectra[{name!r}] is a {type(spectrum).__name__}, not a spectrum")
     counts = [whole("factors", f) for f in factors]
     assumed = list(holds)
     for what, given in (("plant", plants), ("spectra", spectra)):
         if not given:
-            raise ValueError(f"{what} is empty; give at least one")
+            raise InputError(f"{what} is empty; give at least one")
     if not counts or not assumed:
-        raise ValueError("factors and holds must hold at least one entry each")
+        raise InputError("factors and holds must hold at least one entry each")
     if true_hold is None:
         if base_dt is None:
-            raise ValueError("base_dt is missing; give the sample time of the input in s")
+            raise InputError("base_dt is missing; give the sample time of the input in s")
         true_hold = ZeroOrderHold(base_dt)
     if base_dt is None:
         if not isinstance(true_hold, PeriodicHold):
-            raise ValueError(
+            raise InputError(
                 "base_dt is missing; a band-limited input has no period to take it from"
             )
         base_dt = true_hold.period
     for hold in assumed:
         if hold == "estimate":
-            raise ValueError("holds contains 'estimate'; a map compares holds that are assumed")
+            raise InputError("holds contains 'estimate'; a map compares holds that are assumed")
         as_hold(hold, base_dt, true_hold)
     rows = [
         Row(plant, name, hold_label(hold), factor, spectrum, hold)
@@ -189,7 +189,7 @@ def _run(
         import joblib
     except ImportError:
         if n_jobs not in (None, 1):
-            raise ValueError(
+            raise InputError(
                 f"n_jobs={n_jobs} needs joblib; pip install 'freqid[parallel]'"
             ) from None
         yield from (_work(job, setting) for job in jobs)

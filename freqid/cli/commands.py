@@ -12,9 +12,10 @@ import numpy as np
 from cyclopts import Parameter as Option
 
 import freqid as fq
-from freqid.checks import choice, whole
+from freqid.checks import InputError, choice, whole
 from freqid.cli.terminal import folder, hold_of, plain, progress, show, write
 from freqid.excitation.input_spectra import below_nyquist
+from freqid.lti import holds
 from freqid.models.plants import PLANTS
 
 app = cyclopts.App(
@@ -125,9 +126,9 @@ def frf(
     """
     record = fq.read(data, input, output, dt, reference=reference)
     if reference is not None and method == "etfe":
-        raise ValueError("--reference needs --method h1, lpm or lrm")
+        raise InputError("--reference needs --method h1, lpm or lrm")
     if segment is not None and method != "h1":
-        raise ValueError("--segment needs --method h1")
+        raise InputError("--segment needs --method h1")
     loop = None if reference is None else True
     response = {
         "etfe": lambda: fq.etfe(record, band),
@@ -258,14 +259,14 @@ def bias(
     """
     names = ["zoh", "foh", "remembered"] if hold is None else hold
     for name in names:
-        choice("--hold", name, ("zoh", "foh", "bl", "remembered"))
-    holds = [None if name == "remembered" else name for name in names]
+        choice("--hold", name, (*holds.Hold.named, "remembered"))
+    assumed = [None if name == "remembered" else name for name in names]
     factors = [whole("--factor", f) for f in factor]
     plant = PLANTS[model]()
     low, high = chirp
     below_nyquist(high, base_dt)
     asked = f"{low:g}-{high:g}"
-    table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, holds, base_dt)
+    table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, assumed, base_dt)
     if out is not None:
         write(out, lambda path: table.to_csv(path, index=False))
     shown = table.drop(columns=["spectrum", "message"])
@@ -279,7 +280,7 @@ def bias(
     nyquist = 0.5 / base_dt
     uppers = sorted({float(f"{u:.3g}") for u in np.linspace(low, 2 * high - low, 15)[2:]} | {high})
     around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}
-    picture = fq.bias_map(plant, around, factors, holds, base_dt)
+    picture = fq.bias_map(plant, around, factors, assumed, base_dt)
     axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[asked])
     write(plot, lambda path: axes[0].figure.savefig(path))
     print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")

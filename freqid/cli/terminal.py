@@ -10,8 +10,9 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from freqid.checks import InputError
 from freqid.data.files import whole_file
-from freqid.lti.holds.hold import FirstOrderHold, ZeroOrderHold
+from freqid.lti.holds import Hold
 
 notes = Console(stderr=True)
 
@@ -33,11 +34,10 @@ def hold_of(text: str | None) -> Any:
     if text is None or ":" not in text:
         return text
     kind, _, period = text.partition(":")
-    kinds = {"zoh": ZeroOrderHold, "foh": FirstOrderHold}
     try:
-        return kinds[kind](float(period))
+        return Hold.named[kind].at(float(period))
     except (KeyError, ValueError):
-        raise ValueError(
+        raise InputError(
             f"--hold {text} is not a hold; expected zoh, foh, bl, zoh:PERIOD or foh:PERIOD (s)"
         ) from None
 
@@ -45,7 +45,7 @@ def hold_of(text: str | None) -> Any:
 def folder(out: Path) -> None:
     """Make the folder; ValueError where a file stands."""
     if out.exists() and not out.is_dir():
-        raise ValueError(f"--out {out} is a file; give a folder")
+        raise InputError(f"--out {out} is a file; give a folder")
     out.mkdir(parents=True, exist_ok=True)
 
 

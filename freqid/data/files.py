@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import unknown
+from freqid.checks import InputError, unknown
 from freqid.data.readers import READERS
 from freqid.data.record import Record
-from freqid.lti.holds.hold import Hold
+from freqid.lti.holds import Hold
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,11 +60,11 @@ def read(
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise ValueError(f"{path}: {unknown('suffix', path.suffix, READERS)}")
+        raise InputError(f"{path}: {unknown('suffix', path.suffix, READERS)}")
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
     if path.stat().st_size == 0:
-        raise ValueError(f"{path} is empty; expected columns of samples under a line of names")
+        raise InputError(f"{path} is empty; expected columns of samples under a line of names")
     try:
         record = Record.from_frame(
             reader(path), inputs, outputs, dt, hold, reference, units=units, resample=resample
@@ -73,7 +73,7 @@ def read(
             record = record.slice(start or 0.0, stop)
         return record if detrend is None else record.detrend(detrend)
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise InputError(f"{path}: {error}") from None
 
 
 def write(record: Record, path: str | Path) -> None:
@@ -84,7 +84,7 @@ def write(record: Record, path: str | Path) -> None:
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in _WRITERS:
-        raise ValueError(f"{path}: {unknown('suffix', path.suffix, _WRITERS)}")
+        raise InputError(f"{path}: {unknown('suffix', path.suffix, _WRITERS)}")
     with whole_file(path) as beside:
         _WRITERS[kind](record.to_frame(), beside)
 
@@ -97,7 +97,7 @@ def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
     try:
         frame.reset_index().to_parquet(path, index=False)
     except ImportError:
-        raise ValueError("Parquet needs pyarrow: pip install 'freqid[parquet]'") from None
+        raise InputError("Parquet needs pyarrow: pip install 'freqid[parquet]'") from None
 
 
 def _write_npz(frame: pd.DataFrame, path: Path) -> None:

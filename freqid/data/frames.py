@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, positive, unknown
-from freqid.lti.holds.hold import BandLimited, FirstOrderHold, Hold, ZeroOrderHold
+from freqid.checks import FloatArray, InputError, positive, unknown
+from freqid.lti.holds import Hold
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_HOLD_COLUMNS = {"zoh_period": ZeroOrderHold, "foh_period": FirstOrderHold}
+
+def _hold_columns() -> dict[str, type[Hold]]:
+    """The columns by which a file remembers its hold."""
+    return {kind.at(1.0).column[0]: kind for kind in Hold.named.values()}
 
 
 def record_fields(
@@ -26,9 +29,9 @@ def record_fields(
 ) -> dict[str, Any]:
     """The fields of a Record that a frame holds: columns to channels, time to periods."""
     if len(frame) < 2:
-        raise ValueError(f"frame has {len(frame)} rows; a record needs two or more")
+        raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     step = _sample_time(frame, dt)
-    signals = [c for c in frame.columns if c not in ("time", "band_limited", *_HOLD_COLUMNS)]
+    signals = [c for c in frame.columns if c not in ("time", *_hold_columns())]
     u_names, y_names = _channels(signals, inputs, outputs, reference)
     u, y = (_numbers(frame, names) for names in (u_names, y_names))
     commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
@@ -57,10 +60,10 @@ def regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
 
     times = _times(frame)
     if times is None:
-        raise ValueError("resample=True needs a column or index called 'time'")
+        raise InputError("resample=True needs a column or index called 'time'")
     gaps = np.diff(times)
     if not np.isfinite(times).all() or (gaps <= 0).any():
-        raise ValueError("column 'time' must increase; sort or repair the rows")
+        raise InputError("column 'time' must increase; sort or repair the rows")
     step = float(f"{np.median(gaps):.6g}")
     grid = times[0] + step * np.arange(round((times[-1] - times[0]) / step) + 1)
     notes = []
@@ -78,7 +81,7 @@ def regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
         x = frame[name].to_numpy(dtype=float)
         there = np.isfinite(x)
         if not there.any():
-            raise ValueError(f"column {name!r} has no samples at all; leave it out")
+            raise InputError(f"column {name!r} has no samples at all; leave it out")
         missing = len(x) - int(there.sum())
         if missing:
             notes.append(f"{missing} missing samples of {name!r} were filled by straight lines")
@@ -90,7 +93,7 @@ def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
     times = _times(frame)
     if times is None:
         if dt is None:
-            raise ValueError(
+            raise InputError(
                 "dt=None, but the data have no column or index called 'time'; give dt in s"
             )
         return positive("dt", dt, "s")
@@ -98,15 +101,15 @@ def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
     step = float(times[-1] - times[0]) / (len(times) - 1)
     if not np.isfinite(times).all() or (gaps <= 0).any():
         row = int(np.argmax(~(gaps > 0))) + 1
-        raise ValueError(f"column 'time' does not increase in row {row}; sort or repair the rows")
+        raise InputError(f"column 'time' does not increase in row {row}; sort or repair the rows")
     if np.abs(gaps - step).max() > 0.01 * step:
         row = int(np.argmax(np.abs(gaps - step))) + 1
-        raise ValueError(
+        raise InputError(
             f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on "
             "average; resample=True puts them on a regular grid"
         )
     if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
-        raise ValueError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")
+        raise InputError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")
     # a time column printed with few digits carries their rounding: prefer the round number
     rounded = float(f"{step:.9g}")
     return rounded if dt is None else float(dt)
@@ -128,7 +131,7 @@ def _times(frame: pd.DataFrame) -> FloatArray | None:
     try:
         return np.asarray(column, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError("column 'time' holds values that are not numbers of seconds") from None
+        raise InputError("column 'time' holds values that are not numbers of seconds") from None
 
 
 def _channels(
@@ -142,9 +145,9 @@ def _channels(
         names = None if value is None else [value] if isinstance(value, str) else list(value)
         for name in names or []:
             if name not in signals:
-                raise ValueError(unknown(argument, name, signals))
+                raise InputError(unknown(argument, name, signals))
         if names == []:
-            raise ValueError(f"{argument}=[] names no column; expected one of {signals}")
+            raise InputError(f"{argument}=[] names no column; expected one of {signals}")
         given.append(names)
     u, y, r = given
     rest = [s for s in signals if s not in (u or []) + (y or []) + (r or [])]
@@ -152,12 +155,12 @@ def _channels(
         if set(rest) >= {"u", "y"}:
             return ["u"], ["y"]
         if len(rest) != 2:
-            raise ValueError(f"inputs=None, outputs=None: name them; the columns are {signals}")
+            raise InputError(f"inputs=None, outputs=None: name them; the columns are {signals}")
         return rest[:1], rest[1:]
     if u is None or y is None:
         if len(rest) != 1:
             missing = "inputs" if u is None else "outputs"
-            raise ValueError(f"{missing}=None: name them; the other columns are {rest}")
+            raise InputError(f"{missing}=None: name them; the other columns are {rest}")
         return u or rest, y or rest
     return u, y
 
@@ -166,7 +169,7 @@ def _numbers(frame: pd.DataFrame, names: list[str]) -> FloatArray:
     try:
         return frame[names].to_numpy(dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"columns {names} hold values that are not numbers") from None
+        raise InputError(f"columns {names} hold values that are not numbers") from None
 
 
 def _slow_output(y: FloatArray) -> int:
@@ -182,12 +185,12 @@ def _slow_output(y: FloatArray) -> int:
 
 
 def _remembered(frame: pd.DataFrame) -> Hold | None:
-    if "band_limited" in frame.columns:
-        return BandLimited()
-    for column, kind in _HOLD_COLUMNS.items():
+    for column, kind in _hold_columns().items():
         if column in frame.columns:
+            if frame[column].dtype == bool:
+                return kind.at(1.0)
             periods = np.unique(frame[column].to_numpy(dtype=float))
             if len(periods) != 1:
-                raise ValueError(f"column {column!r} must hold one period; it holds {len(periods)}")
-            return kind(positive(column, float(periods[0]), "s"))
+                raise InputError(f"column {column!r} must hold one period; it holds {len(periods)}")
+            return kind.at(positive(column, float(periods[0]), "s"))
     return None

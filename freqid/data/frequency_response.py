@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray, band
-from freqid.lti.holds.hold import Hold
+from freqid.checks import ComplexArray, FloatArray, InputError, channel_names
+from freqid.data.band import as_band, chosen
+from freqid.lti.holds import Hold
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,18 +55,18 @@ class FrequencyResponse:
         put = object.__setattr__
         f = np.array(self.frequency, dtype=float)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
-            raise ValueError("frequency must be finite and increasing, (K,), in Hz")
+            raise InputError("frequency must be finite and increasing, (K,), in Hz")
         put(self, "frequency", _frozen(f))
         G = np.array(self.response, dtype=complex)
         G = G.reshape(1, 1, -1) if G.ndim == 1 else G
         if G.ndim != 3 or G.shape[2] != len(f):
-            raise ValueError(
+            raise InputError(
                 f"response has shape {G.shape} for {len(f)} frequencies; "
                 "expected (outputs, inputs, frequencies)"
             )
         put(self, "response", _frozen(G))
         if not np.isfinite(self.dt) or self.dt < 0:
-            raise ValueError(f"dt={self.dt!r} must be a sample time in s, or 0 for continuous time")
+            raise InputError(f"dt={self.dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape
         for name, shape in (
             ("variance", G.shape),
@@ -76,15 +77,10 @@ class FrequencyResponse:
             if value is not None:
                 array = np.array(value, dtype=float)
                 if array.size != np.prod(shape):
-                    raise ValueError(f"{name} has shape {array.shape}; expected {shape}")
+                    raise InputError(f"{name} has shape {array.shape}; expected {shape}")
                 put(self, name, _frozen(array.reshape(shape)))
         for name, letter, count in (("input_names", "u", m), ("output_names", "y", p)):
-            given = getattr(self, name)
-            if given is None:
-                given = [letter] if count == 1 else [f"{letter}{i + 1}" for i in range(count)]
-            if len(given) != count:
-                raise ValueError(f"{name}={list(given)} names {len(given)} of {count} channels")
-            put(self, name, tuple(given))
+            put(self, name, channel_names(name, getattr(self, name), count, letter))
 
     @property
     def omega(self) -> FloatArray:
@@ -103,13 +99,7 @@ class FrequencyResponse:
 
     def select(self, limits: tuple[float, float]) -> FrequencyResponse:
         """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        low, high = band(limits, np.inf, "limits")
-        keep = (self.frequency >= low * (1 - 1e-9)) & (self.frequency <= high * (1 + 1e-9))
-        if not keep.any():
-            raise ValueError(
-                f"limits=({low:g}, {high:g}) Hz hold no frequency; the response has "
-                f"{len(self.frequency)} from {self.frequency[0]:g} to {self.frequency[-1]:g} Hz"
-            )
+        keep = chosen(self.frequency, as_band(limits, name="limits"), "limits")
         cut: dict[str, Any] = {
             name: None if getattr(self, name) is None else getattr(self, name)[..., keep]
             for name in ("frequency", "response", "variance", "coherence", "input_spectrum")
@@ -136,7 +126,7 @@ class FrequencyResponse:
     def from_control(cls, frd: Any, hold: Hold | None = None) -> FrequencyResponse:
         """A response from ``control.FrequencyResponseData``; ValueError for anything else."""
         if not hasattr(frd, "omega") or not hasattr(frd, "frdata"):
-            raise ValueError(f"frd={type(frd).__name__} is not a control.FrequencyResponseData")
+            raise InputError(f"frd={type(frd).__name__} is not a control.FrequencyResponseData")
         dt = 0.0 if frd.dt is None or frd.dt is True else float(frd.dt)
         order = np.argsort(frd.omega)
         return cls(
@@ -179,7 +169,7 @@ class FrequencyResponse:
         try:
             import xarray
         except ImportError:
-            raise ValueError("to_xarray needs xarray; pip install xarray") from None
+            raise InputError("to_xarray needs xarray; pip install xarray") from None
         coordinates = {
             "output": list(self.output_names or ()),
             "input": list(self.input_names or ()),

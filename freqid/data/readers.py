@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import Array
+from freqid.checks import Array, InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,12 +20,12 @@ def _csv(path: Path) -> pd.DataFrame:
     try:
         frame = pd.read_csv(path)
     except pd.errors.EmptyDataError:
-        raise ValueError("holds no columns; expected samples under a line of names") from None
+        raise InputError("holds no columns; expected samples under a line of names") from None
     except (pd.errors.ParserError, UnicodeDecodeError) as error:
         first = str(error).splitlines()[0]
-        raise ValueError(f"is not CSV or is damaged ({first})") from None
+        raise InputError(f"is not CSV or is damaged ({first})") from None
     if len(frame) == 0:
-        raise ValueError("holds names but no samples")
+        raise InputError("holds names but no samples")
     return frame
 
 
@@ -35,10 +35,10 @@ def _parquet(path: Path) -> pd.DataFrame:
     try:
         return pd.read_parquet(path)
     except ImportError:
-        raise ValueError("is Parquet, which needs pyarrow: pip install 'freqid[parquet]'") from None
+        raise InputError("is Parquet, which needs pyarrow: pip install 'freqid[parquet]'") from None
     except Exception as error:
         # pyarrow has errors of many kinds for a file that is not what it says
-        raise ValueError(f"is not Parquet or is damaged ({_first_line(error)})") from None
+        raise InputError(f"is not Parquet or is damaged ({_first_line(error)})") from None
 
 
 def _npz(path: Path) -> pd.DataFrame:
@@ -47,7 +47,7 @@ def _npz(path: Path) -> pd.DataFrame:
         with np.load(path, allow_pickle=False) as arrays:
             return columns_of({name: arrays[name] for name in arrays.files})
     except (OSError, ValueError) as error:
-        raise ValueError(f"is not an NPZ of plain arrays ({_first_line(error)})") from None
+        raise InputError(f"is not an NPZ of plain arrays ({_first_line(error)})") from None
 
 
 def _mat(path: Path) -> pd.DataFrame:
@@ -59,7 +59,7 @@ def _mat(path: Path) -> pd.DataFrame:
         # version 7.3 is HDF5
         return _hdf5(path)
     except (ValueError, TypeError, OSError, IndexError) as error:
-        raise ValueError(f"is not a MAT file or is damaged ({_first_line(error)})") from None
+        raise InputError(f"is not a MAT file or is damaged ({_first_line(error)})") from None
     arrays: dict[str, Any] = {}
     for name, value in content.items():
         if name.startswith("__"):
@@ -76,7 +76,7 @@ def _hdf5(path: Path) -> pd.DataFrame:
     try:
         import h5py
     except ImportError:
-        raise ValueError("is HDF5, which needs h5py: pip install 'freqid[hdf5]'") from None
+        raise InputError("is HDF5, which needs h5py: pip install 'freqid[hdf5]'") from None
     found: dict[str, Any] = {}
 
     def keep(name: str, item: Any) -> None:
@@ -87,7 +87,7 @@ def _hdf5(path: Path) -> pd.DataFrame:
         with h5py.File(path, "r") as file:
             file.visititems(keep)
     except OSError as error:
-        raise ValueError(f"is not HDF5 or is damaged ({_first_line(error)})") from None
+        raise InputError(f"is not HDF5 or is damaged ({_first_line(error)})") from None
     return columns_of(found)
 
 
@@ -95,11 +95,11 @@ def _uff(path: Path) -> pd.DataFrame:
     try:
         import pyuff
     except ImportError:
-        raise ValueError("is UFF58, which needs pyuff: pip install 'freqid[uff]'") from None
+        raise InputError("is UFF58, which needs pyuff: pip install 'freqid[uff]'") from None
     try:
         sets = pyuff.UFF(str(path)).read_sets()
     except Exception as error:
-        raise ValueError(f"is not UFF58 or is damaged ({_first_line(error)})") from None
+        raise InputError(f"is not UFF58 or is damaged ({_first_line(error)})") from None
     sets = [sets] if isinstance(sets, dict) else list(sets)
     arrays: dict[str, Any] = {}
     for number, s in enumerate(sets):
@@ -111,7 +111,7 @@ def _uff(path: Path) -> pd.DataFrame:
         arrays[name] = np.real(s["data"])
         arrays.setdefault("time", np.asarray(s["x"]))
     if not arrays:
-        raise ValueError("holds no time responses (data sets 58 of function type 1)")
+        raise InputError("holds no time responses (data sets 58 of function type 1)")
     return columns_of(arrays)
 
 
@@ -138,7 +138,7 @@ def columns_of(arrays: Mapping[str, Any]) -> pd.DataFrame:
             x = x if x.shape[0] >= x.shape[1] else x.T
             columns |= {f"{name}{i + 1}": x[:, i] for i in range(x.shape[1])}
     if not columns:
-        raise ValueError("holds no arrays of samples")
+        raise InputError("holds no arrays of samples")
     N = max(len(x) for x in columns.values())
     full: dict[str, Array] = {}
     for name, x in columns.items():
@@ -148,7 +148,7 @@ def columns_of(arrays: Mapping[str, Any]) -> pd.DataFrame:
             full[name] = np.full(N, np.nan)
             full[name][:: N // len(x)] = x
         else:
-            raise ValueError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
+            raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
     if "time" not in full and "t" in full:
         full["time"] = full.pop("t")
     step = scalars.get("dt", scalars.get("Ts"))

@@ -10,10 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, finite, positive, samples, unknown, whole
+from freqid.checks import (
+    FloatArray,
+    InputError,
+    channel_names,
+    finite,
+    positive,
+    samples,
+    unknown,
+    whole,
+)
 from freqid.data.folding import low_pass
 from freqid.data.frames import record_fields, regular
-from freqid.lti.holds.hold import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.lti.holds import Hold, ZeroOrderHold, as_hold
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,31 +73,32 @@ class Record:
         put(self, "y", samples("y", self.y))
         factor = self.dt / input_dt
         if abs(factor - round(factor)) > 1e-6 * factor or round(factor) < 1:
-            raise ValueError(
+            raise InputError(
                 f"dt={self.dt:g} must be a whole multiple of input_dt={input_dt:g}; "
                 "resample the output first"
             )
         n_in, n_out, M = len(self.u), len(self.y), round(factor)
         if not M * (n_out - 1) < n_in <= M * n_out:
-            raise ValueError(
+            raise InputError(
                 f"u has {n_in} samples at {input_dt:g} s and y has {n_out} at {self.dt:g} s; "
                 f"expected {M * n_out if M > 1 else n_out} samples of u: cut the longer one"
             )
         put(self, "hold", as_hold(self.hold, input_dt, ZeroOrderHold(input_dt)))
         for name, letter, array in (("input_names", "u", self.u), ("output_names", "y", self.y)):
-            put(self, name, _names(name, getattr(self, name), letter, array))
+            count = array.reshape(len(array), -1).shape[1]
+            put(self, name, channel_names(name, getattr(self, name), count, letter))
         both = (*self.input_names, *self.output_names)
         if len(set(both)) < len(both):
-            raise ValueError(f"channel names {list(both)} hold a name twice; names must differ")
+            raise InputError(f"channel names {list(both)} hold a name twice; names must differ")
         units = dict(self.units or {})
         for name in units:
             if name not in (*both, "reference"):
-                raise ValueError(unknown("units", name, both))
+                raise InputError(unknown("units", name, both))
         put(self, "units", units)
         if self.reference is not None:
             put(self, "reference", samples("reference", self.reference))
             if len(self.reference) != n_out:
-                raise ValueError(
+                raise InputError(
                     f"reference has {len(self.reference)} samples and y has {n_out}; "
                     "expected as many"
                 )
@@ -158,7 +168,7 @@ class Record:
         factor = whole("factor", factor)
         left = -(-self.n_samples // factor)
         if left < 2:
-            raise ValueError(
+            raise InputError(
                 f"factor={factor} leaves {left} of {self.n_samples} output samples; "
                 "use a smaller factor or a longer record"
             )
@@ -187,7 +197,7 @@ class Record:
         last = self.n_samples if stop is None else _index(finite("stop", stop) / self.dt)
         first, last = max(first, 0), min(last, self.n_samples)
         if last - first < 1:
-            raise ValueError(
+            raise InputError(
                 f"start={start}, stop={stop} s leave no sample; the record runs from 0 to "
                 f"{self.duration:g} s"
             )
@@ -215,7 +225,7 @@ class Record:
         Raises ValueError for a negative or non-finite ``std``.
         """
         if finite("std", std) < 0:
-            raise ValueError(f"std={std!r} must not be negative")
+            raise InputError(f"std={std!r} must not be negative")
         noise = np.random.default_rng(seed).standard_normal(self.y.shape)
         return self._with(y=self.y + std * noise)
 
@@ -246,11 +256,9 @@ class Record:
         for name, values in slow.items():
             columns[name] = np.full(n, np.nan)
             columns[name][::M] = values
-        if isinstance(self.hold, PeriodicHold):
-            if self.hold != ZeroOrderHold(self.input_dt):
-                columns[f"{self.hold.name}_period"] = self.hold.period
-        else:
-            columns["band_limited"] = True
+        if self.hold != ZeroOrderHold(self.input_dt):
+            name, value = self.hold.column
+            columns[name] = value
         # twelve digits hide the rounding of k * dt and keep the times exactly regular on paper
         return pd.DataFrame(columns, index=pd.Index(np.round(self.input_time, 12), name="time"))
 
@@ -309,16 +317,6 @@ class Record:
             rows["notes"] = "; ".join(self.notes)
         body = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>Record</caption>{body}</table>"
-
-
-def _names(argument: str, given: Any, letter: str, array: FloatArray) -> tuple[str, ...]:
-    count = 1 if array.ndim == 1 else array.shape[1]
-    if given is None:
-        return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
-    names = (given,) if isinstance(given, str) else tuple(given)
-    if len(names) != count:
-        raise ValueError(f"{argument}={list(names)} names {len(names)} of {count} channels")
-    return names
 
 
 def _index(position: float) -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, InputError
 from freqid.data.record import Record
 
 
@@ -15,15 +15,15 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
     """The records as a list; ValueError unless they are of one plant and one sample time."""
     sets = [records] if isinstance(records, Record) else list(records)
     if not sets or not all(isinstance(r, Record) for r in sets):
-        raise ValueError("records must be a Record or a list of Records, at least one")
+        raise InputError("records must be a Record or a list of Records, at least one")
     first = sets[0]
     for number, r in enumerate(sets):
         if abs(r.dt / first.dt - 1) > 1e-9 or r.factor != first.factor:
-            raise ValueError(
+            raise InputError(
                 f"records[{number}] has dt={r.dt:g} s and the first {first.dt:g} s; they must agree"
             )
         if (r.n_inputs, r.n_outputs) != (first.n_inputs, first.n_outputs):
-            raise ValueError(
+            raise InputError(
                 f"records[{number}] has {r.n_inputs} inputs and {r.n_outputs} outputs, the first "
                 f"{first.n_inputs} and {first.n_outputs}; they must agree"
             )
@@ -31,7 +31,7 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
             (*r.input_names, *r.output_names), (*r.inputs.T, *r.outputs.T), strict=True
         ):
             if len(sets) == 1 and np.ptp(x) == 0:
-                raise ValueError(f"channel {name!r} is constant; leave it out or check the sensor")
+                raise InputError(f"channel {name!r} is constant; leave it out or check the sensor")
     return sets
 
 
@@ -42,7 +42,7 @@ def references_of(sets: Sequence[Record], reference: Any) -> list[FloatArray] | 
     if reference is True:
         given: list[Any] = [r.reference for r in sets]
         if any(x is None for x in given):
-            raise ValueError(
+            raise InputError(
                 "reference=True, but a record has none; give it to Record(..., reference=...) or "
                 "read(..., reference='column')"
             )
@@ -51,14 +51,14 @@ def references_of(sets: Sequence[Record], reference: Any) -> list[FloatArray] | 
     else:
         given = list(reference)
     if len(given) != len(sets):
-        raise ValueError(f"reference has {len(given)} signals for {len(sets)} records")
+        raise InputError(f"reference has {len(given)} signals for {len(sets)} records")
     signals = [np.asarray(x, dtype=float).reshape(len(x), -1) for x in given]
     for x, r in zip(signals, sets, strict=True):
         if len(x) != r.n_samples or x.shape[1] != r.n_inputs:
-            raise ValueError(
+            raise InputError(
                 f"reference has shape {x.shape}; expected {r.n_samples} samples of as many "
                 f"signals as inputs, {r.n_inputs}"
             )
         if (np.ptp(x, axis=0) == 0).any():
-            raise ValueError("reference is constant; it excites nothing")
+            raise InputError("reference is constant; it excites nothing")
     return signals

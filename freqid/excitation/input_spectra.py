@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import Array, FloatArray, choice, positive
+from freqid.checks import Array, FloatArray, InputError, choice, positive
 from freqid.data.folding import merged_lines, unfold
 from freqid.lti.quadrature import panel_nodes, resolved
 
@@ -53,7 +53,7 @@ class InputSpectrum:
         >>> f, power = LineSpectrum([30, 70], [1.0, 2.0]).aliased_lines(dt=0.01, factor=1)
         Traceback (most recent call last):
         ...
-        ValueError: spectrum has energy at 70 Hz, above 50 Hz, the Nyquist limit of dt=0.01 s; ...
+        freqid.checks.InputError: spectrum has energy at 70 Hz, above 50 Hz, ...
         """
         f, power = self.lines(dt)
         at, _, groups = merged_lines(f, dt, factor)
@@ -111,7 +111,7 @@ class ChirpSpectrum(InputSpectrum):
 
     def __post_init__(self) -> None:
         if positive("low", self.low, "Hz") >= positive("high", self.high, "Hz"):
-            raise ValueError(f"low={self.low:g} Hz must be below high={self.high:g} Hz")
+            raise InputError(f"low={self.low:g} Hz must be below high={self.high:g} Hz")
         choice("method", self.method, ("linear", "log"))
         positive("amplitude", self.amplitude)
 
@@ -166,14 +166,14 @@ class LineSpectrum(InputSpectrum):
     def __post_init__(self) -> None:
         f, power = np.array(self.frequencies, float), np.array(self.powers, float)
         if f.ndim != 1 or f.shape != power.shape or len(f) == 0:
-            raise ValueError(
+            raise InputError(
                 f"frequencies has shape {f.shape} and powers {power.shape}; expected as many "
                 "powers as frequencies, at least one"
             )
         if not np.isfinite(f).all() or (f < 0).any() or len(np.unique(f)) < len(f):
-            raise ValueError("frequencies must be finite, not negative and all different (Hz)")
+            raise InputError("frequencies must be finite, not negative and all different (Hz)")
         if not np.isfinite(power).all() or (power < 0).any() or not power.any():
-            raise ValueError(
+            raise InputError(
                 "powers must be finite and not negative, with at least one above zero (u²)"
             )
         order = np.argsort(f)
@@ -278,10 +278,10 @@ def power_gain(system: Any, frequency: Any, dt: float) -> FloatArray:
         H: Array = np.polyval(system[0], z) / np.polyval(system[1], z)
     elif hasattr(system, "ninputs"):
         if (system.ninputs, system.noutputs) != (1, 1):
-            raise ValueError(f"system has {system.ninputs} inputs and {system.noutputs} outputs")
+            raise InputError(f"system has {system.ninputs} inputs and {system.noutputs} outputs")
         if system.dt is not None and system.dt is not True and system.dt > 0:
             if not np.isclose(system.dt, dt, rtol=1e-9):
-                raise ValueError(f"system has dt={system.dt:g} s; the sequence has {dt:g} s")
+                raise InputError(f"system has dt={system.dt:g} s; the sequence has {dt:g} s")
             s = np.exp(1j * omega.ravel() * dt)
         else:
             s = np.exp(1j * omega.ravel() * dt) if system.dt is True else 1j * omega.ravel()
@@ -289,7 +289,7 @@ def power_gain(system: Any, frequency: Any, dt: float) -> FloatArray:
     elif callable(system):
         H = np.asarray(system(omega))
     else:
-        raise ValueError(
+        raise InputError(
             f"system={type(system).__name__} is no filter; expected a control system, a tuple "
             "(b, a) of polynomials in z, or a function of omega (rad/s)"
         )
@@ -300,7 +300,7 @@ def below_nyquist(highest: float, dt: float) -> None:
     """ValueError for energy above the Nyquist limit, which no sequence at ``dt`` can have."""
     nyquist = 0.5 / positive("dt", dt, "s")
     if highest > nyquist * (1 + 1e-9):
-        raise ValueError(
+        raise InputError(
             f"spectrum has energy at {highest:g} Hz, above {nyquist:g} Hz, the Nyquist limit of "
             f"dt={dt:g} s; lower the band or shorten dt"
         )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import scipy.fft
 import scipy.optimize
 
-from freqid.checks import FloatArray, choice, positive, whole
+from freqid.checks import FloatArray, InputError, choice, positive, whole
 from freqid.excitation.signal_spectra import multisine_lines
 
 # rounds of clipping; the norms then taken in turn; entries of a Jacobian that still is quick
@@ -52,13 +52,13 @@ def multisine(
     count = positive("period", period, "s") / positive("dt", dt, "s")
     N = round(count)
     if N < 2 or abs(count - N) > 1e-6 * max(count, 1):
-        raise ValueError(f"period={period:g} s must be a whole number of dt={dt:g} s")
+        raise InputError(f"period={period:g} s must be a whole number of dt={dt:g} s")
     repeats = whole("periods", periods)
     choice("crest", crest, ("minimise", "schroeder", "random"))
     rng = np.random.default_rng(whole("seed", seed, least=0))
     k = multisine_lines(band, period)
     if 2 * k[-1] >= N:
-        raise ValueError(
+        raise InputError(
             f"band=({band[0]:g}, {band[1]:g}) Hz must stay below {0.5 / dt:g} Hz, the Nyquist limit"
         )
     lines = _Lines(k, _amplitudes(powers, len(k)))
@@ -75,11 +75,11 @@ def _amplitudes(powers: Any, count: int) -> FloatArray:
     """Amplitudes whose sum of squares is 2, which makes an rms of 1."""
     share = np.ones(count) if powers is None else np.asarray(powers, dtype=float)
     if share.shape != (count,) or not np.isfinite(share).all() or (share < 0).any():
-        raise ValueError(
+        raise InputError(
             f"powers has shape {share.shape}; expected {count} powers, finite and not negative"
         )
     if not share.any():
-        raise ValueError("powers are all zero; at least one must be above zero")
+        raise InputError("powers are all zero; at least one must be above zero")
     return np.sqrt(2 * share / share.sum())
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import FloatArray, positive, whole
+from freqid.checks import FloatArray, InputError, positive, whole
 from freqid.data.record import Record
 from freqid.excitation.input_spectra import InputSpectrum, LineSpectrum
 
@@ -28,11 +28,11 @@ def multisine_lines(band: tuple[float, float], period: float) -> FloatArray:
     low, high = float(band[0]), float(band[1])
     positive("period", period, "s")
     if not 0 <= low < high:
-        raise ValueError(f"band=({low:g}, {high:g}) Hz must satisfy 0 <= low < high")
+        raise InputError(f"band=({low:g}, {high:g}) Hz must satisfy 0 <= low < high")
     first = max(int(np.ceil(low * period - 1e-9)), 1)
     k = np.arange(first, int(np.floor(high * period + 1e-9)) + 1)
     if len(k) == 0:
-        raise ValueError(
+        raise InputError(
             f"band=({low:g}, {high:g}) Hz holds no multiple of 1/period = {1 / period:g} Hz; "
             "lengthen the period or widen the band"
         )
@@ -87,13 +87,13 @@ class MeasuredSpectrum(LineSpectrum):
 
     def __init__(self, record: Record, channel: int = 0) -> None:
         if not isinstance(record, Record):
-            raise ValueError(f"record={type(record).__name__} is not a Record")
+            raise InputError(f"record={type(record).__name__} is not a Record")
         u = record.inputs[:, channel]
         n = len(u)
         power = np.abs(np.fft.rfft(u) / n) ** 2
         k = np.arange(len(power))
         power *= np.where((k == 0) | (2 * k == n), 1, 2)
         if not power.any():
-            raise ValueError("record has an input of zero; its spectrum is empty")
+            raise InputError("record has an input of zero; its spectrum is empty")
         keep = power > 1e-9 * power.max()
         super().__init__((k[keep] / (n * record.input_dt)).tolist(), power[keep].tolist())

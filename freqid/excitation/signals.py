@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import scipy.signal
 
-from freqid.checks import FloatArray, choice, finite, positive, whole
+from freqid.checks import FloatArray, InputError, choice, finite, positive, whole
 
 
 def _times(duration: float, dt: float) -> FloatArray:
     count = round(positive("duration", duration, "s") / positive("dt", dt, "s"))
     if count < 1:
-        raise ValueError(f"duration={duration:g} s is shorter than half of dt={dt:g} s")
+        raise InputError(f"duration={duration:g} s is shorter than half of dt={dt:g} s")
     return dt * np.arange(count)
 
 
@@ -36,7 +36,7 @@ def chirp(
     t = _times(duration, dt)
     for name, f in (("f0", f0), ("f1", f1)):
         if not 0 < finite(name, f) <= 0.5 / dt:
-            raise ValueError(f"{name}={f:g} Hz must be in (0, {0.5 / dt:g}] Hz, below Nyquist")
+            raise InputError(f"{name}={f:g} Hz must be in (0, {0.5 / dt:g}] Hz, below Nyquist")
     kind = {"linear": "linear", "log": "logarithmic"}[choice("method", method, ("linear", "log"))]
     wave = scipy.signal.chirp(t, f0, duration, f1, method=kind, phi=finite("phase", phase))
     return finite("amplitude", amplitude) * wave
@@ -54,7 +54,7 @@ def sine(
     """
     t = _times(duration, dt)
     if not 0 < finite("frequency", frequency) <= 0.5 / dt:
-        raise ValueError(f"frequency={frequency:g} Hz must be in (0, {0.5 / dt:g}] Hz")
+        raise InputError(f"frequency={frequency:g} Hz must be in (0, {0.5 / dt:g}] Hz")
     angle = 2 * np.pi * frequency * t + np.deg2rad(finite("phase", phase))
     return finite("amplitude", amplitude) * np.sin(angle)
 
@@ -71,7 +71,7 @@ def prbs(n_bits: int, dt: float, clock: int = 1, periods: int = 1) -> FloatArray
     """
     positive("dt", dt, "s")
     if whole("n_bits", n_bits, least=2) > 24:
-        raise ValueError(f"n_bits={n_bits} must be at most 24: a period has 2**n_bits - 1 bits")
+        raise InputError(f"n_bits={n_bits} must be at most 24: a period has 2**n_bits - 1 bits")
     bits = 2.0 * scipy.signal.max_len_seq(n_bits)[0] - 1
     return np.tile(np.repeat(bits, whole("clock", clock)), whole("periods", periods))
 

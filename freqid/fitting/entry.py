@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from freqid.checks import choice, whole
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.fitting.black_box.output_error import fit_black_box
-from freqid.fitting.black_box.transfer_function import fit_transfer_function
-from freqid.fitting.cost.residuals import experiment_length, line_errors
+from freqid.checks import InputError, choice, whole
+from freqid.data.data_set import DataSet, as_data_sets
+from freqid.fitting import grey_box
+from freqid.fitting.black_box import output_error, transfer_function
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.grey_box import fit_grey_box
+from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.hold_tests import rejected_hold
-from freqid.fitting.preparation import Options
-from freqid.fitting.uncertainty.noise_spectrum import noise_weights
-from freqid.lti.holds.hold import Hold
+from freqid.fitting.noise_models import NoiseModel, as_noise_model
+from freqid.fitting.reading import Domain, InitialState, Reading
+from freqid.fitting.residuals import errors_of
+from freqid.lti.holds import Hold
 from freqid.lti.threads import in_one_blas_thread
 from freqid.models.grey_box import GreyBox
-from freqid.models.output_error import OutputError
-from freqid.models.transfer_function import TransferFunction
 
+# the kinds of model that fit takes are known by the files that fit them
+_KNOWN = (grey_box, output_error, transfer_function)
 # fits with the noise of the one before, and the part of a standard error that ends them
 _NOISE_ROUNDS = 4
 _STANDS = 0.01
@@ -33,16 +33,16 @@ _STANDS = 0.01
 @in_one_blas_thread
 def fit(
     model: Any,
-    data: Record | FrequencyResponse | Sequence[Record | FrequencyResponse],
+    data: DataSet | Sequence[DataSet],
     *,
     hold: Hold | str | None = None,
     band: tuple[float, float] | None = None,
     weights: Any = None,
-    initial_state: str = "estimate",
+    initial_state: InitialState = "estimate",
     start: Mapping[str, float] | None = None,
     n_starts: int | str = "auto",
     seed: int = 0,
-    domain: str = "frequency",
+    domain: Domain = "frequency",
 ) -> Estimate:
     """Estimate a model's free parameters by weighted least squares on the lines of a band.
 
@@ -87,52 +87,36 @@ def fit(
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
     whole("seed", seed, least=0)
-    sets = [data] if isinstance(data, (Record, FrequencyResponse)) else list(data)
-    if not sets:
-        raise ValueError("data=[] holds no experiment; give at least one record or response")
-    each = isinstance(weights, (list, tuple)) and not isinstance(data, (Record, FrequencyResponse))
-    all_weights = list(weights) if each else [weights] * len(sets)
-    if len(all_weights) != len(sets):
-        raise ValueError(f"weights has {len(all_weights)} entries for {len(sets)} experiments")
-    integrates = isinstance(model, GreyBox) and _integrates(model)
+    sets = as_data_sets(data)
+    work = partial(fitter_of(model), model)
     estimated = isinstance(hold, str) and hold == "estimate"
-    options = Options("zoh" if estimated else hold, band, initial_state, domain, integrates)
-    if isinstance(model, (OutputError, TransferFunction)):
-        if start is not None:
-            raise ValueError("start has no meaning for a black box, which needs none; leave it out")
-        if estimated:
-            raise ValueError("hold='estimate' needs a GreyBox; a black box can imitate any delay")
-    elif not isinstance(model, GreyBox):
-        raise ValueError(
-            f"model={type(model).__name__} is not a model; expected a GreyBox, OutputError or "
-            "TransferFunction"
-        )
-
-    def work(
-        some_weights: Sequence[Any], n: int | None, begin: Mapping[str, float] | None
-    ) -> Estimate:
-        if isinstance(model, OutputError):
-            return fit_black_box(model, sets, some_weights, options)
-        if isinstance(model, TransferFunction):
-            return fit_transfer_function(model, sets, some_weights, options)
-        return fit_grey_box(model, sets, some_weights, options, n, seed, estimated, begin)
-
-    unknown_noise = [
-        isinstance(w, str) and w == "noise" and isinstance(d, Record)
-        for w, d in zip(all_weights, sets, strict=True)
+    skip_zero = isinstance(model, GreyBox) and model.integrates
+    readings = [
+        Reading.of(d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero)
+        for d, noise in zip(sets, _noise_models(weights, data, sets), strict=True)
     ]
-    if any(unknown_noise):
-        est = _noise_weighted(work, sets, all_weights, unknown_noise, options, count, start)
+    options = SearchOptions(count, seed, start, estimated)
+    if any(r.noise.to_be_learnt for r in readings):
+        est = _noise_weighted(work, readings, options)
     else:
-        est = work(all_weights, count, start)
-    if hold is not None and not estimated:
-        est = rejected_hold(est)
+        est = work(readings, options)
+    if hold is not None and not estimated and isinstance(model, GreyBox):
+        est.warnings.extend(rejected_hold(est.minimum, est.hold, est.dt))
     given = {
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
     }  # fmt: skip
     call = _call(model, len(sets), given)
-    return dataclasses.replace(est, data=tuple(sets), band=band, weights=weights, call=call)
+    return dataclasses.replace(est, data=sets, band=band, weights=weights, call=call)
+
+
+def _noise_models(weights: Any, data: Any, sets: Sequence[DataSet]) -> list[NoiseModel]:
+    """One for each data set; ValueError for a list of another length."""
+    each = isinstance(weights, (list, tuple)) and not isinstance(data, DataSet)
+    given = list(weights) if each else [weights] * len(sets)
+    if len(given) != len(sets):
+        raise InputError(f"weights has {len(given)} entries for {len(sets)} experiments")
+    return [as_noise_model(w, d) for w, d in zip(given, sets, strict=True)]
 
 
 def _call(model: Any, count: int, given: Mapping[str, Any]) -> str:
@@ -152,28 +136,18 @@ def _call(model: Any, count: int, given: Mapping[str, Any]) -> str:
 
 
 def _noise_weighted(
-    work: Callable[[Sequence[Any], int | None, Mapping[str, float] | None], Estimate],
-    sets: Sequence[Any],
-    weights: Sequence[Any],
-    unknown_noise: Sequence[bool],
-    options: Options,
-    count: int | None,
-    start: Mapping[str, float] | None,
+    work: Callable[[Sequence[Reading], SearchOptions], Estimate],
+    readings: Sequence[Reading],
+    options: SearchOptions,
 ) -> Estimate:
     """Fits in turn with the noise that the one before left; to the maximum of the likelihood."""
-    if options.domain == "time" or options.initial_state == "zero":
-        raise ValueError("weights='noise' needs domain='frequency' and no initial state at rest")
-    used = [None if u else w for u, w in zip(unknown_noise, weights, strict=True)]
-    first = est = work(used, count, start)
+    if any(r.in_time for r in readings):
+        raise InputError("weights='noise' needs domain='frequency' and no initial state at rest")
+    first = est = work(readings, options)
     for _ in range(_NOISE_ROUNDS):
-        hold = None if options.hold is None else est.hold
-        for i, data in enumerate(sets):
-            if unknown_noise[i]:
-                left = line_errors(est, data, hold, options.band, options.initial_state, used[i])
-                used[i] = noise_weights(left.error, experiment_length(data))
-        before = est
-        near = {n: est[n] for n in getattr(est.model, "values", {})}
-        est = work(used, 1, near)
+        readings = [_learnt(est, r, options.estimated_hold) for r in readings]
+        before, near = est, {n: est[n] for n in getattr(est.model, "values", {})}
+        est = work(readings, dataclasses.replace(options, n_starts=1, start=near or None))
         std = np.sqrt(np.diag(est.covariance_matrix))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
@@ -182,7 +156,10 @@ def _noise_weighted(
     )
 
 
-def _integrates(model: GreyBox) -> bool:
-    """Whether the plant has a pole at zero whatever its parameters, up to rounding."""
-    poles = np.abs(np.linalg.eigvals(model.state_space().A))
-    return bool((poles <= 1e-12 * max(poles.max(), 1.0)).any())
+def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:
+    """The reading with the noise that an estimate leaves of it, where that is to be learnt."""
+    if not reading.noise.to_be_learnt:
+        return reading
+    seen = reading.with_(hold=est.hold) if estimated_hold else reading
+    left = errors_of(est.model, seen)
+    return reading.with_(noise=reading.noise.learnt(left.error, left.n_samples))

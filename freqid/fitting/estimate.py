@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,10 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, choice, unknown
+from freqid.checks import ComplexArray, FloatArray, InputError, choice, unknown
+from freqid.data.data_set import DataSet
 from freqid.data.frequency_response import FrequencyResponse
-from freqid.lti.holds.hold import Hold
+from freqid.fitting.findings import Finding
+from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
+from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.uncertainty.profiles import profile_intervals
+from freqid.lti.holds import Hold
+from freqid.models.grey_box import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,12 +33,29 @@ Z95 = 1.959963984540054
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """The result of ``fit``.
+    """The result of ``fit``: parameters, how certain they are, and what speaks against them.
 
-    ``model`` is the model at the estimate; ``cost`` the least weighted sum of squared errors, in
-    units of the output squared; ``n_agreed`` of ``n_starts`` starts
-    ended in the minimum reported; ``fit_percent`` 100·(1 − √(cost / energy of the data fitted));
-    ``warnings`` the reasons for which the result should not be trusted, in sentences.
+    Attributes:
+        model: the model at the estimate: GreyBox, DiscreteModel or ContinuousModel.
+        names: names of the P values that were estimated.
+        values: the estimates, (P,), each in its own unit.
+        nominal: the values that the search began from, (P,); NaN where there were none.
+        units: unit of each value.
+        uncertainty: how the estimate scatters, or the covariance itself, (P, P).
+        cost: the data's part of the least weighted sum of squared errors, in output units squared,
+            or in the noise's variance where weights bring it.
+        fit_percent: 100·(1 − √(cost / energy of the data fitted)).
+        converged: whether the descent ended in a minimum; ``message`` says how it ended.
+        n_evaluations: evaluations of the cost, all starts together.
+        n_rows: real values of the data.
+        hold: what the input was taken to do between its samples.
+        dt: sample time of the output in s; 0 for a continuous response.
+        n_starts, n_agreed: starts that were tried, and those that ended in this minimum.
+        warnings: why the result should not be trusted, in sentences (``str``) that also have
+            ``kind``, ``severity`` and ``number``.
+        problem: the Minimum (structure, experiments, prior), for what asks for more.
+        data: the data sets that were fitted; ``band`` (Hz) and ``weights`` as they were given.
+        call: the call of ``fit``, to be made again.
     """
 
     model: Any
@@ -38,8 +63,7 @@ class Estimate:
     values: FloatArray
     nominal: FloatArray
     units: Sequence[str]
-    # the covariance, or what computes it when it is asked for
-    uncertainty: FloatArray | Callable[[], FloatArray]
+    uncertainty: Spread | FloatArray
     cost: float
     fit_percent: float
     converged: bool
@@ -48,16 +72,28 @@ class Estimate:
     hold: Hold
     dt: float
     n_rows: int
+    warnings: list[Finding] = field(default_factory=list)
     n_starts: int = 1
     n_agreed: int = 1
-    warnings: list[str] = field(default_factory=list)
-    # the cost that was minimised, for what asks for more than its least point
-    problem: Any = field(default=None, repr=False)
-    # the data, the band (Hz), the weights and the call that made the estimate, for reports of it
-    data: Sequence[Any] = ()
+    problem: Minimum | None = field(default=None, repr=False)
+    data: Sequence[DataSet] = ()
     band: tuple[float, float] | None = None
     weights: Any = None
     call: str = ""
+
+    @property
+    def minimum(self) -> Minimum:
+        """The point of least cost. Raises ValueError for an estimate that has none any more."""
+        if self.problem is None:
+            raise InputError("this estimate does not hold its cost any more; fit again")
+        return self.problem
+
+    @property
+    def spread(self) -> Spread:
+        """How the estimate scatters: covariance, and how it is carried to modes and responses."""
+        if isinstance(self.uncertainty, Spread):
+            return self.uncertainty
+        return Spread(np.ones(len(self.values)), given=self.uncertainty)
 
     def __getitem__(self, name: str) -> float:
         if name in self.names:
@@ -78,7 +114,7 @@ class Estimate:
     @cached_property
     def covariance_matrix(self) -> FloatArray:
         """Covariance of the parameters, (P, P)."""
-        return self.uncertainty() if callable(self.uncertainty) else self.uncertainty
+        return self.spread.covariance
 
     @cached_property
     def parameters(self) -> pd.DataFrame:
@@ -123,7 +159,9 @@ class Estimate:
         """
         if omega is None:
             omega = np.geomspace(1e-3, 1, 200) * np.pi / self.dt
-        return self.model.response_with_variance(omega, hold, self.names, self.covariance_matrix)
+        frf: FrequencyResponse = self.model.frequency_response(omega, hold)
+        variance = response_variance(self.minimum, self.spread, frf.omega, hold)
+        return dataclasses.replace(frf, variance=variance)
 
     def to_control(self) -> Any:
         """The estimated model as a ``control.StateSpace``."""
@@ -132,10 +170,10 @@ class Estimate:
     def to_continuous(self, hold: Hold | str | None = None) -> Any:
         """A black-box model in continuous time, by inverting its hold (see ``OutputError``)."""
         if not hasattr(self.model, "to_continuous"):
-            raise ValueError("the model is in continuous time already; use to_control()")
+            raise InputError("the model is in continuous time already; use to_control()")
         return self.model.to_continuous(self.hold if hold is None else hold)
 
-    def derived(self, function: Any) -> tuple[Any, Any]:
+    def derived(self, function: Callable[[GreyBox], ArrayLike]) -> tuple[FloatArray, FloatArray]:
         """Value and standard error of ``function(model)``, a number or an array, to first order.
 
         >>> import freqid as fq
@@ -145,15 +183,18 @@ class Estimate:
         >>> bool(abs(gain - 1) < 5 * std)
         True
         """
-        from freqid.fitting.uncertainty.error_bars import derived
-
-        return derived(self, function)
+        if not isinstance(self.model, GreyBox):
+            raise InputError("a function of parameters needs a grey-box estimate")
+        count = len(self.model.free_parameters)
+        return derived(self.model, function, self.covariance_matrix[:count, :count])
 
     def modes(self) -> pd.DataFrame:
         """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
-        from freqid.fitting.uncertainty.error_bars import modes
+        return modes(self.minimum, self.spread)
 
-        return modes(self)
+    def pole_scatter(self) -> tuple[ComplexArray, FloatArray]:
+        """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
+        return pole_scatter(self.minimum, self.spread)
 
     def intervals(self, method: str = "linear", level: float = 0.95) -> pd.DataFrame:
         """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.
@@ -163,13 +204,14 @@ class Estimate:
         import pandas as pd
         from scipy.stats import norm
 
-        from freqid.fitting.uncertainty.error_bars import profile_intervals
-
         choice("method", method, ("linear", "profile"))
         if not 0 < level < 1:
-            raise ValueError(f"level={level!r} must lie between 0 and 1")
+            raise InputError(f"level={level!r} must lie between 0 and 1")
         if method == "profile":
-            return profile_intervals(self, level)
+            if not isinstance(self.model, GreyBox) or self.spread.given is not None:
+                raise InputError("profile intervals need a grey-box estimate from data")
+            std = np.sqrt(np.diag(self.covariance_matrix))
+            return profile_intervals(self.minimum, self.spread.change, std, level)
         half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
         return pd.DataFrame(
             {"lower": self.values - half, "upper": self.values + half},

@@ -1,81 +1,64 @@
-"""What the data say of the hold: was the record decimated, is the assumed hold refuted."""
+"""What the data say of a hold that is assumed: is it refuted."""
 
 from __future__ import annotations
 
-import dataclasses
-from typing import Any
-
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import InputError
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.fitting.cost.minimum import Objective, Problem, Solution, minimise
+from freqid.fitting.cost.nuisance import HoldPeriod
+from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.estimate import Estimate
-from freqid.lti.holds.hold import PeriodicHold
-from freqid.models.grey_box import GreyBox
+from freqid.fitting.findings import Finding
+from freqid.fitting.search.descent import Solution, minimise
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.lti.holds import Hold, PeriodicHold
 
 # 0.1 % point of chi-square with one degree of freedom
 _REFUTED = 10.83
+# a period to free the hold from beside its own, as a part of the sample time
+_SHORT = 0.3
 
 
-def decimation_warning(period: float, std: float, dt: float) -> list[str]:
-    """A sentence when an estimated period is significantly below the sample time."""
-    if not np.isfinite(std) or dt - period < 3 * std or period > 0.75 * dt:
-        return []
-    return [
-        f"decimated: the input was held for {period:.4g} s and the sample time is {dt:.4g} s; this "
-        f"record was probably decimated by about {dt / period:.0f}"
-    ]
-
-
-def rejected_hold(est: Estimate) -> Estimate:
-    """The estimate, with a warning where freeing the hold explains the data much better.
+def rejected_hold(minimum: Minimum, hold: Hold, dt: float) -> list[Finding]:
+    """A warning where freeing the hold explains the data, and what was known, much better.
 
     Likelihood ratio: n ln(V/V_free) is chi-square with one degree of freedom when the assumed
     zero-order hold is right (Wilks). For another assumed hold, which is not a special case of the
-    free one, the same statistic compares the two as models of equal cost.
+    free one, the same statistic compares the two as models of equal cost. ``dt`` in s.
     """
-    if not isinstance(est.problem, Problem) or not isinstance(est.model, GreyBox):
-        return est
-    experiments = est.problem.objective.experiments
+    structure = minimum.structure
     testable = all(
-        isinstance(e, SpectralExperiment) and e.aliases == 1 and e.lift == 1 for e in experiments
+        isinstance(e, SpectralExperiment) and e.lines.aliases == 1 and e.lift == 1
+        for e in minimum.experiments
     )
-    dof = est.n_rows - len(est.names) - 1
-    rounding = 1e-18 * sum(e.energy for e in experiments)
-    if not testable or dof < 10 or est.cost <= rounding or est.dt <= 0:
-        return est
-    structure: Any = est.problem.objective.structure
-    names = structure.physical_names
-    freed = GreyStructure(structure.model, est.dt, {n: est[n] for n in names})
-    free_objective = Objective(freed, experiments)
-    x = freed.start
-    solutions = [_freed(free_objective, np.append(x[:-1], h)) for h in _periods(est)]
-    costs = [s.point.cost for s in solutions if s is not None]
-    if not costs:
-        return est
-    statistic = dof * np.log(est.cost / max(min(costs), rounding))
+    dof = minimum.objective.n_rows - len(minimum.x) - 1
+    if not isinstance(structure, GreyStructure) or not testable:
+        return []
+    if dof < 10 or minimum.exact or dt <= 0:
+        return []
+    freed = structure.with_unknown(HoldPeriod.of(dt), minimum.x)
+    known = minimum.prior
+    prior = None if known is None else Prior.of(freed.parameters, freed.scale, known.variance)
+    objective = minimum.objective.of(freed, prior)
+    own = hold.period / dt if isinstance(hold, PeriodicHold) else 1.0
+    solutions = []
+    for period in (min(own, 1.0), _SHORT):
+        try:
+            start = np.append(freed.start[: structure.count], period)
+            solutions.append(minimise(objective, start, limit=40))
+        except InputError:
+            continue
+    if not solutions:
+        return []
+    best: Solution = min(solutions, key=lambda s: s.cost)
+    statistic = dof * np.log(minimum.point.cost / max(best.cost, 1e-18 * objective.energy))
     if statistic < _REFUTED:
-        return est
-    best = min((s for s in solutions if s is not None), key=lambda s: s.point.cost)
-    period = best.x[-1] * est.dt
-    text = (
-        f"hold rejected: the data contradict {est.hold!r} (likelihood ratio {statistic:.3g}, "
+        return []
+    period = best.x[freed.names.index(HoldPeriod.name)] * dt
+    sentence = (
+        f"the data contradict {hold!r} (likelihood ratio {statistic:.3g}, "
         f"limit {_REFUTED}); a zero-order hold of about {period:.3g} s explains them better: use "
         "hold='estimate', or the hold that the converter had"
     )
-    return dataclasses.replace(est, warnings=[*est.warnings, text])
-
-
-def _periods(est: Estimate) -> list[float]:
-    """Periods to free the hold from, as parts of the sample time."""
-    own = est.hold.period / est.dt if isinstance(est.hold, PeriodicHold) else 1.0
-    return [min(own, 1.0), 0.3]
-
-
-def _freed(objective: Objective, start: FloatArray) -> Solution | None:
-    try:
-        return minimise(objective, start, limit=40)
-    except ValueError:
-        return None
+    return [Finding("hold rejected", sentence, number=float(statistic))]

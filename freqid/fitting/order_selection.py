@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import choice, whole
+from freqid.checks import InputError, choice, whole
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
-from freqid.fitting.black_box.output_error import cost_of, fit_black_box
-from freqid.fitting.preparation import Options, prepare
-from freqid.lti.holds.hold import Hold
+from freqid.fitting.black_box.output_error import cost_of, fit_output_error
+from freqid.fitting.noise_models import GivenWeights
+from freqid.fitting.reading import Reading
+from freqid.lti.holds import Hold
 from freqid.lti.responses import Plane
 from freqid.lti.threads import in_one_blas_thread
 from freqid.models.output_error import OutputError
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 # every so-manyth line is held out in turn
 _FOLDS = 4
@@ -55,21 +55,20 @@ def select_order(
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
     wanted = [whole("orders", n) for n in orders]
     if not wanted:
-        raise ValueError("orders is empty; give at least one, such as range(1, 7)")
-    options = Options(hold, band, initial_state)
-    shape = len(data.output_names or ()), len(data.input_names or ())
-    lines = prepare(data, shape, None, options, Plane())[0].n_lines  # type: ignore[attr-defined]
+        raise InputError("orders is empty; give at least one, such as range(1, 7)")
+    reading = Reading.of(data, hold, band, initial_state=initial_state)  # type: ignore[arg-type]
+    lines = np.arange(reading.at_lines().lines(Plane()).n_lines)
     rows = []
     for order in wanted:
         spec = OutputError(order, feedthrough)
-        est = fit_black_box(spec, [data], [None], options)
+        est = fit_output_error(spec, [reading])
         n, k = est.n_rows, len(est.values)
         misfit = n * np.log(max(est.cost, 1e-300) / n)
         held_out = 0.0
         for fold in range(_FOLDS):
-            out = np.arange(lines) % _FOLDS == fold
-            trained = fit_black_box(spec, [data], [np.where(out, 0.0, 1.0)], options)
-            held_out += cost_of(trained.model, data, np.where(out, 1.0, 0.0), options)
+            out = lines % _FOLDS == fold
+            kept, left_out = (reading.with_(noise=GivenWeights(1.0 * m)) for m in (~out, out))
+            held_out += cost_of(fit_output_error(spec, [kept]).model, left_out)
         rows.append(
             {
                 "order": order,
@@ -86,32 +85,3 @@ def select_order(
     table.attrs["best"] = int(table["order"].to_numpy()[table[criterion].argmin()])
     table.attrs["criterion"] = criterion
     return table
-
-
-def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
-    """Criteria against order, each less its least value; the best order is marked.
-
-    Takes the table of ``select_order`` and returns the axes.
-    """
-    import matplotlib.pyplot as plt
-
-    from freqid.plots.style import context, line
-
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
-        n = np.exp((table["mdl"] - table["aic"]) / table["parameters"] + 2).iloc[0]
-        curves: dict[str, Any] = {
-            "AIC": table["aic"],
-            "MDL": table["mdl"],
-            "cross-validation": n * np.log(table["cross_validation"]),
-        }
-        for index, (name, values) in enumerate(curves.items()):
-            ax.plot(
-                table["order"], values - values.min() + 1, marker="o", label=name, **line(index)
-            )
-        ax.axvline(table.attrs["best"], color="#999999", linewidth=0.8, zorder=0)
-        ax.set(xlabel="order", ylabel="criterion, less its least value, + 1", yscale="log")
-        ax.set_xticks(table["order"])
-        ax.legend()
-    return ax

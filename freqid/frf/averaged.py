@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import scipy.signal
 
-from freqid.checks import Array, ComplexArray, FloatArray, whole
-from freqid.checks import band as checked_band
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, whole
+from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.data.record_sets import as_records, references_of
@@ -75,7 +75,7 @@ def h2(
     """
     s = _spectral(records, segment, band, window, overlap, detrend, None)
     if s.yu.shape[-1] != s.yu.shape[-2]:
-        raise ValueError(
+        raise InputError(
             f"records have {s.yu.shape[-1]} inputs and {s.yu.shape[-2]} outputs; h2 needs as many "
             "outputs as inputs: use h1"
         )
@@ -143,12 +143,12 @@ def _spectral(
         segment = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
     length = whole("segment", segment, least=2)
     if length > shortest:
-        raise ValueError(f"segment={length} is longer than the shortest record, {shortest} samples")
+        raise InputError(f"segment={length} is longer than the shortest record, {shortest} samples")
     if overlap is None:
         named = isinstance(window, str) and window in ("boxcar", "rectangular")
         overlap = 0.0 if named else 0.5
     if not 0 <= overlap < 1:
-        raise ValueError(f"overlap={overlap!r} must be a part of the segment, from 0 to below 1")
+        raise InputError(f"overlap={overlap!r} must be a part of the segment, from 0 to below 1")
     step = length - int(length * overlap)
     options = {
         "fs": 1 / first.dt, "window": window, "nperseg": length, "noverlap": length - step,
@@ -170,18 +170,12 @@ def _spectral(
             f, S = scipy.signal.csd(b[None, :], a[:, None], **options)
             total[pair] = total.get(pair, 0) + n * np.moveaxis(S, -1, 0)
         count += n
-    keep = np.ones(len(f), bool)
-    if band is not None:
-        low, high = checked_band(band, first.nyquist)
-        keep = (f >= low * (1 - 1e-9)) & (f <= high * (1 + 1e-9))
-    keep &= f > 0
-    if not keep.any():
-        raise ValueError(f"band={band} holds no frequency; lengthen the segments or widen the band")
+    keep = chosen(f, as_band(band, first.nyquist), positive=True)
     averaged = {pair: S[keep] / count for pair, S in total.items()}
     averages = _independent(window, length, step, count)
     m = first.n_inputs
     if count < m:
-        raise ValueError(
+        raise InputError(
             f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
             "segments or more experiments"
         )
@@ -195,7 +189,7 @@ def _spectral(
         )
         related = np.median(level.max(axis=-1))
         if related < 2 / max(averages, 1) and averages > 2:
-            raise ValueError(
+            raise InputError(
                 f"reference has a coherence of {related:.2g} with the input, no more than chance; "
                 "it did not drive this experiment"
             )
@@ -209,11 +203,11 @@ def _excited(uu: ComplexArray, first: Record) -> None:
     power = np.einsum("kii->ki", uu).real
     if not (power.max(axis=0) > 0).all():
         silent = first.input_names[int(np.argmin(power.max(axis=0)))]
-        raise ValueError(f"input {silent!r} is constant in the band; it excites nothing")
+        raise InputError(f"input {silent!r} is constant in the band; it excites nothing")
     size = np.sqrt(np.where(power > 0, power, 1))
     least = np.linalg.eigvalsh(uu / (size[:, :, None] * size[:, None, :]))[:, 0]
     if uu.shape[-1] > 1 and np.median(least) < 1e-10:
-        raise ValueError(
+        raise InputError(
             "the inputs move together in every segment, so that their effects cannot be told "
             "apart; use as many different experiments as inputs"
         )

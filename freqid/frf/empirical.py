@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from freqid.checks import InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.frf.spectra import spectra
@@ -33,12 +34,12 @@ def etfe(
     sets = [record] if isinstance(record, Record) else list(record)
     first, count = sets[0], len(sets)
     if count < first.n_inputs:
-        raise ValueError(
+        raise InputError(
             f"record has {first.n_inputs} inputs and there are {count} experiments; the ratio of "
             "DFTs needs as many experiments as inputs: give a list, or fit a model"
         )
     if len({r.n_samples for r in sets}) > 1:
-        raise ValueError(
+        raise InputError(
             f"records have {sorted({r.n_samples for r in sets})} samples; cut them to one length "
             "with slice()"
         )
@@ -51,7 +52,7 @@ def etfe(
     power = (np.abs(U) ** 2).mean(axis=-1)
     keep = (power > 1e-26 * power.max()).all(axis=1) & ((s.omega > 0) | (band is not None))
     if not keep.any():
-        raise ValueError(f"u has no energy at the output's lines in band={band}; widen the band")
+        raise InputError(f"u has no energy at the output's lines in band={band}; widen the band")
     U, Y = U[keep], Y[keep]
     variance = None
     if count == first.n_inputs == 1:
@@ -61,7 +62,7 @@ def etfe(
         try:
             inverse = np.linalg.inv(U @ Uh)
         except np.linalg.LinAlgError:
-            raise ValueError(
+            raise InputError(
                 "the experiments move the inputs alike; use as many different ones as inputs"
             ) from None
         G = Y @ Uh @ inverse

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray, whole
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, whole
+from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.data.record_sets import as_records, references_of
@@ -123,9 +124,9 @@ def _estimate(
         width += 1 - width % 2
     width = whole("width", width, least=3)
     if width % 2 == 0:
-        raise ValueError(f"width={width} must be odd: a line and as many on each side")
+        raise InputError(f"width={width} must be odd: a line and as many on each side")
     if width * E <= unknown:
-        raise ValueError(
+        raise InputError(
             f"width={width} gives {width * E} equations for {unknown} unknowns; widen it"
         )
     data = _lines(sets, signals, band, width)
@@ -171,17 +172,17 @@ def _lines(
     first = sets[0]
     N = min(r.n_samples for r in sets)
     if any(r.n_samples != N for r in sets):
-        raise ValueError(
+        raise InputError(
             f"records have {sorted({r.n_samples for r in sets})} samples; local models need equal "
             "lengths: cut them with slice()"
         )
     if first.factor > 1:
-        raise ValueError("records have an input faster than the output; decimate the input first")
+        raise InputError("records have an input faster than the output; decimate the input first")
     spacing = 1 / (N * first.dt)
-    limits = None
-    if band is not None:
+    asked, limits = as_band(band, first.nyquist), None
+    if asked is not None:
         half = (width // 2 + 1) * spacing
-        limits = (max(band[0] - half, 0.0), min(band[1] + half, first.nyquist))
+        limits = (max(asked.low - half, 0.0), min(asked.high + half, first.nyquist))
     each = [spectra(r, limits) for r in sets]
     f = each[0].frequency
     # zero and Nyquist are real and say nothing of phases
@@ -197,13 +198,8 @@ def _lines(
         Y = np.concatenate([Y, U], axis=1)
         U = np.stack(as_input)[..., inner]
     if len(f) < width:
-        raise ValueError(f"data hold {len(f)} lines for a window of {width}; narrow the window")
-    wanted = np.ones(len(f), bool)
-    if band is not None:
-        wanted = (f >= band[0] * (1 - 1e-9)) & (f <= band[1] * (1 + 1e-9))
-    if not wanted.any():
-        raise ValueError(f"band={band} holds no DFT line; lines are {spacing:g} Hz apart")
-    return _Lines(U, Y, f, wanted, first)
+        raise InputError(f"data hold {len(f)} lines for a window of {width}; narrow the window")
+    return _Lines(U, Y, f, chosen(f, asked), first)
 
 
 def _windows(

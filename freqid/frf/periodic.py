@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray, positive, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, positive, whole
+from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.data.record_sets import as_records
@@ -74,18 +75,18 @@ def distortion(
     sets = as_records(records)
     first = sets[0]
     if (first.n_inputs, first.n_outputs) != (1, 1) or first.factor > 1:
-        raise ValueError(
+        raise InputError(
             f"records have {first.n_inputs} inputs and {first.n_outputs} outputs; distortion needs "
             "one of each, at one rate"
         )
     count = positive("period", period, "s") / first.dt
     n = round(count)
     if abs(count - n) > 1e-6 * count:
-        raise ValueError(f"period={period:g} s must be a whole number of dt={first.dt:g} s")
+        raise InputError(f"period={period:g} s must be a whole number of dt={first.dt:g} s")
     skip = whole("skip", skip, least=0)
     periods = min(r.n_samples for r in sets) // n - skip
     if periods < 2:
-        raise ValueError(
+        raise InputError(
             f"records hold {periods + skip} periods of {period:g} s, {skip} of them skipped; two "
             "are needed to tell the noise"
         )
@@ -94,16 +95,16 @@ def distortion(
         for signals in ([r.inputs[:, 0] for r in sets], [r.outputs[:, 0] for r in sets])
     )  # (realisations, periods, lines)
     f = np.arange(n // 2 + 1) / period
-    inside = f > 0 if band is None else (f >= band[0] - 1e-9) & (f <= band[1] + 1e-9) & (f > 0)
+    inside = chosen(f, as_band(band, first.nyquist), positive=True)
     level = np.abs(U.mean(axis=1)).mean(axis=0)
     excited = inside & (level > _SILENT * level.max())
     if not excited.any():
-        raise ValueError(f"input has no energy in band={band}; widen it")
+        raise InputError(f"input has no energy in band={band}; widen it")
     if len(sets) > 1:
         return _robust(first, f, U, Y, excited)
     quiet = inside & ~excited & (f < f[excited][-1])
     if not quiet.any():
-        raise ValueError(
+        raise InputError(
             "one realisation and no line left out: distortion cannot be told from the response; "
             "use several realisations, or a multisine with detection lines"
         )

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.fft
 
-from freqid.checks import ComplexArray, FloatArray, band
+from freqid.checks import ComplexArray, FloatArray, InputError, IntArray
+from freqid.data.band import Band, as_band
 from freqid.data.record import Record
 
 
@@ -72,7 +72,7 @@ def spectra(
 
     A record never changes, so it keeps its spectra: each is computed once, however many fits ask.
     """
-    inside = None if limits is None else band(limits, 0.5 / record.input_dt)
+    inside = as_band(limits, 0.5 / record.input_dt)
     key = inside, lifted and record.factor > 1
     known: dict[Any, Spectra] = record.__dict__.setdefault("_spectra", {})
     if key not in known:
@@ -87,11 +87,11 @@ def spectra(
 _REMEMBERED = 4
 
 
-def _compute(record: Record, limits: tuple[float, float] | None, lifted: bool) -> Spectra:
+def _compute(record: Record, limits: Band | None, lifted: bool) -> Spectra:
     M = record.factor
     N = len(record.u) // M
     if N < 2:
-        raise ValueError(f"record has {N} whole output samples; a spectrum needs two or more")
+        raise InputError(f"record has {N} whole output samples; a spectrum needs two or more")
     u, y = record.inputs[: N * M], record.outputs[:N]
     lines = _lines(record, N, limits)
     if M == 1:
@@ -106,7 +106,7 @@ def _compute(record: Record, limits: tuple[float, float] | None, lifted: bool) -
     if M > 1:
         Y = dft_at(list(y.T), lines)
     if not np.abs(U).max() > 1e-13 * np.sqrt(np.vdot(u, u)):
-        raise ValueError(
+        raise InputError(
             f"u is zero over band={limits}; an input without energy there identifies nothing"
         )
     step = 2 * np.pi / (N * record.dt)
@@ -122,7 +122,7 @@ def _compute(record: Record, limits: tuple[float, float] | None, lifted: bool) -
     )
 
 
-def dft_at(x: Sequence[FloatArray], lines: npt.NDArray[np.int64]) -> ComplexArray:
+def dft_at(x: Sequence[FloatArray], lines: IntArray) -> ComplexArray:
     """DFT of each of the signals x, (N,), at the lines, (signals, K).
 
     A narrow band of a long record is taken from the FFTs of P interleaved parts, which fit the
@@ -166,7 +166,7 @@ _LONG = 2**19
 _RUN = 4096
 
 
-def _twiddle(lines: npt.NDArray[np.int64], N: int) -> ComplexArray:
+def _twiddle(lines: IntArray, N: int) -> ComplexArray:
     """exp(−j2πk/N) from two short tables: k = k0 + 256 a + b, and the exponentials multiply."""
     offset = lines - lines[0]
     turn = -2j * np.pi / N
@@ -175,9 +175,7 @@ def _twiddle(lines: npt.NDArray[np.int64], N: int) -> ComplexArray:
     return coarse[offset // 256] * fine[offset % 256]
 
 
-def _aliases(
-    U: ComplexArray, lines: npt.NDArray[np.int64], N: int, M: int
-) -> tuple[ComplexArray, npt.NDArray[np.int64]]:
+def _aliases(U: ComplexArray, lines: IntArray, N: int, M: int) -> tuple[ComplexArray, IntArray]:
     """U/M (inputs, K, M) at the fast lines k + mN that fold onto each line, and their numbers."""
     folded = lines[:, None] + N * (np.arange(M) - (M - 1) // 2)
     folded[folded > N * M // 2] -= N * M
@@ -186,7 +184,7 @@ def _aliases(
     return values, folded
 
 
-def _lines(record: Record, N: int, limits: tuple[float, float] | None) -> npt.NDArray[np.int64]:
+def _lines(record: Record, N: int, limits: Band | None) -> IntArray:
     """The output lines, 0 to N/2, onto which a frequency inside the band folds."""
     last_line = N // 2
     if limits is None:
@@ -200,7 +198,7 @@ def _lines(record: Record, N: int, limits: tuple[float, float] | None) -> npt.ND
         inside = inside % N
         inside = np.unique(np.minimum(inside, N - inside))
     if len(inside) == 0:
-        raise ValueError(
+        raise InputError(
             f"band=({low:g}, {high:g}) Hz holds no DFT line; lines are {spacing:g} Hz apart: "
             "widen the band or use a longer record"
         )

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.linalg
 
 from freqid.checks import Array, ComplexArray, FloatArray
-from freqid.lti.holds.hold import Hold, PeriodicHold, Sampled, ZeroOrderHold
-from freqid.lti.holds.phi import phi_functions
-from freqid.lti.sampled import SampledPlant, StateSpace
+from freqid.lti.holds import Hold, PeriodicHold, Sampled, ZeroOrderHold, phi_functions
+from freqid.lti.sampled import SampledPlant
+from freqid.lti.state_space import StateSpace
 
 # beyond this the eigenbasis loses more digits than the fit can spare
 WORST_CONDITION = 1e5
@@ -52,7 +52,7 @@ class EigenBasis:
             phi, dphi = f.phi, f.dphi[..., None, :, :] * self.dA
             gamma, dgamma = self._input(f.gamma, f.dgamma)
             following = dfollowing = None
-            if hold.name != "zoh":
+            if f.gamma_next is not None and f.dgamma_next is not None:
                 following, dfollowing = self._input(f.gamma_next, f.dgamma_next)
             D, dD = self.D, self.dD
             if lift > 1:
@@ -81,10 +81,9 @@ class EigenBasis:
         change = (times[:, None, None] * difference[0])[:, None] * self.dA
         return value[0], change
 
-    def by_period(self, plant: SampledPlant) -> SampledPlant:
-        """The last parameter made the period of a zero-order hold: dΦ = AΦ dh, dΓ = ΦB dh."""
-        moved = plant.phi[:, None] * self.B
-        return _last_row(plant, np.diag(self.eigenvalues * plant.phi), moved)
+    def by_period(self, plant: SampledPlant) -> tuple[Array, Array]:
+        """Derivatives of Φ and Γ by the period of a zero-order hold: AΦ and ΦB."""
+        return np.diag(self.eigenvalues * plant.phi), plant.phi[:, None] * self.B
 
     def delayed(self, period: float, fraction: float) -> tuple[SampledPlant, Array]:
         """The plant behind a zero-order hold whose steps come ``fraction`` of a period late.
@@ -111,14 +110,6 @@ class EigenBasis:
         """f(A) B in the basis, and its derivative by Fréchet's product rule."""
         change = (df[..., None, :, :] * self.dA) @ self.B[..., None, :, :]
         return f[..., None] * self.B, change + f[..., None, :, None] * self.dB
-
-
-def _last_row(plant: SampledPlant, dphi: Array, dgamma: Array) -> SampledPlant:
-    return dataclasses.replace(
-        plant,
-        dphi=np.concatenate([plant.dphi[:-1], dphi[None]]),
-        dgamma=np.concatenate([plant.dgamma[:-1], dgamma[None]]),
-    )
 
 
 def _lifted_inputs(
@@ -186,7 +177,7 @@ class SchurBasis:
         if isinstance(hold, PeriodicHold):
             value, change = hold.sampled_derivatives(at.A, at.B, d.A, d.B)
             phi, gamma, dphi, dgamma = value.phi, value.gamma, change.phi, change.gamma
-            if hold.name != "zoh":
+            if hold.reaches_next:
                 following, dfollowing = value.gamma_next, change.gamma_next
             if lift > 1:
                 step = Sampled(phi, gamma, following), Sampled(dphi, dgamma, dfollowing)
@@ -243,11 +234,11 @@ class SchurBasis:
         )
         return plant, Qh @ zero.phi @ at.B
 
-    def by_period(self, plant: SampledPlant) -> SampledPlant:
-        """The last parameter made the period of a zero-order hold: dΦ = AΦ dh, dΓ = ΦB dh."""
+    def by_period(self, plant: SampledPlant) -> tuple[Array, Array]:
+        """Derivatives of Φ and Γ by the period of a zero-order hold: AΦ and ΦB."""
         Qh = self.basis.conj().T
         A, B = Qh @ self.at.A @ self.basis, Qh @ self.at.B
-        return _last_row(plant, A @ plant.phi, plant.phi @ B)
+        return A @ plant.phi, plant.phi @ B
 
 
 def _rescaled(system: StateSpace, scale: FloatArray) -> StateSpace:
@@ -293,7 +284,7 @@ def _state_scale(at: StateSpace) -> FloatArray:
 def basis_of(at: StateSpace, derivative: StateSpace | None = None) -> Basis:
     """Eigenvectors where they are good, Schur coordinates where they are not."""
     if derivative is None:
-        derivative = StateSpace(*(np.zeros((0, *M.shape)) for M in at))
+        derivative = at.still()
     eigen = eigenvectors(at)
     return SchurBasis(at, derivative) if eigen is None else EigenBasis(at, derivative, eigen)
 
@@ -304,7 +295,7 @@ def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> 
     The states are balanced as those of the first plant are, which the others resemble.
     """
     if derivative is None:
-        derivative = StateSpace(*(np.zeros((len(M), 0, *M.shape[1:])) for M in at))
+        derivative = at.still()
     scale = _state_scale(StateSpace(*(M[0] for M in at)))
     finite = np.asarray(np.isfinite(at.A).all(axis=(1, 2)))
     A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1])) * scale / scale[:, None]
@@ -319,3 +310,13 @@ def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> 
     eigenvalues = eigenvalues.astype(complex)
     eigenvalues[bad] = np.nan
     return EigenBasis(at, derivative, (eigenvalues, V * scale[:, None], inverse / scale))
+
+
+def eigenvalues_and_derivatives(A: FloatArray, dA: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Eigenvalues (n,) of A and their derivatives (n, P) along dA (P, n, n).
+
+    dλ = wᴴ dA v/(wᴴ v) (Wilkinson, The Algebraic Eigenvalue Problem, 1965).
+    """
+    eigenvalues, V = np.linalg.eig(A)
+    change: ComplexArray = np.einsum("ki,pij,jk->kp", np.linalg.inv(V), dA, V)
+    return eigenvalues.astype(complex), change

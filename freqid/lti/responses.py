@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many
-from freqid.lti.holds.hold import BandLimited, Hold, PeriodicHold, ZeroOrderHold
-from freqid.lti.sampled import SampledPlant, StateSpace
+from freqid.lti.bases import Basis, eigenbasis_of_many
+from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold
+from freqid.lti.sampled import Moving, SampledPlant
+from freqid.lti.state_space import StateSpace
 
 
 @dataclass(frozen=True)
@@ -64,13 +62,21 @@ def transfer(plant: SampledPlant, z: ComplexArray) -> ComplexArray:
 
 
 def response_and_derivatives(
-    plant: SampledPlant, z: ComplexArray, dz: ComplexArray | None = None
+    plant: SampledPlant,
+    z: ComplexArray,
+    moving: Moving | None = None,
+    factor: ComplexArray | float = 1.0,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response (…, outputs, inputs, lines) and exact derivatives (…, P, outputs, inputs, lines)."""
+    """Response (…, outputs, inputs, lines) and exact derivatives (…, P, outputs, inputs, lines).
+
+    ``factor`` multiplies what drives the states, as in a plane other than that of z.
+    """
     m = plant.gamma.shape[-1]
     U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, z.shape[-1]))
-    x = plant.solve(z, plant.drive(z, U))
-    return plant.output(x, U), plant.sensitivity(z, plant.output_rows(z), x, U, dz=dz)
+    driving = U if isinstance(factor, float) else U * factor
+    x = plant.solve(z, plant.drive(z, driving))
+    w = plant.output_rows(z)
+    return plant.output(x, U), plant.sensitivity(z, w, x, driving, direct=U, moving=moving)
 
 
 def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArray:
@@ -80,34 +86,3 @@ def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArra
     m = at.B.shape[-1]
     U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
     return plant.output(plant.solve(z, plant.drive(z, U)), U)
-
-
-def frequency_response(
-    at: StateSpace,
-    omega: Any,
-    hold: Hold | None = None,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
-) -> FrequencyResponse:
-    """Response of the plant at ``omega`` (rad/s), continuous or through a hold."""
-    omega = np.atleast_1d(np.asarray(omega, dtype=float))
-    if omega.ndim != 1 or not np.isfinite(omega).all():
-        raise ValueError(
-            f"omega has shape {omega.shape}; expected finite frequencies (rad/s), (K,)"
-        )
-    if hold is not None and not isinstance(hold, Hold):
-        raise ValueError(
-            f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
-            "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
-        )
-    between = BandLimited() if hold is None else hold
-    plant, z = basis_of(at).through(between), points(omega, between)
-    dt = hold.period if isinstance(hold, PeriodicHold) else 0.0
-    return FrequencyResponse(
-        omega / (2 * np.pi),
-        transfer(plant, z),
-        dt=dt,
-        hold=hold,
-        input_names=inputs,
-        output_names=outputs,
-    )

@@ -11,31 +11,33 @@ points z of its own, (…, lines).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray
+from freqid.checks import Array, ComplexArray
 
 # lines worked on at once: their products stay in the processor's cache
 BLOCK = 4096
 
 
-class StateSpace(NamedTuple):
-    """A (n, n), B (n, m), C (p, n), D (p, m) of x' = A x + B u, y = C x + D u."""
+class Moving(NamedTuple):
+    """z itself changes by ``dz`` (lines,) with one parameter: an estimated period of the hold."""
 
-    A: FloatArray
-    B: FloatArray
-    C: FloatArray
-    D: FloatArray
+    parameter: int
+    dz: ComplexArray
 
 
-class Linearisation(NamedTuple):
-    """The matrices at one point and their derivatives, with the parameters as leading axis."""
+class Term(NamedTuple):
+    """``derivative`` (…, P, a, b) times the product left (…, a, lines) ⊗ right (…, b, channels,
+    lines); a left of None is one.
+    """
 
-    at: StateSpace
-    derivative: StateSpace
+    derivative: Array
+    left: ComplexArray | None
+    right: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -106,68 +108,55 @@ class SampledPlant:
         U: ComplexArray | None,
         aliases: int = 1,
         direct: ComplexArray | None = None,
-        dz: ComplexArray | None = None,
+        moving: Moving | None = None,
     ) -> ComplexArray:
         """dy for each parameter, (…, P, outputs, channels, lines / aliases).
 
-        ``w`` is ``output_rows(z)`` and ``x`` the state. Runs of ``aliases`` lines are summed: the
-        products of w with x and U do not depend on the parameter, so they are summed before the
-        parameters enter in one matrix product. With many inputs dΓ u is formed first, which takes
-        fewer products than w and u together. ``direct`` is the input that D multiplies, where it
-        is not U; ``dz`` the derivative of z itself by the last parameter.
+        ``w`` is ``output_rows(z)`` and ``x`` the state. Every term of dy is a derivative times a
+        product of lines that does not depend on the parameter; the products are written one under
+        the other, summed over runs of ``aliases`` lines, and meet the derivatives in one
+        contraction. ``direct`` is the input that D multiplies, where it is not U; ``moving`` says
+        how z itself changes.
         """
-        n, p = w.shape[-2], w.shape[-3]
-        z_at = z[..., None, None, :]
-        lead, E, lines = x.shape[:-3], x.shape[-2], x.shape[-1]
-        if lines > BLOCK and aliases == 1:
-            return self._in_blocks(z, w, x, U, direct, dz)
-        P = self.dphi.shape[-3]
-        moving_C, moving_D = self.dC.any(), U is not None and self.dD.any()
-        push = None
-        if U is not None and len(U) > 2:
-            push = _times(self.dgamma, U)
-            if self.dgamma_next is not None:
-                following = z_at * U
-                push = push + _times(self.dgamma_next, following[:, None] if lead else following)
-        driven_by_U = U is not None and push is None
-        m = len(U) if U is not None else 0
-        foh = self.dgamma_next is not None
-        n_rows = n * n + (n * m * (1 + foh) if driven_by_U else 0)
-        n_rows += (n if moving_C else 0) + (m if moving_D else 0)
-        rows = []
-        for o in range(p):
-            wo = w[..., o, :, None, :]
-            F = np.empty((*lead, n_rows, E, lines), complex)
-            products = F[..., : n * n, :, :].reshape(*lead, n, n, E, lines)
-            np.multiply(wo[..., None, :], x[..., None, :, :, :], out=products)
-            weights, at = [self.dphi.reshape(*lead, P, n * n)], n * n
-            if driven_by_U:
-                wu = F[..., at : at + n * m, :, :]
-                wu[...] = (wo[..., None, :] * U).reshape(*lead, n * m, E, lines)
-                weights.append(self.dgamma.reshape(*lead, P, n * m))
-                at += n * m
-                if self.dgamma_next is not None:
-                    F[..., at : at + n * m, :, :] = z_at * wu
-                    weights.append(self.dgamma_next.reshape(*lead, P, n * m))
-                    at += n * m
-            if moving_C:
-                F[..., at : at + n, :, :] = x
-                weights.append(self.dC[..., o, :])
-                at += n
-            if moving_D:
-                F[..., at:, :, :] = U if direct is None else direct
-                weights.append(self.dD[..., o, :])
-            F = sum_runs(F, aliases)
-            flat = F.reshape(*lead, F.shape[-3], -1)
-            row = (np.concatenate(weights, axis=-1) @ flat).reshape(*lead, P, E, lines // aliases)
+        if x.shape[-1] > BLOCK and aliases == 1:
+            return self._in_blocks(z, w, x, U, direct, moving)
+        # with many inputs dΓ u is formed first, which takes fewer products than w and u together
+        push = self._push(z, U) if U is not None and len(U) > 2 else None
+        outputs = []
+        for o in range(w.shape[-3]):
+            terms = self._terms(o, z, w[..., o, :, :], x, None if push is not None else U)
+            if U is not None and self.dD.any():
+                terms.append(Term(self.dD[..., o, None, :], None, U if direct is None else direct))
+            dy = _contracted(terms, x.shape, aliases)
             if push is not None:
-                driven = (w[..., None, o, :, None, :] * push).sum(axis=-3)
-                row = row + sum_runs(driven, aliases)
-            if dz is not None:
+                dy += sum_runs((w[..., None, o, :, None, :] * push).sum(axis=-3), aliases)
+            if moving is not None:
                 # d(zI − Φ)⁻¹ = −R (dz I − dΦ) R
-                row[..., -1, :, :] -= sum_runs((wo * x).sum(axis=-3) * dz, aliases)
-            rows.append(row)
-        return rows[0][..., None, :, :] if p == 1 else np.stack(rows, axis=-3)
+                seen = (w[..., o, :, None, :] * x).sum(axis=-3)
+                dy[..., moving.parameter, :, :] -= sum_runs(seen * moving.dz, aliases)
+            outputs.append(dy)
+        return outputs[0][..., None, :, :] if len(outputs) == 1 else np.stack(outputs, axis=-3)
+
+    def _terms(
+        self, o: int, z: ComplexArray, w: ComplexArray, x: ComplexArray, U: ComplexArray | None
+    ) -> list[Term]:
+        """C R (dΦ x + dΓ u + dΓ⁺ z u) + dC x of one output, ``w`` being its row of C R."""
+        terms = [Term(self.dphi, w, x)]
+        if U is not None:
+            terms.append(Term(self.dgamma, w, U))
+            if self.dgamma_next is not None:
+                terms.append(Term(self.dgamma_next, z[..., None, :] * w, U))
+        if self.dC.any():
+            terms.append(Term(self.dC[..., o, None, :], None, x))
+        return terms
+
+    def _push(self, z: ComplexArray, U: ComplexArray) -> ComplexArray:
+        """dΓ U + dΓ⁺ z U for each parameter, (…, P, n, channels, lines)."""
+        push = _times(self.dgamma, U)
+        if self.dgamma_next is None:
+            return push
+        following = z[..., None, None, :] * U
+        return push + _times(self.dgamma_next, following[:, None] if z.ndim > 1 else following)
 
     def _in_blocks(
         self,
@@ -176,7 +165,7 @@ class SampledPlant:
         x: ComplexArray,
         U: ComplexArray | None,
         direct: ComplexArray | None,
-        dz: ComplexArray | None,
+        moving: Moving | None,
     ) -> ComplexArray:
         shape = (self.dphi.shape[-3], w.shape[-3], *x.shape[-2:])
         dy = np.empty((*x.shape[:-3], *shape), complex)
@@ -188,9 +177,29 @@ class SampledPlant:
                 x[..., part],
                 None if U is None else U[..., part],
                 direct=None if direct is None else direct[..., part],
-                dz=None if dz is None else dz[part],
+                moving=None if moving is None else Moving(moving.parameter, moving.dz[part]),
             )
         return dy
+
+
+def _contracted(terms: Sequence[Term], shape: tuple[int, ...], aliases: int) -> ComplexArray:
+    """Σ derivative · (left ⊗ right), (…, P, channels, lines / aliases), for states of a shape."""
+    *lead, _, channels, lines = shape
+    P = terms[0].derivative.shape[-3]
+    sizes = [t.derivative.shape[-2] * t.derivative.shape[-1] for t in terms]
+    products = np.empty((*lead, sum(sizes), channels, lines), complex)
+    at = 0
+    for t, size in zip(terms, sizes, strict=True):
+        rows, columns = t.derivative.shape[-2:]
+        out = products[..., at : at + size, :, :].reshape(*lead, rows, columns, channels, lines)
+        left = 1.0 if t.left is None else t.left[..., :, None, None, :]
+        np.multiply(left, t.right[..., None, :, :, :], out=out)
+        at += size
+    weights = [t.derivative.reshape(*lead, P, size) for t, size in zip(terms, sizes, strict=True)]
+    summed = sum_runs(products, aliases)
+    flat = summed.reshape(*lead, summed.shape[-3], -1)
+    dy: ComplexArray = np.concatenate(weights, axis=-1) @ flat
+    return dy.reshape(*lead, P, channels, lines // aliases)
 
 
 def _times(M: Array, x: ComplexArray) -> ComplexArray:

@@ -11,19 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, unknown
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.lti.bases import basis_of
-from freqid.lti.holds.hold import BandLimited, Hold
-from freqid.lti.responses import frequency_response, points, response_and_derivatives
-from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.checks import FloatArray, InputError, channel_names, unknown
+from freqid.lti.state_space import Linearisation, StateSpace
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction
+from freqid.models.model import Model
 from freqid.models.parameter import Parameter
 from freqid.models.ties import Ties
 
 
 @dataclass(frozen=True)
-class GreyBox:
+class GreyBox(Model):
     """A continuous-time plant whose matrices are functions of physical parameters.
 
     Args:
@@ -48,6 +45,9 @@ class GreyBox:
     {'tau': 0.02}
     """
 
+    dt = 0.0
+    delay = 0.0
+
     matrices: Matrices
     parameters: Sequence[Parameter]
     outputs: Sequence[str] | None = None
@@ -63,17 +63,19 @@ class GreyBox:
         object.__setattr__(self, "parameters", parameters)
         for p in parameters:
             if not isinstance(p, Parameter):
-                raise ValueError(f"parameters holds {p!r}; expected Parameter objects")
+                raise InputError(f"parameters holds {p!r}; expected Parameter objects")
         names = [p.name for p in parameters]
         if len(set(names)) < len(names):
-            raise ValueError(f"parameters={names} has a name twice; names must differ")
+            raise InputError(f"parameters={names} has a name twice; names must differ")
         ties = Ties(self.ties, names)
         nominal = ties.resolve({p.name: p.value for p in parameters})
         function = MatrixFunction(self.matrices, ties, self.vectorized, self.jacobian, nominal)
         object.__setattr__(self, "_function", function)
         at = self.state_space()
-        object.__setattr__(self, "outputs", _channels("outputs", self.outputs, at.C.shape[0], "y"))
-        object.__setattr__(self, "inputs", _channels("inputs", self.inputs, at.B.shape[1], "u"))
+        object.__setattr__(
+            self, "outputs", channel_names("outputs", self.outputs, at.C.shape[0], "y")
+        )
+        object.__setattr__(self, "inputs", channel_names("inputs", self.inputs, at.B.shape[1], "u"))
 
     @property
     def values(self) -> dict[str, float]:
@@ -85,16 +87,6 @@ class GreyBox:
         """The parameters that a fit moves: neither fixed nor tied."""
         return tuple(p for p in self.parameters if not p.fixed and p.name not in self.ties)
 
-    @property
-    def n_inputs(self) -> int:
-        """Number of inputs."""
-        return len(self.inputs or ())
-
-    @property
-    def n_outputs(self) -> int:
-        """Number of outputs."""
-        return len(self.outputs or ())
-
     def __getitem__(self, name: str) -> float:
         self.parameter(name)
         return self.values[name]
@@ -104,7 +96,7 @@ class GreyBox:
         for p in self.parameters:
             if p.name == name:
                 return p
-        raise ValueError(unknown("parameter", name, self.values))
+        raise InputError(unknown("parameter", name, self.values))
 
     def with_values(self, **values: float) -> GreyBox:
         """The same plant at other parameter values. Raises ValueError for an unknown name.
@@ -150,7 +142,7 @@ class GreyBox:
             self.parameter(name)
         for name in self.ties:
             if "value" in changes.get(name, {}) and changes[name]["value"] != self.values[name]:
-                raise ValueError(
+                raise InputError(
                     f"parameter {name} is tied to {self.ties[name]!r}; set the parameters it is of"
                 )
         new = tuple(
@@ -177,43 +169,9 @@ class GreyBox:
         full = {n: columns.get(n, np.full(count, v)) for n, v in self.values.items()}
         return self._function.at_many(full)
 
-    def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
-        """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
-
-        Returns a FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega
-        that is not finite or a hold that is not one.
-
-        >>> import freqid as fq
-        >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
-        np.float64(0.7071)
-        """
-        return frequency_response(self.state_space(), omega, hold, self.inputs, self.outputs)
-
-    def response_with_variance(
-        self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
-    ) -> FrequencyResponse:
-        """Response and its variance J Σ Jᴴ, to first order in the covariance of ``names``.
-
-        Names that are not the plant's own, such as an estimated hold's period, do not count.
-        """
-        own = [i for i, name in enumerate(names) if name in self.values]
-        names, covariance = [names[i] for i in own], covariance[np.ix_(own, own)]
-        lin = self.linearise(self.values, names)
-        frf = self.frequency_response(omega, hold)
-        between = BandLimited() if hold is None else hold
-        plant = basis_of(*lin).through(between)
-        _, J = response_and_derivatives(plant, points(frf.omega, between))
-        known = np.where(np.isfinite(covariance), covariance, 0)
-        variance = np.einsum("apmk,ab,bpmk->pmk", J.conj(), known, J).real
-        return dataclasses.replace(frf, variance=variance)
-
-    def to_control(self) -> Any:
-        """The plant as a continuous ``control.StateSpace``."""
-        import control
-
-        return control.ss(
-            *self.state_space(), inputs=list(self.inputs or ()), outputs=list(self.outputs or ())
-        )
+    def linearisation(self) -> Linearisation:
+        """The matrices, and their derivatives by the free parameters."""
+        return self.linearise(self.values, [p.name for p in self.free_parameters])
 
     def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
         """Matrices at ``values`` and their derivatives by the parameters ``names``.
@@ -244,14 +202,3 @@ class GreyBox:
             f"<table><caption>{escape(self.name)}</caption>"
             f"<tr><th>parameter</th><th>value</th><th>unit</th><th></th></tr>{rows}</table>"
         )
-
-
-def _channels(name: str, given: Sequence[str] | None, count: int, letter: str) -> tuple[str, ...]:
-    if given is None:
-        return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
-    names = (given,) if isinstance(given, str) else tuple(given)
-    if len(names) != count:
-        raise ValueError(
-            f"{name}={list(names)} names {len(names)} channels; the matrices have {count}"
-        )
-    return names

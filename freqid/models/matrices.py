@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, FloatArray
-from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.checks import Array, FloatArray, InputError
+from freqid.lti.state_space import Linearisation, StateSpace
 from freqid.models.ties import Ties
 
 Matrices = Callable[..., Sequence[Any]]
@@ -44,7 +44,7 @@ class MatrixFunction:
             matrices = self.matrices(**resolved)
         except Exception as error:  # the user's function may raise anything
             where = ", ".join(f"{k}={v:g}" for k, v in resolved.items())
-            raise ValueError(f"the model cannot be computed at {where}: {error}") from error
+            raise InputError(f"the model cannot be computed at {where}: {error}") from error
         return _shaped(matrices, resolved)
 
     def at_many(self, columns: Mapping[str, FloatArray]) -> StateSpace:
@@ -89,7 +89,7 @@ class MatrixFunction:
                 if slope == 0:
                     continue
                 if other not in by:
-                    raise ValueError(f"jacobian returned no derivative by {other!r}")
+                    raise InputError(f"jacobian returned no derivative by {other!r}")
                 for part, d in zip(total, by[other], strict=True):
                     part[i] += slope * np.asarray(0.0 if d is None else d, dtype=float)
         return StateSpace(*total)
@@ -201,18 +201,18 @@ def _dense(matrices: Sequence[Any], dtype: type) -> list[Array]:
 def _shaped(matrices: Sequence[Any], values: Mapping[str, float]) -> StateSpace:
     """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
     if len(matrices) != 4:
-        raise ValueError(f"matrices returned {len(matrices)} items; expected A, B, C, D")
+        raise InputError(f"matrices returned {len(matrices)} items; expected A, B, C, D")
     shapes = [np.shape(M) for M in matrices]
     text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
     expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"
     if any(len(shape) != 2 for shape in shapes[:3]):
-        raise ValueError(f"{text}; {expected}")
+        raise InputError(f"{text}; {expected}")
     out = StateSpace(*_dense(matrices, float))
     n, m, p = out.A.shape[0], out.B.shape[1], out.C.shape[0]
     wanted = ((n, n), (n, m), (p, n), (p, m))
     if any(M.shape != shape for M, shape in zip(out, wanted, strict=True)):
-        raise ValueError(f"{text}; {expected}")
+        raise InputError(f"{text}; {expected}")
     if not all(np.isfinite(M).all() for M in out):
         at = ", ".join(f"{k}={v:g}" for k, v in values.items())
-        raise ValueError(f"matrices are not finite at {at}; change the values or the function")
+        raise InputError(f"matrices are not finite at {at}; change the values or the function")
     return out

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, whole
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.lti.bases import basis_of
-from freqid.lti.holds.hold import (
+from freqid.lti.holds import (
     BandLimited,
-    FirstOrderHold,
     Hold,
     PeriodicHold,
-    ZeroOrderHold,
     as_hold,
 )
 from freqid.lti.responses import transfer
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
+from freqid.models.model import Model
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,10 @@ class OutputError:
 
 
 @dataclass(frozen=True, eq=False)
-class DiscreteModel:
+class DiscreteModel(Model):
     """A sampled model x(k+1) = Φ x + Γ u, y = C x + D u at the period of its hold (s)."""
+
+    delay = 0.0
 
     matrices: StateSpace
     dt: float
@@ -53,15 +55,29 @@ class DiscreteModel:
     input_names: Sequence[str]
     output_names: Sequence[str]
 
+    def state_space(self) -> StateSpace:
+        """Φ, Γ, C, D."""
+        return self.matrices
+
+    @property
+    def inputs(self) -> Sequence[str]:  # type: ignore[override]
+        """Names of the inputs."""
+        return self.input_names
+
+    @property
+    def outputs(self) -> Sequence[str]:  # type: ignore[override]
+        """Names of the outputs."""
+        return self.output_names
+
+    @property
+    def spec(self) -> OutputError:
+        """The black box of which this is one: order and feedthrough."""
+        return OutputError(self.order, bool(self.matrices.D.any()))
+
     @property
     def order(self) -> int:
         """Number of states."""
         return len(self.matrices.A)
-
-    @property
-    def poles(self) -> ComplexArray:
-        """Poles in the z plane, (order,)."""
-        return np.linalg.eigvals(self.matrices.A).astype(complex)
 
     @property
     def zeros(self) -> ComplexArray:
@@ -78,13 +94,13 @@ class DiscreteModel:
         """b(z) from one input to one output, highest power first, (order + 1,)."""
         return numerator_of(self.matrices, self.denominator(), output, input)
 
-    def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
+    def frequency_response(self, omega: ArrayLike, hold: Hold | None = None) -> FrequencyResponse:
         """Response at ``omega`` (rad/s), taken at exp(jω·dt)."""
-        omega = np.atleast_1d(np.asarray(omega, dtype=float))
+        at = np.atleast_1d(np.asarray(omega, dtype=float))
         plant = basis_of(self.matrices).through(BandLimited())
         return FrequencyResponse(
-            omega / (2 * np.pi),
-            transfer(plant, np.exp(1j * omega * self.dt)),
+            at / (2 * np.pi),
+            transfer(plant, np.exp(1j * at * self.dt)),
             dt=self.dt,
             hold=self.hold,
             input_names=self.input_names,
@@ -103,45 +119,6 @@ class DiscreteModel:
         names += [f"a{k}" for k in range(1, self.order + 1)]
         return names, coefficients_of(self.matrices)
 
-    def response_with_variance(
-        self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
-    ) -> FrequencyResponse:
-        """Response and its variance, to first order in the covariance of the coefficients."""
-        frf = self.frequency_response(omega)
-        p, m, K = frf.response.shape
-        z = np.exp(1j * frf.omega * self.dt)
-        n = self.order
-        a = np.polyval(self.denominator(), z)
-        first = 0 if self.matrices.D.any() else 1
-        per_pair = n + 1 - first
-        variance = np.empty((p, m, K))
-        for o in range(p):
-            for i in range(m):
-                J = np.zeros((len(names), K), complex)
-                begin = (o * m + i) * per_pair
-                for k in range(first, n + 1):
-                    J[begin + k - first] = z ** (n - k) / a
-                for k in range(1, n + 1):
-                    J[p * m * per_pair + k - 1] = -frf.response[o, i] * z ** (n - k) / a
-                variance[o, i] = np.einsum("ak,ab,bk->k", J.conj(), covariance, J).real
-        return FrequencyResponse(
-            frf.frequency,
-            frf.response,
-            dt=frf.dt,
-            hold=frf.hold,
-            variance=variance,
-            input_names=frf.input_names,
-            output_names=frf.output_names,
-        )
-
-    def to_control(self) -> Any:
-        """The model as a discrete ``control.StateSpace``."""
-        import control
-
-        return control.ss(
-            *self.matrices, self.dt, inputs=list(self.input_names), outputs=list(self.output_names)
-        )
-
     def to_continuous(self, hold: Hold | str | None = None) -> Any:
         """The continuous plant that this hold samples to the model, a ``control.StateSpace``.
 
@@ -152,7 +129,7 @@ class DiscreteModel:
 
         between = as_hold(self.hold if hold is None else hold, self.dt)
         if isinstance(between, PeriodicHold) and abs(between.period / self.dt - 1) > 1e-9:
-            raise ValueError(
+            raise InputError(
                 f"hold={between!r} must have the model's own period, {self.dt:g} s; "
                 f"use {type(between).__name__}({self.dt:g})"
             )
@@ -196,27 +173,22 @@ def coefficients_of(matrices: StateSpace) -> FloatArray:
 def invert_hold(sampled: StateSpace, dt: float, hold: Hold) -> StateSpace:
     """The continuous plant whose sampled matrices under ``hold`` are these.
 
-    Zero-order hold: the matrix logarithm of [[Φ, Γ], [0, I]]. First-order hold: A from the
-    logarithm of Φ, then B from Γ + ΦΓ⁺ and D from C Γ⁺. Band-limited: the plant whose impulse
-    response, times dt, is the model's (impulse invariance).
+    A from the logarithm of Φ; under a periodic hold B from Γ + ΦΓ⁺, which is linear in B, and D
+    from C Γ⁺. Band-limited: the plant whose impulse response, times dt, is the model's (impulse
+    invariance).
     """
     Phi, Gamma, C, D = sampled
-    n, m = Gamma.shape
     poles = np.linalg.eigvals(Phi)
     bad = (np.abs(poles.imag) <= 1e-9 * np.abs(poles)) & (poles.real <= 1e-12)
     if bad.any():
-        raise ValueError(
+        raise InputError(
             f"the model has a pole at z={poles[bad][0].real:.6g}, on the negative real axis or at "
             f"zero: no real continuous plant samples to it under {hold!r}; lower the order or "
             "sample faster"
         )
-    if isinstance(hold, ZeroOrderHold):
-        big = np.block([[Phi, Gamma], [np.zeros((m, n)), np.eye(m)]])
-        generator = _real_log(big) / dt
-        return StateSpace(generator[:n, :n], generator[:n, n:], C, D)
     A = _real_log(Phi) / dt
-    if isinstance(hold, FirstOrderHold):
-        unit = hold.sampled(A, np.eye(n))
+    if isinstance(hold, PeriodicHold):
+        unit = hold.sampled(A, np.eye(len(A)))
         B = np.linalg.solve(unit.gamma + Phi @ unit.gamma_next, Gamma)
         return StateSpace(A, B, C, D - C @ unit.gamma_next @ B)
     B = np.linalg.solve(Phi, Gamma) / dt
@@ -227,5 +199,5 @@ def invert_hold(sampled: StateSpace, dt: float, hold: Hold) -> StateSpace:
 def _real_log(M: FloatArray) -> FloatArray:
     logarithm = scipy.linalg.logm(M)
     if np.abs(np.imag(logarithm)).max() > 1e-8 * max(np.abs(logarithm).max(), 1e-300):
-        raise ValueError("the model has no real logarithm: no real continuous plant samples to it")
+        raise InputError("the model has no real logarithm: no real continuous plant samples to it")
     return np.real(logarithm)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from freqid.checks import finite
+from freqid.checks import InputError, finite
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class Parameter:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
-            raise ValueError(f"name={self.name!r} must be a non-empty string")
+            raise InputError(f"name={self.name!r} must be a non-empty string")
         object.__setattr__(self, "value", finite(f"parameter {self.name}", self.value))
         if not self.lower < self.upper:
-            raise ValueError(
+            raise InputError(
                 f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"
             )
         if not self.lower <= self.value <= self.upper:
-            raise ValueError(
+            raise InputError(
                 f"parameter {self.name}={self.value:g} lies outside its bounds "
                 f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
             )
@@ -47,15 +47,15 @@ class Parameter:
             try:
                 mean, std = (float(v) for v in self.prior)
             except (TypeError, ValueError):
-                raise ValueError(
+                raise InputError(
                     f"parameter {self.name}: prior={self.prior!r} must be (mean, std)"
                 ) from None
             if not (math.isfinite(mean) and math.isfinite(std) and std > 0):
-                raise ValueError(
+                raise InputError(
                     f"parameter {self.name}: prior={self.prior!r} must have a finite mean and a "
                     "positive standard deviation"
                 )
             if self.fixed:
-                raise ValueError(
+                raise InputError(
                     f"parameter {self.name} is fixed and has a prior; free it or drop the prior"
                 )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import choice, whole
+from freqid.checks import InputError, choice, whole
 from freqid.models.grey_box import GreyBox
 from freqid.models.parameter import Parameter
 
@@ -86,7 +86,7 @@ def drivetrain(
     for name in names:
         choice("outputs", name, _DRIVETRAIN_OUTPUTS)
     if not names:
-        raise ValueError(f"outputs=[] is empty; expected any of {', '.join(_DRIVETRAIN_OUTPUTS)}")
+        raise InputError(f"outputs=[] is empty; expected any of {', '.join(_DRIVETRAIN_OUTPUTS)}")
     # the paper's axis, its arm and gear shared out so that the modes lie apart
     parameters = [Parameter("J1", 9e-4, unit="kg m²")]
     parameters += [Parameter(f"J{i}", 22.0 / n / 2 ** (i - 2), "kg m²") for i in range(2, n + 1)]

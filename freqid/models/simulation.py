@@ -8,12 +8,10 @@ import numpy as np
 import scipy.linalg
 import scipy.signal
 
-from freqid.checks import Array, FloatArray, positive, samples
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive, samples
 from freqid.data.record import Record
-from freqid.lti.bases import basis_of
-from freqid.lti.holds.hold import Hold, PeriodicHold, Sampled, as_hold
-from freqid.lti.responses import points, transfer
-from freqid.lti.sampled import StateSpace
+from freqid.lti.holds import Hold, PeriodicHold, Sampled, as_hold
+from freqid.models.conversion import as_model
 
 
 def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
@@ -21,7 +19,7 @@ def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
 
     Args: phi (n, n), forcing (…, n, N), initial (…, n).
     """
-    S, Q = scipy.linalg.schur(phi, output="complex")
+    S, Q = _triangular(phi)
     f = np.einsum("ji,...jk->...ik", Q.conj(), forcing)
     forward = np.ones(len(S), bool)
     return np.einsum("ij,...jk->...ik", Q, _chain(S, f, initial @ Q.conj(), forward)).real
@@ -35,7 +33,7 @@ class FreeMotion:
     """
 
     def __init__(self, phi: FloatArray, n_samples: int) -> None:
-        self.S, self.Q = scipy.linalg.schur(phi, output="complex")
+        self.S, self.Q = _triangular(phi)
         self.forward = np.abs(np.diag(self.S)) <= 1
         n = len(phi)
         quiet = np.zeros((n, n, n_samples), complex)
@@ -48,6 +46,14 @@ class FreeMotion:
         f = np.einsum("ji,...jk->...ik", self.Q.conj(), forcing)
         x = _chain(self.S, f, np.zeros(f.shape[:-1], complex), self.forward)
         return np.einsum("ij,...jk->...ik", self.Q, x).real
+
+
+def _triangular(phi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Schur's form S and basis Q; LinAlgError where a plant grows beyond all numbers."""
+    if not np.isfinite(phi).all():
+        raise np.linalg.LinAlgError("the sampled matrices are not finite")
+    S, Q = scipy.linalg.schur(phi, output="complex")
+    return S, Q
 
 
 def _chain(S: Array, f: Array, boundary: Array, forward: Array) -> Array:
@@ -106,35 +112,31 @@ def simulate(
     u = samples("u", u)
     between = as_hold("zoh" if hold is None else hold, dt)
     if isinstance(between, PeriodicHold) and abs(between.period - dt) > 1e-9 * dt:
-        raise ValueError(
+        raise InputError(
             f"hold={between!r} must have the period dt={dt:g} s of the input's samples"
         )
-    if getattr(getattr(model, "model", model), "delay", 0):
-        raise ValueError("model has a delay; simulate it without and shift the input by hand")
-    system, discrete_dt = _state_space(model)
+    plant = as_model(model)
+    if plant.delay:
+        raise InputError("model has a delay; simulate it without and shift the input by hand")
+    system = plant.state_space()
     inputs = u.reshape(len(u), -1)
     n, m = system.B.shape
     if inputs.shape[1] != m:
-        raise ValueError(f"u has {inputs.shape[1]} channels and the model {m} inputs; give as many")
+        raise InputError(f"u has {inputs.shape[1]} channels and the model {m} inputs; give as many")
     x0 = np.zeros(n) if initial_state is None else np.asarray(initial_state, dtype=float)
     if x0.shape != (n,):
-        raise ValueError(f"initial_state has shape {x0.shape}; the model has {n} states")
-    if discrete_dt and abs(discrete_dt - dt) > 1e-9 * dt:
-        raise ValueError(f"dt={dt:g} s, but the model is discrete with dt={discrete_dt:g} s")
-
-    sampled = None
-    if discrete_dt:
-        sampled = Sampled(system.A, system.B, np.zeros_like(system.B))
-    elif isinstance(between, PeriodicHold):
-        sampled = between.sampled(system.A, system.B)
-    if sampled is not None:
+        raise InputError(f"initial_state has shape {x0.shape}; the model has {n} states")
+    if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
+        raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
+    if plant.dt or isinstance(between, PeriodicHold):
+        sampled = plant.sampled(between)
         x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
         y = (system.C @ x + system.D @ inputs.T).T
     else:
         if initial_state is not None:
-            raise ValueError("initial_state has no meaning for a band-limited, periodic input")
+            raise InputError("initial_state has no meaning for a band-limited, periodic input")
         omega = 2 * np.pi * np.fft.rfftfreq(len(u), dt)
-        G = transfer(basis_of(system).through(between), points(omega, between))
+        G = plant.frequency_response(omega, between).response
         U = np.fft.rfft(inputs, axis=0)
         y = np.fft.irfft(np.einsum("pmk,km->kp", G, U), n=len(u), axis=0)
     return Record(
@@ -145,23 +147,3 @@ def simulate(
         input_names=input_names,
         output_names=output_names,
     )
-
-
-def _state_space(model: Any) -> tuple[StateSpace, float]:
-    """Matrices of anything that simulates, and its sample time (0 for continuous time)."""
-    model = getattr(model, "model", model)
-    if hasattr(model, "state_space"):
-        return model.state_space(), 0.0
-    if hasattr(model, "to_control"):
-        model = model.to_control()
-    import control
-
-    if not isinstance(model, control.lti.LTI):
-        raise ValueError(
-            f"model={type(model).__name__} is not a model, an estimate or a control system"
-        )
-    system = control.ss(model)
-    dt = 1.0 if system.dt is True else float(system.dt or 0.0)
-    return StateSpace(
-        *(np.asarray(M, dtype=float) for M in (system.A, system.B, system.C, system.D))
-    ), dt

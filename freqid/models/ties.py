@@ -9,7 +9,7 @@ from typing import Any
 import asteval
 import numpy as np
 
-from freqid.checks import unknown
+from freqid.checks import InputError, unknown
 
 
 @cache
@@ -30,19 +30,19 @@ class Ties:
         self._parsed: dict[str, Any] = {}
         for name, text in self.expressions.items():
             if name not in names:
-                raise ValueError(unknown("ties", name, names))
+                raise InputError(unknown("ties", name, names))
             try:
                 node = _interpreter().parse(text)
             except (SyntaxError, TypeError):
                 _interpreter().error = []
-                raise ValueError(
+                raise InputError(
                     f"tie {name}={text!r} is not an expression; expected one like '2 * Jm'"
                 ) from None
             for other in asteval.get_ast_names(node):
                 if other in self.expressions:
-                    raise ValueError(f"tie {name}={text!r} refers to {other}, which is tied itself")
+                    raise InputError(f"tie {name}={text!r} refers to {other}, which is tied itself")
                 if other not in names and other not in _interpreter().symtable:
-                    raise ValueError(f"tie {name}={text!r}: {unknown('parameter', other, names)}")
+                    raise InputError(f"tie {name}={text!r}: {unknown('parameter', other, names)}")
             self._parsed[name] = node
 
     def resolve(self, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -63,7 +63,7 @@ class Ties:
                     interpreter.symtable.pop(n, None)
                 interpreter.symtable.update(kept)
             if errors or resolved[name] is None:
-                raise ValueError(f"tie {name}={self.expressions[name]!r} cannot be computed")
+                raise InputError(f"tie {name}={self.expressions[name]!r} cannot be computed")
             if np.ndim(resolved[name]) == 0 and not np.iscomplexobj(resolved[name]):
                 resolved[name] = float(resolved[name])
         return resolved

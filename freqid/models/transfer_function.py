@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -10,14 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray, finite, whole
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.lti.bases import basis_of
-from freqid.lti.holds.hold import BandLimited, Hold
-from freqid.lti.realisation import Realisation
-from freqid.lti.responses import frequency_response, points, transfer
-from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, finite, whole
+from freqid.lti.state_space import StateSpace
 from freqid.models.grey_box import GreyBox
+from freqid.models.model import Model
 from freqid.models.parameter import Parameter
 
 _ANY = (-np.inf, np.inf)
@@ -43,19 +38,21 @@ class TransferFunction:
         object.__setattr__(self, "poles", whole("poles", self.poles))
         object.__setattr__(self, "zeros", whole("zeros", self.zeros, least=0))
         if self.zeros > self.poles:
-            raise ValueError(
+            raise InputError(
                 f"zeros={self.zeros} is more than poles={self.poles}; no plant has that"
             )
         if self.delay != "estimate":
             delay = finite("delay", self.delay)
             if delay < 0:
-                raise ValueError(f"delay={delay:g} s must not be negative")
+                raise InputError(f"delay={delay:g} s must not be negative")
             object.__setattr__(self, "delay", delay)
 
 
 @dataclass(frozen=True, eq=False)
-class ContinuousModel:
+class ContinuousModel(Model):
     """An estimated continuous-time rational model, x' = A x + B u, y = C x + D u."""
+
+    dt = 0.0
 
     matrices: StateSpace
     denominator: FloatArray
@@ -69,6 +66,21 @@ class ContinuousModel:
         return self.matrices
 
     @property
+    def inputs(self) -> Sequence[str]:  # type: ignore[override]
+        """Names of the inputs."""
+        return self.input_names
+
+    @property
+    def outputs(self) -> Sequence[str]:  # type: ignore[override]
+        """Names of the outputs."""
+        return self.output_names
+
+    @property
+    def spec(self) -> TransferFunction:
+        """The black box of which this is one: zeros, poles and delay."""
+        return TransferFunction(self.numerators.shape[2] - 1, len(self.denominator) - 1, self.delay)
+
+    @property
     def poles(self) -> ComplexArray:
         """Poles in rad/s."""
         return np.roots(self.denominator)
@@ -76,56 +88,6 @@ class ContinuousModel:
     def zeros(self, output: int = 0, input: int = 0) -> ComplexArray:
         """Zeros from one input to one output, in rad/s."""
         return np.roots(self.numerators[output, input])
-
-    def frequency_response(self, omega: Any, hold: Hold | None = None) -> FrequencyResponse:
-        """Response at ``omega`` (rad/s), continuous or through a hold."""
-        frf = frequency_response(self.matrices, omega, hold, self.input_names, self.output_names)
-        if self.delay == 0:
-            return frf
-        between = BandLimited() if hold is None else hold
-        at = self.matrices
-        still = StateSpace(*(np.zeros((0, *M.shape)) for M in at))
-        realisation = Realisation(Linearisation(at, still), basis_of(at), delay=self.delay)
-        z = points(frf.omega, between)
-        plant, late = realisation.delayed(between, frf.omega, z)
-        return dataclasses.replace(frf, response=transfer(plant, z) * late)
-
-    def response_with_variance(
-        self, omega: Any, hold: Hold | None, names: Sequence[str], covariance: FloatArray
-    ) -> FrequencyResponse:
-        """Response and its variance, to first order in the covariance of the coefficients."""
-        frf = self.frequency_response(omega, hold)
-        continuous = self.frequency_response(omega)
-        s = 1j * frf.omega
-        a = np.polyval(self.denominator, s)
-        p, m, K = frf.response.shape
-        nb, na = self.numerators.shape[2], len(self.denominator) - 1
-        variance = np.empty((p, m, K))
-        for o in range(p):
-            for i in range(m):
-                J = np.zeros((len(names), K), complex)
-                begin = (o * m + i) * nb
-                for k in range(nb):
-                    J[begin + k] = s ** (nb - 1 - k) / a * np.exp(-s * self.delay)
-                if "delay" in names:
-                    J[list(names).index("delay")] = -s * continuous.response[o, i]
-                for k in range(na):
-                    J[p * m * nb + k] = -continuous.response[o, i] * s ** (na - 1 - k) / a
-                variance[o, i] = np.einsum("ak,ab,bk->k", J.conj(), covariance, J).real
-        return dataclasses.replace(frf, variance=variance)
-
-    def to_control(self) -> Any:
-        """The model as a continuous ``control.StateSpace``."""
-        import control
-
-        if self.delay != 0:
-            raise ValueError(
-                f"control systems have no delay and this model has {self.delay:g} s; use "
-                "dataclasses.replace(model, delay=0).to_control() with control.pade(delay, order)"
-            )
-        return control.ss(
-            *self.matrices, inputs=list(self.input_names), outputs=list(self.output_names)
-        )
 
     def __repr__(self) -> str:
         p, m = self.matrices.D.shape

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import whole
+from freqid.checks import InputError, whole
 from freqid.data.files import whole_file
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.excitation.signals import sine
 from freqid.fitting.estimate import Estimate
-from freqid.lti.holds.hold import ZeroOrderHold
+from freqid.lti.holds import ZeroOrderHold
 from freqid.models.plants import first_order, two_mass
 from freqid.models.simulation import simulate
 from freqid.paper.study import BAND, FACTOR, OMEGA, T1, T2, first_order_estimates, study
@@ -30,7 +30,7 @@ def draw(number: int) -> Any:
     """One figure by its number in the paper."""
     number = whole("number", number)
     if number not in _FIGURES:
-        raise ValueError(f"number={number} is not a figure of the paper; expected 1 to 10")
+        raise InputError(f"number={number} is not a figure of the paper; expected 1 to 10")
     with context():
         return _FIGURES[number]()
 

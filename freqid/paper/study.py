@@ -18,7 +18,7 @@ from freqid.data.record import Record
 from freqid.excitation.signals import chirp, sine
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Estimate
-from freqid.lti.holds.hold import FirstOrderHold, ZeroOrderHold
+from freqid.lti.holds import FirstOrderHold, ZeroOrderHold
 from freqid.models.output_error import OutputError
 from freqid.models.plants import first_order, two_mass
 from freqid.models.simulation import simulate

@@ -9,9 +9,9 @@ import numpy as np
 
 from freqid.bias.apparent import apparent_response
 from freqid.bias.asymptotic import asymptotic_fit
-from freqid.checks import FloatArray, unknown
+from freqid.checks import FloatArray, InputError, unknown
 from freqid.excitation.input_spectra import InputSpectrum
-from freqid.lti.holds.hold import Hold, PeriodicHold, as_hold
+from freqid.lti.holds import Hold, PeriodicHold, as_hold
 from freqid.plots.bode_nyquist import bode, nyquist
 from freqid.plots.style import COLOURS, context, line
 
@@ -112,7 +112,7 @@ def plot_bias_curves(
     wanted = list(parameters or known)
     chosen = int(table["factor"].max()) if factor is None else factor
     if chosen not in set(table["factor"]):
-        raise ValueError(unknown("factor", chosen, sorted(set(table["factor"]))))
+        raise InputError(unknown("factor", chosen, sorted(set(table["factor"]))))
     names, labels, title = _spectra(table)
     upper = table.attrs.get("upper_frequency", {})
     numeric = all(n in upper for n in names)
@@ -245,7 +245,7 @@ def _sentence(est: Any, plant: Any) -> str:
 def _of_parameter(table: pd.DataFrame, parameter: str) -> pd.DataFrame:
     known = list(dict.fromkeys(table["parameter"]))
     if parameter not in known:
-        raise ValueError(unknown("parameter", parameter, known))
+        raise InputError(unknown("parameter", parameter, known))
     return table[table["parameter"] == parameter]
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, choice
+from freqid.checks import FloatArray, InputError, choice
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.plots.style import context, line
@@ -180,7 +180,7 @@ def plot_record(record: Record, ax: Any = None) -> Any:
         for index, (name, values) in enumerate(
             zip(record.input_names, record.inputs.T, strict=True)
         ):
-            if record.hold.name == "zoh":
+            if record.hold.constant:
                 ax[0].step(record.input_time, values, where="post", label=name, **line(index))
             else:
                 ax[0].plot(record.input_time, values, label=name, **line(index))
@@ -208,7 +208,7 @@ def plot_coherence(frf: FrequencyResponse, ax: Axes | None = None, unit: str = "
 
     choice("unit", unit, list(_UNITS))
     if frf.coherence is None:
-        raise ValueError("frf has no coherence; an average over segments or repeats has one")
+        raise InputError("frf has no coherence; an average over segments or repeats has one")
     with context():
         if ax is None:
             _, ax = plt.subplots()
@@ -224,9 +224,9 @@ def _curves(
     responses: Sequence[Any], labels: Sequence[str] | None, omega: Any
 ) -> list[tuple[FrequencyResponse, str | None]]:
     if not responses:
-        raise ValueError("give at least one response, model, estimate or control system")
+        raise InputError("give at least one response, model, estimate or control system")
     if labels is not None and len(labels) != len(responses):
-        raise ValueError(f"labels has {len(labels)} entries for {len(responses)} responses")
+        raise InputError(f"labels has {len(labels)} entries for {len(responses)} responses")
     if omega is None:
         measured = [r.omega for r in responses if isinstance(r, FrequencyResponse)]
         omega = np.unique(np.concatenate(measured)) if measured else np.geomspace(0.1, 1000, 600)
@@ -247,7 +247,7 @@ def _as_response(thing: Any, omega: FloatArray) -> FrequencyResponse:
         return thing.frequency_response(omega)
     if hasattr(thing, "ninputs"):
         return FrequencyResponse.from_control(thing.frequency_response(omega))
-    raise ValueError(
+    raise InputError(
         f"{type(thing).__name__} cannot be drawn; expected a FrequencyResponse, a model, an "
         "Estimate or a control system"
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, choice
+from freqid.checks import FloatArray, InputError, choice
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.fitting.estimate import Estimate
@@ -73,16 +73,14 @@ def plot_poles(
     import matplotlib.pyplot as plt
     from matplotlib.patches import Ellipse
 
-    from freqid.fitting.uncertainty.error_bars import pole_scatter
-
     if labels is not None and len(labels) != len(estimates):
-        raise ValueError(f"labels has {len(labels)} entries for {len(estimates)} estimates")
+        raise InputError(f"labels has {len(labels)} entries for {len(estimates)} estimates")
     with context():
         if ax is None:
             _, ax = plt.subplots()
         for index, est in enumerate(estimates):
             colour = COLOURS[index % len(COLOURS)]
-            poles, scatter = pole_scatter(est)
+            poles, scatter = est.pole_scatter()
             label = None if labels is None else labels[index]
             ax.plot(poles.real, poles.imag, "x", color=colour, markersize=8, label=label)
             for pole, covariance in zip(poles, scatter, strict=True):

@@ -10,6 +10,7 @@ from freqid.plots.style import COLOURS, context, line
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
     from freqid.validation.comparison import Comparison
 
@@ -68,4 +69,31 @@ def plot_residuals(table: pd.DataFrame, ax: Any = None) -> Any:
             axis.set_title(f"{curve['test']}: {pair} (99 % limits shaded)", loc="left")
             axis.set_ylabel("correlation")
         ax[-1].set_xlabel("lag / samples")
+    return ax
+
+
+def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
+    """Criteria against order, each less its least value; the best order is marked.
+
+    Takes the table of ``select_order`` and returns the axes.
+    """
+    import matplotlib.pyplot as plt
+
+    with context():
+        if ax is None:
+            _, ax = plt.subplots()
+        n = np.exp((table["mdl"] - table["aic"]) / table["parameters"] + 2).iloc[0]
+        curves: dict[str, Any] = {
+            "AIC": table["aic"],
+            "MDL": table["mdl"],
+            "cross-validation": n * np.log(table["cross_validation"]),
+        }
+        for index, (name, values) in enumerate(curves.items()):
+            ax.plot(
+                table["order"], values - values.min() + 1, marker="o", label=name, **line(index)
+            )
+        ax.axvline(table.attrs["best"], color="#999999", linewidth=0.8, zorder=0)
+        ax.set(xlabel="order", ylabel="criterion, less its least value, + 1", yscale="log")
+        ax.set_xticks(table["order"])
+        ax.legend()
     return ax

@@ -70,15 +70,14 @@ def test_standard_errors_of_coefficients_match_the_scatter(rng):
 def test_subspace_start_finds_the_poles_by_itself(plant, fast):
     from freqid.fitting.black_box.subspace import identify, plane_for
     from freqid.fitting.cost.charts import from_plane
-    from freqid.fitting.preparation import Options, prepare
+    from freqid.fitting.reading import Reading
     from freqid.lti.responses import Plane
 
-    options = Options(band=BAND)
-    first, _ = prepare(fast, (1, 1), None, options, Plane())
-    plane = plane_for(first.z)
-    experiment, hold = prepare(fast, (1, 1), None, options, plane)
-    start = from_plane(identify([experiment], 3, False), plane)
-    found = np.sort_complex(np.log(np.linalg.eigvals(start.A).astype(complex)) / hold.period)
+    reading = Reading.of(fast, band=BAND)
+    plane = plane_for(reading.lines(Plane()).points.z)
+    start = from_plane(identify([reading.lines(plane)], 3, False), plane)
+    period = reading.hold.period
+    found = np.sort_complex(np.log(np.linalg.eigvals(start.A).astype(complex)) / period)
     true = np.sort_complex(np.linalg.eigvals(plant.state_space().A))
     assert np.abs(found / true - 1).max() < 1e-5
 
@@ -97,8 +96,8 @@ def test_the_refined_start_lands_near_the_minimum_in_noise(rng):
     from freqid.fitting.black_box.refinement import first_model
     from freqid.fitting.black_box.subspace import identify, plane_for
     from freqid.fitting.cost.charts import Chart
-    from freqid.fitting.cost.minimum import Objective
-    from freqid.fitting.preparation import Options, prepare
+    from freqid.fitting.cost.objective import Objective
+    from freqid.fitting.reading import Reading
 
     w = 2 * np.pi * np.array([10, 10.6])
     A = np.zeros((4, 4))
@@ -108,10 +107,10 @@ def test_the_refined_start_lands_near_the_minimum_in_noise(rng):
     record = fq.simulate(system, rng.standard_normal(4000), 0.01)
     record = record.with_noise(0.1 * record.y.std(), seed=2)
     plane = plane_for(np.exp(1j * np.linspace(0.01, np.pi, 100)))
-    experiment, _ = prepare(record, (1, 1), None, Options(), plane)
+    experiment = Reading.of(record).lines(plane)
 
     def cost(model):
-        chart = Chart(model, False, plane)
+        chart = Chart(model, False, plane, 0.01)
         return Objective(chart, [experiment]).point(np.zeros(chart.size)).cost
 
     least = fq.fit(fq.OutputError(4), record).cost

@@ -109,7 +109,7 @@ def test_band_in_time_and_steady_state(plant, slow):
 def test_the_lifted_cost_is_that_of_its_aliases(plant, fast):
     """Interleaved inputs and sums over alias frequencies are the same model."""
     from freqid.fitting.cost.experiments import SpectralExperiment
-    from freqid.fitting.cost.minimum import Objective
+    from freqid.fitting.cost.objective import Objective
     from freqid.fitting.cost.structures import GreyStructure
     from freqid.frf.spectra import spectra
 

@@ -34,12 +34,13 @@ def test_a_record_that_was_never_decimated_gets_no_such_warning(plant, rng):
 
 
 def test_the_derivative_by_the_period(plant, slow):
-    from freqid.fitting.cost.minimum import Objective
+    from freqid.fitting.cost.nuisance import HoldPeriod
+    from freqid.fitting.cost.objective import Objective
     from freqid.fitting.cost.structures import GreyStructure
-    from freqid.fitting.preparation import Options, prepare
+    from freqid.fitting.reading import Reading
 
-    experiment, _ = prepare(slow, (1, 1), None, Options("zoh", BAND))
-    structure = GreyStructure(plant, slow.dt)
+    experiment = Reading.of(slow, "zoh", BAND).lines()
+    structure = GreyStructure(plant, unknown=[HoldPeriod.of(slow.dt)])
     objective = Objective(structure, [experiment])
     x = np.array([1.1, 0.9, 1.05, 1.2, 0.8, 0.3])
     for k in range(6):

@@ -6,7 +6,7 @@ import pytest
 import freqid as fq
 from freqid.fitting.black_box.output_error import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
-from freqid.fitting.preparation import Options
+from freqid.fitting.reading import Reading
 from freqid.lti.polynomials import Basis
 
 
@@ -83,7 +83,7 @@ def test_the_start_is_the_minimum_with_a_direct_term_and_without(rng, feedthroug
 
     u = rng.standard_normal(2000)
     record = fq.Record(u, lfilter(b, a, u), dt=0.01).with_noise(0.1, seed=1)
-    (lines,), _, plane = lines_in_plane([record], (1, 1), [None], Options())
+    (lines,), plane = lines_in_plane([Reading.of(record)])
     model = first_model([lines], 3, feedthrough)
     est = fq.fit(fq.OutputError(3, feedthrough), record)
     assert est.n_evaluations <= 2

@@ -104,12 +104,13 @@ def test_a_narrow_band_of_a_long_record_is_the_same_dft(rng):
 @pytest.mark.parametrize("period", [None, 2, 4])
 def test_the_noise_floor_is_the_noise_that_was_added(plant, period):
     """Over K lines of weight 1 white noise of σ costs 2 K σ², whichever lines are left out."""
-    from freqid.fitting.preparation import Options, prepare
+    from freqid.fitting.noise_models import GivenWeights
+    from freqid.fitting.reading import Reading
     from freqid.fitting.search.noise_floor import noise_floor
 
     record = fq.simulate(plant, fq.chirp(10, 80, 40, 5e-4), 5e-4).with_noise(0.3, seed=2)
     weights = np.ones(2801)
     if period is not None:
         weights[::period] = 0
-    experiment, _ = prepare(record, (1, 1), weights, Options(None, (10, 80)))
+    experiment = Reading.of(record, band=(10, 80), noise=GivenWeights(weights)).lines()
     assert noise_floor([experiment]) == pytest.approx(2 * weights.sum() * 0.3**2, rel=0.2)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import freqid as fq
-from freqid.lti.holds.phi import phi_functions
+from freqid.lti.holds import phi_functions
 
 
 def random_plant(kind, rng):

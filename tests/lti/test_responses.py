@@ -7,7 +7,7 @@ import pytest
 import freqid as fq
 from freqid.lti.bases import EigenBasis, SchurBasis, basis_of
 from freqid.lti.responses import points, response_and_derivatives
-from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.lti.state_space import Linearisation, StateSpace
 
 OMEGA = 2 * np.pi * np.linspace(10, 80, 71)
 HOLDS = [fq.ZeroOrderHold(5e-3), fq.FirstOrderHold(5e-3), fq.BandLimited()]

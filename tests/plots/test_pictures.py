@@ -1,6 +1,6 @@
 """The main pictures as pictures: their shapes against drawings that were looked at.
 
-After a change that is meant, run with FREQID_NEW_PICTURES=1, look at the folder pictures, and commit.
+After a change that is meant, run with FREQID_NEW_PICTURES=1, look at them, and commit.
 """
 
 import os
@@ -112,14 +112,12 @@ def test_units_and_names_are_on_the_axes(plant, slow, est):
 
 def test_ellipses_of_poles_hold_the_scatter(plant, fast):
     """100 runs: 95 % of the poles inside the ellipse told by each."""
-    from freqid.fitting.uncertainty.error_bars import pole_scatter
-
     true = plant.to_control().poles()
     target = true[np.argmax(true.imag)]
     inside = []
     for s in range(100):
         est = fq.fit(plant, fast.decimate(5).with_noise(0.5, seed=s), band=(10, 80), n_starts=1)
-        poles, scatter = pole_scatter(est)
+        poles, scatter = est.pole_scatter()
         k = int(np.argmax(poles.imag))
         away = np.array([(poles[k] - target).real, (poles[k] - target).imag])
         inside.append(away @ np.linalg.solve(scatter[k], away) < 5.991)

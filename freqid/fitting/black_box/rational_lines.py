@@ -22,7 +22,7 @@ from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.lti.polynomials import Basis
 from freqid.lti.projection import triangle_of
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
 
 # steps of Sanathanan and Koerner at the most; a denominator that has changed by less than this,
 # relative, on the lines is the last one
@@ -56,17 +56,17 @@ class RationalLines:
     def __init__(self, experiments: Sequence[SpectralExperiment], feedthrough: bool) -> None:
         self.experiments, self.feedthrough = experiments, feedthrough
         # with one channel the weights are in the data already
-        self.w = np.concatenate([e.z for e in experiments])
-        self.Y = np.concatenate([e.Y[0, 0] for e in experiments])
-        self.U = np.concatenate([e.U[0, 0] for e in experiments])
-        state = np.concatenate([e.U_state[0, 0] for e in experiments])
+        self.w = np.concatenate([e.points.z for e in experiments])
+        self.Y = np.concatenate([e.lines.Y[0, 0] for e in experiments])
+        self.U = np.concatenate([e.lines.U[0, 0] for e in experiments])
+        state = np.concatenate([e.points.U[0, 0] for e in experiments])
         self.driven = self.U if feedthrough else state
-        ends = np.cumsum([len(e.omega) for e in experiments])
+        ends = np.cumsum([e.n_lines for e in experiments])
         self.free = []
         for e, end in zip(experiments, ends, strict=True):
-            if e.transient_dt is not None:
+            if e.transient is not None:
                 own = np.zeros(len(self.w), complex)
-                own[end - len(e.omega) : end] = e.free_factor
+                own[end - e.n_lines : end] = e.transient.factor
                 self.free.append(own)
 
     def minimum(self, poles: ComplexArray) -> Minimum | None:

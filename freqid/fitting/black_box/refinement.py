@@ -12,12 +12,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from freqid.checks import ComplexArray
+from freqid.checks import ComplexArray, InputError
 from freqid.fitting.black_box.rational_lines import FEW, Minimum, RationalLines
 from freqid.fitting.black_box.subspace import identify, observed
-from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.search.noise_floor import noise_floor
-from freqid.lti.sampled import StateSpace
+from freqid.lti.state_space import StateSpace
 
 # a minimum that was found without a detour and leaves less than this part of the data's energy, or
 # little more than their noise, is believed
@@ -36,11 +36,10 @@ def first_model(
 
     Raises ValueError where the lines are too few.
     """
-    single = all(e.Y.shape[:2] == (1, 1) and e.U.shape[:2] == (1, 1) for e in experiments)
-    single &= all(e.aliases == 1 and e.free_aliases == 1 for e in experiments)
-    if not single:
+    if not all(e.single and e.one_to_one for e in experiments):
         return identify(experiments, order, feedthrough)
-    few = _fewer_lines(experiments)
+    # of very many lines a part will do: its minimum is next to that of all
+    few = thinned_to(experiments, _LINES)
     lines = RationalLines(few, feedthrough)
     best: Minimum | None = None
     for poles in _begun(lines, order):
@@ -53,12 +52,6 @@ def first_model(
         lines = RationalLines(experiments, feedthrough)
         best = lines.minimum(best.poles)
     return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
-
-
-def _fewer_lines(experiments: Sequence[SpectralExperiment]) -> Sequence[SpectralExperiment]:
-    """A part of the lines, where they are very many: their minimum is next to that of all."""
-    step = sum(len(e.omega) for e in experiments) // _LINES
-    return [e.thinned(step) for e in experiments] if step > 1 else experiments
 
 
 def _believed(lines: RationalLines, found: Minimum) -> bool:
@@ -79,7 +72,7 @@ def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:
     for more in (0, *_LARGER):
         try:
             A, _ = observed(lines.experiments, order + more)
-        except ValueError:
+        except InputError:
             # the lines are too few
             if more == 0 and order > FEW:
                 raise

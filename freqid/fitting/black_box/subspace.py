@@ -10,13 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
+from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.lti.bases import basis_of
-from freqid.lti.holds.hold import BandLimited
+from freqid.lti.holds import BandLimited
 from freqid.lti.projection import triangle
 from freqid.lti.responses import Plane
-from freqid.lti.sampled import StateSpace
+from freqid.lti.sampled import sum_runs
+from freqid.lti.state_space import StateSpace
 
 
 def plane_for(z: ComplexArray) -> Plane:
@@ -42,7 +43,7 @@ def observed(
     experiments: Sequence[SpectralExperiment], order: int
 ) -> tuple[FloatArray, FloatArray]:
     """Φ̃ and C, which the outputs' span alone tells; ValueError where the lines are too few."""
-    p, m = experiments[0].Y.shape[0], experiments[0].U.shape[0]
+    p, m = experiments[0].n_channels
     columns = [_columns(e, i, experiments) for i, e in enumerate(experiments)]
     w = np.concatenate([c[0] for c in columns])
     Y = np.concatenate([c[1] for c in columns], axis=1)
@@ -50,7 +51,7 @@ def observed(
     # twice as many block rows as the order: enough to see it, few enough to stay conditioned
     q = min(2 * order + 2, (2 * len(w)) // (p + len(V)) - 2)
     if q * p <= order:
-        raise ValueError(
+        raise InputError(
             f"data hold {len(w)} lines; order {order} with {m} inputs needs more: widen the band"
         )
     powers = w ** np.arange(q + 1)[:, None]
@@ -69,24 +70,19 @@ def _columns(
     e: SpectralExperiment, index: int, experiments: Sequence[SpectralExperiment]
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Lines, outputs and inputs (a transient each) of one experiment, one column a channel."""
-    channels, K = e.Y.shape[1:]
-    base = 0
-    if e.aliases > 1:
-        # the alias with the most energy stands for all
-        power = np.abs(e.U).reshape(len(e.U), channels, K, e.aliases).sum(axis=(0, 1))
-        base = power.argmax(axis=1)
-    pick = np.arange(K) * e.aliases + base
-    w = np.tile(e.z[pick], channels)
-    common = e.scale.mean(axis=0).reshape(1, -1)
-    if e.line_scale is not None:
-        Y, V = e.Y.reshape(len(e.Y), -1), e.U[:, :, pick].reshape(len(e.U), -1)
-    else:
-        Y = (e.Y * e.scale).reshape(len(e.Y), -1)
-        V = e.U[:, :, pick].reshape(len(e.U), -1) * common
+    lines = e.lines
+    # the alias with the most energy stands for all
+    pick = lines.strongest()
+    w = np.tile(e.points.z[pick], lines.Y.shape[1])
+    common = lines.scale.mean(axis=0).reshape(1, -1)
+    Y = lines.error(lines.Y).reshape(len(lines.Y), -1)
+    V = lines.U[:, :, pick].reshape(len(lines.U), -1)
+    if not lines.inside:
+        V = V * common
     free = np.zeros((len(experiments), V.shape[1]), complex)
-    if e.transient_dt is not None:
+    if e.transient is not None:
         free[index] = common
-    used = [i for i, other in enumerate(experiments) if other.transient_dt is not None]
+    used = [i for i, other in enumerate(experiments) if other.transient is not None]
     return w, Y, np.concatenate([V, free[used]])
 
 
@@ -94,33 +90,32 @@ def inputs_of(
     experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
 ) -> StateSpace:
     """Γ and D (and the transients, which are dropped) by linear least squares."""
-    n, m, p = len(A), experiments[0].U.shape[0], len(C)
+    n, m, p = len(A), experiments[0].n_channels[1], len(C)
     rows, right = [], []
     for index, e in enumerate(experiments):
-        CR = _output_rows(A, C, e.z)
+        CR, lines, transient = _output_rows(A, C, e.points.z), e.lines, e.transient
         blocks = []
         for j in range(m):
             for i in range(n):
-                y = CR[:, i, None, :] * e.U_state[j]
-                blocks.append(e.rows(y.reshape(*y.shape[:-1], -1, e.aliases).sum(axis=-1)))
+                y = CR[:, i, None, :] * e.points.U[j]
+                blocks.append(lines.rows(sum_runs(y, lines.aliases)))
         if feedthrough:
             for j in range(m):
                 for o in range(p):
-                    y = np.zeros((p, *e.U.shape[1:]), complex)
-                    y[o] = e.U[j]
-                    blocks.append(e.rows(y.reshape(*y.shape[:-1], -1, e.aliases).sum(axis=-1)))
+                    y = np.zeros((p, *lines.U.shape[1:]), complex)
+                    y[o] = lines.U[j]
+                    blocks.append(lines.rows(sum_runs(y, lines.aliases)))
         for other in range(len(experiments)):
-            if experiments[other].transient_dt is None:
+            if experiments[other].transient is None:
                 continue
             for i in range(n):
-                if other != index:
-                    blocks.append(np.zeros(2 * e.Y.size))
+                if other != index or transient is None:
+                    blocks.append(np.zeros(2 * lines.Y.size))
                     continue
-                F = _output_rows(A, C, e.z_free)[:, i]
-                y = (F * e.free_factor).reshape(p, 1, -1, e.free_aliases).sum(axis=-1)
-                blocks.append(e.rows(y))
+                y = _output_rows(A, C, transient.z)[:, i, None] * transient.factor
+                blocks.append(lines.rows(sum_runs(y, transient.aliases)))
         rows.append(np.array(blocks).T)
-        right.append(e.rows(e.Y))
+        right.append(lines.rows(lines.Y))
     R = triangle(np.column_stack([np.concatenate(rows), np.concatenate(right)]))
     solution = np.linalg.lstsq(R[:, :-1], R[:, -1])[0]
     B = solution[: n * m].reshape(m, n).T

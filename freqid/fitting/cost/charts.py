@@ -1,4 +1,4 @@
-"""Black boxes as the optimiser sees them: a local chart of all state-space models of one order.
+"""Black boxes as the optimiser sees them: a local chart of all state spaces of one order.
 
 A state space has n² entries more than the model has parameters, because any change of its states
 leaves the model as it is. The chart moves only at right angles to those changes (data driven local
@@ -11,17 +11,24 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
-from freqid.checks import FloatArray
+from freqid.checks import ComplexArray, FloatArray
+from freqid.lti.bases import eigenvalues_and_derivatives
+from freqid.lti.holds import BandLimited, Hold
 from freqid.lti.realisation import Realisation
-from freqid.lti.responses import Plane
-from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.lti.responses import Plane, on_circle, response_and_derivatives
+from freqid.lti.state_space import Linearisation, StateSpace
 
 
 class Chart:
     """Models near a state space (Φ̃, Γ, C, D) of a plane, by unknowns x that are zero there."""
 
-    def __init__(self, centre: StateSpace, feedthrough: bool, plane: Plane, moves: int = 0) -> None:
-        self.moves = moves
+    # coordinates that mean nothing to a user
+    names: list[str] = []  # noqa: RUF012
+
+    def __init__(
+        self, centre: StateSpace, feedthrough: bool, plane: Plane, dt: float, moves: int = 0
+    ) -> None:
+        self.moves, self.dt = moves, dt
         self.centre, self.feedthrough, self.plane = balanced(centre), feedthrough, plane
         A, B, C, D = self.centre
         n, m, p = len(A), B.shape[1], len(C)
@@ -65,11 +72,32 @@ class Chart:
 
     def moved(self, x: FloatArray) -> Chart:
         """A chart around the model at x."""
-        return Chart(self.matrices(x), self.feedthrough, self.plane, self.moves + 1)
+        return Chart(self.matrices(x), self.feedthrough, self.plane, self.dt, self.moves + 1)
 
     def describe(self, x: FloatArray) -> str:
         """Said of the trial point in errors."""
         return f"poles {np.linalg.eigvals(self.matrices(x).A)}"
+
+    def response(
+        self, x: FloatArray, omega: FloatArray, hold: Hold | None
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Response at x, taken at exp(jω·dt), and its derivatives by x: a hold is inside."""
+        w = self.plane.points(on_circle(omega * self.dt))
+        plant = self.realise(x).basis.through(BandLimited())
+        return response_and_derivatives(plant, w, factor=self.plane.input_factor(w))
+
+    def poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Poles (n,) in rad/s and their derivatives by x (n, P).
+
+        z = (w + a)/(1 + a w), λ = ln z / dt: through the coefficients of a polynomial of poles
+        that lie close together nothing would be left of the digits.
+        """
+        at, d = self.realise(x).linearisation
+        w, change = eigenvalues_and_derivatives(at.A, d.A)
+        a = self.plane.a
+        z = (w + a) / (1 + a * w)
+        slope = (1 - a**2) / (1 + a * w) ** 2 / z / self.dt
+        return np.log(z) / self.dt, change * slope[:, None]
 
     def in_z(self, x: FloatArray) -> StateSpace:
         """The state space at x in the z plane."""

@@ -12,15 +12,18 @@ Inverse Problems 19, 2003).
 
 from __future__ import annotations
 
-import copy
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf.spectra import Spectra
-from freqid.lti.holds.hold import BandLimited, Hold, PeriodicHold
+from freqid.lti.holds import BandLimited, Hold, PeriodicHold
 from freqid.lti.realisation import Realisation
 from freqid.lti.responses import Plane, on_circle, points, transition
 from freqid.lti.sampled import sum_runs
@@ -40,7 +43,10 @@ class Evaluation(Protocol):
 class Experiment(Protocol):
     """A data set as residuals. ``n_rows`` counts real values; ``energy`` is a zero model's cost."""
 
-    n_rows: int
+    @property
+    def n_rows(self) -> int:
+        """Real values."""
+        ...
 
     @property
     def energy(self) -> float:
@@ -52,67 +58,43 @@ class Experiment(Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
 class SpectralExperiment:
     """DFT lines of a record, or of a frequency response, against the model's.
 
-    ``Y`` (outputs, channels, K) and ``U`` (inputs, channels, K·M): one channel for a record, one
-    for each input for a frequency response. ``scale`` multiplies the residual, broadcasting
-    against ``Y``. ``transient_dt`` is the sample time of the output; None leaves the transient out.
+    ``lift`` inputs of one slow period stand in turn for each input of the plant; a ``discrete``
+    model's matrices are taken as they are. ``n_rows`` counts real values.
     """
 
-    def __init__(
-        self,
-        omega: FloatArray,
-        omega_input: FloatArray,
-        U: ComplexArray,
-        Y: ComplexArray,
-        scale: FloatArray,
+    lines: Lines
+    points: Points
+    transient: Transient | None
+    hold: Hold
+    n_rows: int
+    lift: int = 1
+    discrete: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        lines: Lines,
         hold: Hold,
         transient_dt: float | None,
         n_real: int = 0,
         lift: int = 1,
         plane: Plane | None = None,
-    ) -> None:
-        self.omega, self.omega_input = omega, omega_input
-        # one weight for all channels of a line is put into the data once and for all
-        line = scale[0, 0]
-        self.line_scale: FloatArray | None = None
-        if bool((scale == line).all()):
-            self.line_scale = line
-            U = U * np.repeat(line, omega_input.size // len(omega))
-            Y = Y * line
-        self.hold, self.U, self.Y, self.scale, self.lift = hold, U, Y, scale, lift
-        self.aliases = omega_input.size // len(omega)
-        self.transient_dt = transient_dt
-        discrete, plane = plane is not None, plane or Plane()
-        period = hold.period * lift if isinstance(hold, PeriodicHold) else None
-        if lift > 1 and period is not None:
-            z = on_circle(period * omega)
+    ) -> SpectralExperiment:
+        """``transient_dt`` is the sample time of the output; None leaves the transient out."""
+        if lift > 1 and isinstance(hold, PeriodicHold):
+            z = on_circle(hold.period * lift * lines.omega)
         else:
-            z = points(omega_input.ravel(), hold)
-        self.z = plane.points(z)
-        self.U_state = U * plane.input_factor(self.z)
-        # one resolvent serves input and transient when both have the same period
-        self.shared = False
-        self.free_aliases = 1
+            z = points(lines.omega_input.ravel(), hold)
+        n_rows = 2 * int(np.count_nonzero(lines.scale)) - n_real
+        discrete, transient = plane is not None, None
         if transient_dt is not None:
-            ratio = 0.0 if period is None else transient_dt / period
-            self.shared = self.aliases == 1 and abs(ratio - 1) < 1e-9
-            z_free = z if self.shared else on_circle(omega * transient_dt)
-            if discrete and not self.shared and isinstance(hold, PeriodicHold):
-                # (z^M I − Φ^M)⁻¹ z^M is the mean of (zI − Φ)⁻¹ z over the M aliases
-                self.free_aliases = round(transient_dt / hold.period)
-                turns = 2 * np.pi * np.arange(self.free_aliases) / transient_dt
-                z_free = on_circle((omega[:, None] + turns).ravel() * hold.period)
-            self.z_free = plane.points(z_free)
-            self.free_factor = plane.free_factor(self.z_free) / self.free_aliases
-            if self.line_scale is not None:
-                self.free_factor = self.free_factor * np.repeat(line, self.free_aliases)
-        self.discrete = discrete
-        if discrete:
-            # the matrices are sampled already: the kernel takes them as they are
-            self.hold = BandLimited()
-        self.n_rows = 2 * int(np.count_nonzero(scale)) - n_real
+            transient = Transient.of(lines, transient_dt, hold, z, discrete, lift)
+        made = cls(lines, Points(z, lines.U), transient, hold, n_rows, lift, discrete)
+        return made if plane is None or plane.a == 0 else made.in_plane(plane)
 
     @classmethod
     def of_record(
@@ -128,18 +110,11 @@ class SpectralExperiment:
         scale = np.sqrt(s.multiplicity * weights / s.n_samples)
         scale = np.broadcast_to(scale, s.Y.shape)
         n_real = int(np.count_nonzero(scale[:, s.multiplicity == 1]))
-        return cls(
-            s.omega,
-            s.omega_input,
-            s.U.reshape(len(s.U), 1, -1),
-            s.Y[:, None, :],
-            scale[:, None, :],
-            hold,
-            s.dt if transient else None,
-            n_real,
-            lift=len(s.U) // n_inputs,
-            plane=plane,
+        lines = Lines.weighted(
+            s.omega, s.omega_input, s.U.reshape(len(s.U), 1, -1), s.Y[:, None], scale[:, None]
         )
+        lift = len(s.U) // n_inputs
+        return cls.of(lines, hold, s.dt if transient else None, n_real, lift, plane)
 
     @classmethod
     def of_response(
@@ -149,110 +124,131 @@ class SpectralExperiment:
         m, K = frf.response.shape[1:]
         U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, K))
         scale = np.broadcast_to(np.sqrt(weights), frf.response.shape)
-        return cls(frf.omega, frf.omega, U, frf.response, scale, hold, None, plane=plane)
+        lines = Lines.weighted(frf.omega, frf.omega[:, None], U, frf.response, scale)
+        return cls.of(lines, hold, None, plane=plane)
 
     def in_plane(self, plane: Plane) -> SpectralExperiment:
         """The same lines of a sampled model, in z until now, seen in another plane."""
-        other = copy.copy(self)
-        other.z = plane.points(self.z)
-        other.U_state = self.U * plane.input_factor(other.z)
-        if self.transient_dt is not None:
-            other.z_free = plane.points(self.z_free)
-            other.free_factor = self.free_factor / self.z_free * plane.free_factor(other.z_free)
-        return other
+        return dataclasses.replace(
+            self,
+            points=self.points.in_plane(plane, self.lines.U),
+            transient=self.transient and self.transient.in_plane(plane),
+        )
+
+    def behind(self, delay: float) -> SpectralExperiment:
+        """The same with every input late by ``delay`` (s), as if it were periodic."""
+        late = np.exp(-1j * self.lines.omega_input.ravel() * delay)
+        return dataclasses.replace(
+            self,
+            lines=dataclasses.replace(self.lines, U=self.lines.U * late),
+            points=Points(self.points.z, self.points.U * late),
+        )
 
     @property
     def n_lines(self) -> int:
-        """Number of DFT lines, whatever their weights."""
-        return len(self.omega)
+        """Number of lines, whatever their weights."""
+        return len(self.lines.omega)
+
+    @property
+    def n_channels(self) -> tuple[int, int]:
+        """Numbers of outputs and inputs, each input of a lifted plant counted apart."""
+        return self.lines.Y.shape[0], self.lines.U.shape[0]
+
+    @property
+    def single(self) -> bool:
+        """Whether it is of one input and one output, and one channel."""
+        return self.lines.Y.shape[:2] == (1, 1) and self.lines.U.shape[:2] == (1, 1)
+
+    @property
+    def one_to_one(self) -> bool:
+        """Whether each line takes the resolvent at one point alone."""
+        free = self.transient.aliases if self.transient else 1
+        return self.lines.aliases == 1 == free
 
     @property
     def energy(self) -> float:
         """Weighted energy of the data, the cost of a model that is zero."""
-        if self.line_scale is not None:
-            return float(np.vdot(self.Y, self.Y).real)
-        return float(np.sum(self.rows(self.Y) ** 2))
+        Y = self.lines.error(self.lines.Y)
+        return float(np.vdot(Y, Y).real)
 
     def thinned(self, step: int) -> SpectralExperiment:
         """One in ``step`` of the lines that count, weighted so that costs stay comparable."""
-        few = copy.copy(self)
         # weights may leave out lines with a period of their own
-        lines = np.flatnonzero((self.scale > 0).any(axis=(0, 1)))[::step]
-        inputs = (lines[:, None] * self.aliases + np.arange(self.aliases)).ravel()
+        kept = np.flatnonzero(self.lines.counted)[::step]
         more = np.sqrt(step)
-        few.omega, few.omega_input = self.omega[lines], self.omega_input[lines]
-        few.U, few.U_state = self.U[..., inputs] * more, self.U_state[..., inputs] * more
-        few.z, few.Y, few.scale = self.z[inputs], self.Y[..., lines] * more, self.scale[..., lines]
-        if self.line_scale is not None:
-            few.line_scale = self.line_scale[lines]
-        if self.transient_dt is not None:
-            n = self.free_aliases
-            frees = (lines[:, None] * n + np.arange(n)).ravel()
-            few.z_free, few.free_factor = self.z_free[frees], self.free_factor[frees] * more
-        return few
+        return dataclasses.replace(
+            self,
+            lines=self.lines.some(kept, more),
+            points=self.points.some(runs(kept, self.lines.aliases), more),
+            transient=self.transient and self.transient.some(kept, more),
+        )
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
         return _SpectralEvaluation(self, realisation)
 
-    def rows(self, values: ComplexArray) -> FloatArray:
-        """Weighted (…, outputs, channels, K) as real rows, (…, 2·outputs·channels·K)."""
-        weighted = values if self.line_scale is not None else values * self.scale
-        return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-3], -1)).view(float)
+
+def thinned_to(
+    experiments: Sequence[SpectralExperiment], count: int
+) -> Sequence[SpectralExperiment]:
+    """About ``count`` lines of all experiments together; the same ones where they are fewer."""
+    step = sum(e.n_lines for e in experiments) // count
+    return [e.thinned(step) for e in experiments] if step > 1 else experiments
 
 
 class _SpectralEvaluation:
     def __init__(self, experiment: SpectralExperiment, realisation: Realisation) -> None:
         e, basis = experiment, realisation.basis
-        self.experiment, self.basis = e, basis
-        self.U, self.U_state = e.U, e.U_state
-        self.delay_scale = realisation.delay_scale
-        if realisation.delay or realisation.delay_scale is not None:
-            self.plant, late = realisation.delayed(e.hold, e.omega_input.ravel(), e.z)
-            self.z, self.dz = e.z, None
-            self.U, self.U_state = e.U * late, e.U_state * late
+        self.experiment, self.basis, self.delay = e, basis, realisation.delay
+        self.U, self.U_state = e.lines.U, e.points.U
+        # a sampled model's matrices are what they are, whatever made them
+        hold = BandLimited() if e.discrete else e.hold
+        omega = e.lines.omega_input.ravel()
+        if self.delay is not None:
+            self.plant, late = realisation.delayed(hold, omega, e.points.z)
+            self.z, self.moving = e.points.z, None
+            self.U, self.U_state = self.U * late, self.U_state * late
         else:
-            self.plant, self.z, self.dz = realisation.seen_through(
-                e.hold, e.lift, e.omega_input.ravel(), e.z
+            self.plant, self.z, self.moving = realisation.seen_through(
+                hold, e.lift, omega, e.points.z
             )
         self.inverse = self.plant.resolvent(self.z)
         drive = self.plant.drive(self.z, self.U_state)
         self.x = self.plant.solve(self.z, drive, self.inverse)
         self.forced = self.plant.output(self.x, self.U)
-        y = sum_runs(self.forced, e.aliases)
-        self.residual = e.rows(y - e.Y)
+        y = sum_runs(self.forced, e.lines.aliases)
+        self.residual = e.lines.rows(y - e.lines.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
-        if e.transient_dt is not None:
-            self.shared = e.shared and realisation.period is None
+        if e.transient is not None:
+            self.shared = e.transient.shared and realisation.period is None
             same = self.shared or e.discrete
-            self.free = self.plant if same else transition(basis, e.transient_dt)
+            self.free = self.plant if same else transition(basis, e.transient.dt)
             self.free_inverse = self.inverse if self.shared else None
-            self._w = self.free.output_rows(e.z_free, self.free_inverse)
+            self._w = self.free.output_rows(e.transient.z, self.free_inverse)
             # (outputs, states, K) to one column for each physical state
-            seen = sum_runs(self._w * e.free_factor, e.free_aliases)
+            seen = sum_runs(self._w * e.transient.factor, e.transient.aliases)
             columns = np.moveaxis(basis.to_basis.T @ seen, 0, 1)
-            self.transient = e.rows(columns[:, :, None, :])
+            self.transient = e.lines.rows(columns[:, :, None, :])
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        e, plant = self.experiment, self.plant
-        if initial is None or self._w is None:
-            return e.rows(self._forced_change(plant.output_rows(self.z, self.inverse), self.x))
+        rows, t = self.experiment.lines.rows, self.experiment.transient
+        if initial is None or self._w is None or t is None:
+            return rows(self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x))
         delta = (self.basis.to_basis @ initial)[:, None, None]
-        x_free = self.free.solve(e.z_free, delta * e.free_factor, self.free_inverse)
+        x_free = self.free.solve(t.z, delta * t.factor, self.free_inverse)
         if self.shared:
-            return e.rows(self._forced_change(self._w, self.x + x_free))
-        forced = self._forced_change(plant.output_rows(self.z, self.inverse), self.x)
-        return e.rows(
-            forced + self.free.sensitivity(e.z_free, self._w, x_free, None, e.free_aliases)
-        )
+            return rows(self._forced_change(self._w, self.x + x_free))
+        forced = self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x)
+        return rows(forced + self.free.sensitivity(t.z, self._w, x_free, None, t.aliases))
 
     def _forced_change(self, w: ComplexArray, x: ComplexArray) -> ComplexArray:
-        e = self.experiment
+        e, aliases = self.experiment, self.experiment.lines.aliases
         dy = self.plant.sensitivity(
-            self.z, w, x, self.U_state, e.aliases, direct=self.U, dz=self.dz
+            self.z, w, x, self.U_state, aliases, direct=self.U, moving=self.moving
         )
-        if self.delay_scale is not None and isinstance(e.hold, BandLimited):
-            turned = -1j * e.omega_input.ravel() * self.delay_scale * self.forced
-            dy[-1] += sum_runs(turned, e.aliases)
+        delay = self.delay
+        if delay and delay.parameter is not None and not isinstance(e.hold, PeriodicHold):
+            turned = -1j * e.lines.omega_input.ravel() * delay.scale * self.forced
+            dy[delay.parameter] += sum_runs(turned, aliases)
         return dy

@@ -15,16 +15,18 @@ from freqid.models.parameter import Parameter
 class Prior:
     """Rows σ (θ − mean)/std, so that V + Σ rows² is −2σ² times the log of the posterior.
 
-    σ² is the variance of the data's noise in the units of V: the weaker the data, the more the
-    prior counts. ``slope`` (rows, P) and ``offset`` (rows,) make the rows slope · x − offset.
+    σ² = ``variance`` is that of the data's noise in each real value of V: the weaker the data, the
+    more the prior counts. ``slope`` (rows, P) and ``offset`` (rows,) make the rows
+    slope · x − offset.
     """
 
     slope: FloatArray
     offset: FloatArray
+    variance: float
 
     @classmethod
     def of(
-        cls, parameters: Sequence[Parameter], scale: FloatArray, noise_variance: float
+        cls, parameters: Sequence[Parameter], scale: FloatArray, variance: float
     ) -> Prior | None:
         """The prior of these parameters, in units of ``scale`` (P,); None where none has one."""
         known = [(i, p.prior) for i, p in enumerate(parameters) if p.prior is not None]
@@ -32,9 +34,14 @@ class Prior:
             return None
         slope, offset = np.zeros((len(known), len(scale))), np.zeros(len(known))
         for row, (i, (mean, std)) in enumerate(known):
-            slope[row, i] = np.sqrt(noise_variance) * scale[i] / std
-            offset[row] = np.sqrt(noise_variance) * mean / std
-        return cls(slope, offset)
+            slope[row, i] = np.sqrt(variance) * scale[i] / std
+            offset[row] = np.sqrt(variance) * mean / std
+        return cls(slope, offset, variance)
+
+    def held(self, index: int, value: float) -> Prior:
+        """The prior of the other unknowns where one is held at a value."""
+        offset = self.offset - self.slope[:, index] * value
+        return Prior(np.delete(self.slope, index, axis=1), offset, self.variance)
 
     def rows(self, x: FloatArray) -> FloatArray:
         """Jacobian and residual side by side, (rows, P + 1)."""

@@ -1,85 +1,111 @@
-"""Grey boxes as the optimiser sees them: free parameters and, where free, the hold's period."""
+"""Grey boxes as the optimiser sees them: free parameters, then the experiment's own unknowns."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from freqid.checks import FloatArray
-from freqid.lti.holds.hold import Hold, ZeroOrderHold
-from freqid.lti.realisation import Realisation
+from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.cost.nuisance import Nuisance
+from freqid.lti.bases import eigenvalues_and_derivatives
+from freqid.lti.holds import BandLimited, Hold
+from freqid.lti.realisation import Realisation, sampled_response
 from freqid.lti.responses import many_responses
-from freqid.lti.sampled import Linearisation, StateSpace
+from freqid.lti.state_space import Linearisation, StateSpace
 from freqid.models.grey_box import GreyBox
+from freqid.models.parameter import Parameter
 
 # scattered starts lie within this factor of the start, where there are no bounds
 SPREAD = 10.0
-# scattered periods of the hold, as parts of the sample time
-PERIODS = (0.02, 1.0)
-HOLD_PERIOD, DELAY = "hold_period", "delay"
 
 
 class GreyStructure:
-    """A grey box: free parameters in units of their own size.
+    """A grey box: free parameters in units of their own size, then ``unknown`` nuisances.
 
-    With ``dt`` (s) the period of a zero-order hold is one more unknown, the last, in units of it.
-    ``start`` gives values to begin from; one next to zero keeps the size of the model's own.
+    ``known`` nuisances stay at their start. ``start`` gives values to begin from; one next to zero
+    keeps the size of the model's own.
     """
 
     def __init__(
-        self, model: GreyBox, dt: float | None = None, start: Mapping[str, float] | None = None
+        self,
+        model: GreyBox,
+        start: Mapping[str, float] | None = None,
+        unknown: Sequence[Nuisance] = (),
+        known: Sequence[Nuisance] = (),
     ) -> None:
-        self.model, self.dt = model, dt
+        self.model, self.unknown, self.known = model, tuple(unknown), tuple(known)
         self.parameters = model.free_parameters
         self.physical_names = [p.name for p in self.parameters]
+        self.count = len(self.parameters)
         begin = {} if start is None else start
         values = [float(begin.get(p.name, p.value)) for p in self.parameters]
         sizes = zip(values, self.parameters, strict=True)
         scale = [max(abs(v), 1e-3 * abs(p.value)) or 1.0 for v, p in sizes]
-        lower, upper = [p.lower for p in self.parameters], [p.upper for p in self.parameters]
-        if dt is not None:
-            values, scale = [*values, dt / 2], [*scale, dt]
-            lower, upper = [*lower, -np.inf], [*upper, np.inf]
-        self.names = self.physical_names + ([HOLD_PERIOD] if dt is not None else [])
-        self.values, self.scale = np.array(values), np.array(scale)
-        self.lower, self.upper = np.array(lower) / self.scale, np.array(upper) / self.scale
+        everything: list[Parameter | Nuisance] = [*self.parameters, *self.unknown]
+        self.names = [each.name for each in everything]
+        self.units = [each.unit for each in everything]
+        self.values = np.array([*values, *(n.start for n in self.unknown)])
+        self.scale = np.array([*scale, *(n.size for n in self.unknown)])
+        self.lower = np.array([each.lower for each in everything]) / self.scale
+        self.upper = np.array([each.upper for each in everything]) / self.scale
         self._fixed = model.values
 
     @property
     def start(self) -> FloatArray:
-        """The unknowns at the model's values."""
+        """The unknowns at the values to begin from."""
         return self.values / self.scale
 
-    def realise(self, x: FloatArray) -> Realisation:
-        """Matrices at x and their derivatives by x."""
-        count = len(self.physical_names)
-        theta = (x * self.scale[: len(x)]).tolist()
-        values = self._fixed | dict(zip(self.physical_names, theta[:count], strict=True))
-        at, d = self.model.linearise(values, self.physical_names)
-        by = self.scale[:count, None, None]
-        scaled = StateSpace(*(M * by for M in d))
-        if self.dt is None:
-            return Realisation.of(Linearisation(at, scaled))
-        if not 1e-6 < x[-1] < 4:
-            raise ArithmeticError(f"a hold of {theta[-1]:g} s is out of reach")
-        still = (np.concatenate([M, np.zeros((1, *M.shape[1:]))]) for M in scaled)
-        return Realisation.of(Linearisation(at, StateSpace(*still)), theta[-1], self.dt)
+    def with_unknown(self, nuisance: Nuisance, near: FloatArray) -> GreyStructure:
+        """The same with one unknown more, begun from the unknowns ``near``."""
+        values = dict(zip(self.physical_names, near * self.scale, strict=False))
+        return GreyStructure(self.model, values, (*self.unknown, nuisance), self.known)
 
-    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> FloatArray:
+    def physical(self, x: FloatArray) -> dict[str, float]:
+        """The plant's free parameters at x by name."""
+        theta = (x * self.scale[: len(x)]).tolist()
+        return dict(zip(self.physical_names, theta, strict=False))
+
+    def at(self, x: FloatArray) -> GreyBox:
+        """The plant at x."""
+        return self.model.with_values(**self.physical(x))
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """Matrices at x and their derivatives by x; ArithmeticError where there are none."""
+        at, d = self.model.linearise(self._fixed | self.physical(x), self.physical_names)
+        if not all(np.isfinite(M).all() for M in at):
+            raise ArithmeticError(f"the matrices are not finite at {self.describe(x)}")
+        scaled = d.times(self.scale[: self.count, None, None])
+        if self.unknown:
+            blank = [np.zeros((len(self.unknown), *M.shape)) for M in at]
+            scaled = StateSpace(*(np.concatenate(pair) for pair in zip(scaled, blank, strict=True)))
+        plant = Realisation.of(Linearisation(at, scaled))
+        for place, nuisance in enumerate(self.unknown, self.count):
+            plant = nuisance.applied(plant, float(x[place] * nuisance.size), place)
+        for nuisance in self.known:
+            plant = nuisance.applied(plant, nuisance.start, None)
+        return plant
+
+    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> ComplexArray:
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""
-        count = len(self.physical_names)
+        if self.unknown:
+            each = [sampled_response(self.realise(x), omega, hold)[0] for x in points]
+            return np.stack(each)
         theta = points * self.scale
-        columns = dict(zip(self.physical_names, theta.T[:count], strict=True))
-        at = self.model.state_spaces(**columns)
-        if self.dt is None:
-            return many_responses(at, omega, hold)
-        each = (
-            many_responses(StateSpace(*(M[[i]] for M in at)), omega, ZeroOrderHold(theta[i, -1]))
-            for i in range(len(theta))
-        )
-        return np.concatenate(list(each))
+        columns = dict(zip(self.physical_names, theta.T, strict=True))
+        return many_responses(self.model.state_spaces(**columns), omega, hold)
+
+    def response(
+        self, x: FloatArray, omega: FloatArray, hold: Hold | None
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Response at x through any hold, and its derivatives by x."""
+        plant = self.realise(x).at_known_period()
+        return sampled_response(plant, omega, BandLimited() if hold is None else hold)
+
+    def poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Poles at x (n,) in rad/s and their derivatives by x (n, P)."""
+        at, d = self.realise(x).linearisation
+        return eigenvalues_and_derivatives(at.A, d.A)
 
     def span(self, start: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds where there are both, else a factor on each side of the start."""
@@ -87,35 +113,10 @@ class GreyStructure:
         size = np.where(start == 0, 1.0, start)
         low = np.where(bounded, self.lower, np.where(start == 0, -1.0, size / SPREAD))
         high = np.where(bounded, self.upper, np.where(start == 0, 1.0, size * SPREAD))
-        if self.dt is not None:
-            low[-1], high[-1] = PERIODS
+        for place, nuisance in enumerate(self.unknown, self.count):
+            low[place], high[place] = nuisance.scattered
         return low, high
 
     def describe(self, x: FloatArray) -> str:
         """The parameter values at x."""
         return ", ".join(f"{n}={v:g}" for n, v in zip(self.names, x * self.scale, strict=True))
-
-
-class DelayedStructure(GreyStructure):
-    """A grey box behind a delay (s): known, or with ``unit`` (s) one more unknown, the last."""
-
-    def __init__(self, model: GreyBox, delay: float, unit: float | None = None) -> None:
-        super().__init__(model)
-        self.delay, self.unit = delay, unit
-        if unit is not None:
-            self.names = [*self.names, DELAY]
-            self.values, self.scale = np.append(self.values, delay), np.append(self.scale, unit)
-            self.lower = np.append(self.lower, -np.inf)
-            self.upper = np.append(self.upper, np.inf)
-
-    def realise(self, x: FloatArray) -> Realisation:
-        """Matrices at x and their derivatives by x, behind the delay at x."""
-        if self.unit is None:
-            return dataclasses.replace(super().realise(x), delay=self.delay)
-        count = len(self.physical_names)
-        inner = GreyStructure.realise(self, x[:count])
-        at, d = inner.linearisation
-        still = StateSpace(*(np.concatenate([M, np.zeros((1, *M.shape[1:]))]) for M in d))
-        delay = float(x[-1] * self.unit)
-        extended = Realisation.of(Linearisation(at, still))
-        return dataclasses.replace(extended, delay=delay, delay_scale=self.unit)

@@ -9,9 +9,9 @@ from freqid.checks import Array, FloatArray
 from freqid.data.record import Record
 from freqid.fitting.cost.experiments import Evaluation
 from freqid.frf.spectra import Spectra
-from freqid.lti.holds.hold import PeriodicHold, Sampled
+from freqid.lti.holds import PeriodicHold, Sampled
 from freqid.lti.realisation import Realisation
-from freqid.lti.sampled import Linearisation
+from freqid.lti.state_space import Linearisation
 from freqid.models.simulation import FreeMotion, forcing, propagate
 
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
-from freqid.fitting.cost.minimum import Structure
-from freqid.lti.holds.hold import PeriodicHold
+from freqid.fitting.cost.objective import Structure
+from freqid.lti.holds import PeriodicHold
 from freqid.lti.realisation import Realisation, sampled_response
 
 # lines of the first stage: enough to show every mode, few enough to cost next to nothing
@@ -99,29 +99,30 @@ def log_targets(experiments: Sequence[Experiment]) -> list[LogResponse]:
 
 def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
     """Frequencies and Ĝ (outputs, inputs, lines) at lines where one input frequency rules."""
-    m, channels, _ = e.U.shape
+    lines = e.lines
+    m, channels, _ = lines.U.shape
     if e.lift > 1 and isinstance(e.hold, PeriodicHold):
-        delays = np.exp(-1j * e.omega[None] * e.hold.period * np.arange(e.lift)[:, None])
+        delays = np.exp(-1j * lines.omega[None] * e.hold.period * np.arange(e.lift)[:, None])
         if m != e.lift or channels != 1:
             return None
-        U = (e.U[:, 0] * delays).sum(axis=0) / e.lift
-        total = (np.abs(e.U[:, 0]) ** 2).sum(axis=0) / e.lift
+        U = (lines.U[:, 0] * delays).sum(axis=0) / e.lift
+        total = (np.abs(lines.U[:, 0]) ** 2).sum(axis=0) / e.lift
     elif channels == m and m > 1:
         # a frequency response: unit inputs, one at a time
-        U, total = np.ones(len(e.omega)), np.ones(len(e.omega))
+        U, total = np.ones(e.n_lines), np.ones(e.n_lines)
     elif m == 1 and channels == 1:
-        every = e.U[0, 0].reshape(-1, e.aliases)
-        base = int(np.argmin(np.abs(e.omega_input[0] - e.omega[0])))
+        every = lines.U[0, 0].reshape(-1, lines.aliases)
+        base = int(np.argmin(np.abs(lines.omega_input[0] - lines.omega[0])))
         U, total = every[:, base], (np.abs(every) ** 2).sum(axis=1)
     else:
         return None
-    G = e.Y / np.where(U == 0, 1, U)
+    G = lines.Y / np.where(U == 0, 1, U)
     power = np.abs(U) ** 2
-    weight = (np.abs(e.scale) > 0).all(axis=(0, 1))
-    usable = (power > 1e-3 * power.max()) & (power > 0.98 * total) & weight & (e.omega > 0)
+    weight = (np.abs(lines.scale) > 0).all(axis=(0, 1))
+    usable = (power > 1e-3 * power.max()) & (power > 0.98 * total) & weight & (lines.omega > 0)
     usable &= (np.abs(G) > 0).all(axis=(0, 1))
-    lines = np.flatnonzero(usable)
-    if len(lines) < 8:
+    kept = np.flatnonzero(usable)
+    if len(kept) < 8:
         return None
-    lines = lines[np.unique(np.linspace(0, len(lines) - 1, _LINES).astype(int))]
-    return e.omega[lines], G[:, :, lines]
+    kept = kept[np.unique(np.linspace(0, len(kept) - 1, _LINES).astype(int))]
+    return lines.omega[kept], G[:, :, kept]

@@ -23,12 +23,16 @@ def noise_floor(experiments: Sequence[Experiment]) -> float:
 
 
 def _local_noise(e: Experiment) -> float:
-    if not isinstance(e, SpectralExperiment) or e.U.shape[:2] != (1, 1) or e.aliases > 1:
+    if (
+        not isinstance(e, SpectralExperiment)
+        or e.lines.U.shape[:2] != (1, 1)
+        or e.lines.aliases > 1
+    ):
         return 0.0
-    if not (e.scale > 0).all():
+    if not (e.lines.scale > 0).all():
         # among lines that are left out nothing is smooth
         e = e.thinned(1)
-    width, K = 12, len(e.omega)
+    width, K = 12, e.n_lines
     count = K // width
     if count < 4:
         return 0.0
@@ -36,7 +40,7 @@ def _local_noise(e: Experiment) -> float:
     at = picked[:, None] * width + np.arange(width)
     r = np.linspace(-1, 1, width)
     local = np.stack([np.ones(width), r, r**2], axis=-1)
-    U = e.U[0, 0][at]
+    U = e.lines.U[0, 0][at]
     scale = np.abs(U).max(axis=1, keepdims=True)
     basis = np.concatenate(
         [
@@ -46,7 +50,7 @@ def _local_noise(e: Experiment) -> float:
         axis=-1,
     )
     Q = np.linalg.qr(basis).Q
-    Y = (e.Y if e.line_scale is not None else e.Y * e.scale)[:, 0][:, at][..., None]
+    Y = e.lines.error(e.lines.Y)[:, 0][:, at][..., None]
     left = Y - Q @ (Q.conj().swapaxes(-1, -2) @ Y)
     variance = (np.abs(left[..., 0]) ** 2).sum(axis=-1) / (width - 6)
     return float(np.median(variance, axis=-1).sum() * K / _MEDIAN)

@@ -9,7 +9,7 @@ import scipy.ndimage
 
 from freqid.checks import FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.fitting.cost.minimum import Objective
+from freqid.fitting.cost.objective import Objective
 from freqid.lti.projection import eliminate
 
 # lines of an experiment that are enough for a covariance
@@ -43,22 +43,18 @@ def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
     System Identification, 1999, section 9.4); σ² is the local mean of the squared residual. None
     where the experiments have no lines, or nothing but rounding is left.
     """
-    experiments = objective.experiments
-    if not all(isinstance(e, SpectralExperiment) for e in experiments):
+    lines = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+    if len(lines) < len(objective.experiments):
         return None
     try:
         realisation = objective.structure.realise(x)
     except Exception:  # the user's function may raise anything
         return None
-    P = len(x)
-    total = np.zeros((P, P))
-    rows = unknown = 0
+    total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
     with np.errstate(all="ignore"):
-        for e in experiments:
-            assert isinstance(e, SpectralExperiment)
-            step = max(len(e.omega) // _LINES, 1)
+        for e in lines:
+            step = max(e.n_lines // _LINES, 1)
             few = e.thinned(step) if step > 1 else e
-            counted = (few.scale > 0).astype(float).reshape(-1, len(few.omega))
             evaluation = few.at(realisation)
             r, T, delta = evaluation.residual, evaluation.transient, None
             Q = np.zeros((0, len(r)))
@@ -67,13 +63,20 @@ def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
                 r = r - (Q @ r) @ Q
             J = evaluation.jacobian(delta)
             J = J - (J @ Q.T) @ Q
-            lines = r.view(complex).reshape(-1, len(few.omega))
-            # half of a complex error's power is in each of its parts
-            local = smoothed_power(lines) / np.maximum(smoothed_power(counted), 1e-9)
-            power = np.repeat(local.ravel() / 2, 2)
+            power = _local_power(r, few)
             total += (J * power) @ J.T / step
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)
     if not np.isfinite(total).all():
         return None
-    return total * rows / max(rows - unknown - P, 1)
+    return total * rows / max(rows - unknown - len(x), 1)
+
+
+def _local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """Local mean of the squared residual, for each of its real values."""
+    each = residual.view(complex).reshape(-1, e.n_lines)
+    counted = (e.lines.scale > 0).astype(float).reshape(each.shape)
+    local = smoothed_power(each) / np.maximum(smoothed_power(counted), 1e-9)
+    # half of a complex error's power is in each of its parts
+    power: FloatArray = np.repeat(local.ravel() / 2, 2)
+    return power

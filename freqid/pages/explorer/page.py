@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from freqid.checks import InputError
 from freqid.data.record import Record
 from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 from freqid.pages.explorer.state import HOLDS, PLANTS, Scene, State, label_of, presets, scene
@@ -32,7 +33,7 @@ def explore(
     """
     if host not in _LOOPBACK:
         if not allow_remote:
-            raise ValueError(
+            raise InputError(
                 f"--host {host} would open the page to other machines; give --allow-remote if "
                 "that is what you want"
             )
@@ -54,7 +55,7 @@ def free_port(host: str, port: int) -> int:
             except OSError:
                 continue
             return candidate
-    raise ValueError(f"--port {port} and the {_PORTS} behind it are busy; give another")
+    raise InputError(f"--port {port} and the {_PORTS} behind it are busy; give another")
 
 
 def application(record: Record | None = None) -> Any:
@@ -62,7 +63,7 @@ def application(record: Record | None = None) -> Any:
     try:
         import dash
     except ImportError:
-        raise ValueError("the explorer needs dash; pip install 'freqid[explore]'") from None
+        raise InputError("the explorer needs dash; pip install 'freqid[explore]'") from None
     app = dash.Dash(
         "freqid", title="freqid explorer", update_title="", serve_locally=True,
         suppress_callback_exceptions=True, index_string=_PAGE,

@@ -17,7 +17,7 @@ from freqid.data.record import Record
 from freqid.excitation.signals import chirp, sine
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Estimate
-from freqid.lti.holds.hold import Hold, ZeroOrderHold, as_hold
+from freqid.lti.holds import Hold, ZeroOrderHold, as_hold
 from freqid.models.grey_box import GreyBox
 from freqid.models.output_error import OutputError
 from freqid.models.plants import first_order, two_mass

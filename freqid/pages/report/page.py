@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, InputError
 from freqid.data.files import whole_file
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
-from freqid.lti.holds.hold import PeriodicHold, ZeroOrderHold
+from freqid.lti.holds import PeriodicHold, ZeroOrderHold
 from freqid.plots.style import COLOURS
 
 if TYPE_CHECKING:
@@ -30,10 +30,10 @@ def write_report(est: Estimate, path: str | Path, title: str | None = None) -> N
         import jinja2
         import plotly.offline
     except ImportError:
-        raise ValueError("a report needs jinja2 and plotly; pip install 'freqid[report]'") from None
+        raise InputError("a report needs jinja2 and plotly; pip install 'freqid[report]'") from None
     path = Path(path)
     if path.suffix.lower() not in (".html", ".htm"):
-        raise ValueError(f"path={str(path)!r} must end in .html")
+        raise InputError(f"path={str(path)!r} must end in .html")
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("freqid.pages.report", ""),
         autoescape=True,
@@ -95,7 +95,7 @@ def _records(est: Estimate) -> list[Record]:
 def _bias(est: Estimate) -> dict[str, float]:
     """The bias bar, where a record remembers another hold than the fit assumed."""
     from freqid.models.grey_box import GreyBox
-    from freqid.validation.comparison import hold_bias
+    from freqid.validation.repeats import hold_bias
 
     records = _records(est)
     if not records or len(records) < len(est.data) or not isinstance(est.model, GreyBox):
@@ -278,7 +278,7 @@ def _residuals(est: Estimate) -> list[dict[str, Any]]:
 
 
 def _tests(est: Estimate) -> list[dict[str, Any]]:
-    from freqid.validation.comparison import residual_test
+    from freqid.validation.residual_tests import residual_test
 
     records = _records(est)
     if not records:

@@ -1,0 +1,45 @@
+"""DataSet: what an experiment left, a Record or a FrequencyResponse, seen alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from freqid.checks import InputError
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+
+DataSet = Record | FrequencyResponse
+
+
+def as_data_sets(data: Any) -> tuple[DataSet, ...]:
+    """One data set or several, as a tuple; ValueError where there is none, or something else."""
+    sets = (data,) if isinstance(data, DataSet) else tuple(data)
+    if not sets:
+        raise InputError("data=[] holds no experiment; give at least one record or response")
+    for each in sets:
+        if not isinstance(each, DataSet):
+            raise InputError(
+                f"data holds a {type(each).__name__}; expected Record or FrequencyResponse"
+            )
+    return sets
+
+
+def channel_counts(data: DataSet) -> tuple[int, int]:
+    """Numbers of outputs and inputs."""
+    return len(data.output_names or ()), len(data.input_names or ())
+
+
+def common_names(sets: Sequence[DataSet]) -> tuple[Sequence[str], Sequence[str]]:
+    """Names of the inputs and of the outputs, as the first of the data sets has them."""
+    return tuple(sets[0].input_names or ()), tuple(sets[0].output_names or ())
+
+
+def input_dt(data: DataSet) -> float:
+    """Sample time of the input in s; 0 for a response in continuous time."""
+    return data.input_dt if isinstance(data, Record) else data.dt
+
+
+def rate_factor(data: DataSet) -> int:
+    """Input samples for each output sample."""
+    return data.factor if isinstance(data, Record) else 1

@@ -1,0 +1,158 @@
+"""The lines of an experiment as the cost sees them: data, where they are taken, and transient."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from freqid.lti.holds import Hold, PeriodicHold
+from freqid.lti.responses import Plane, on_circle
+
+
+@dataclass(frozen=True)
+class Lines:
+    """DFT lines, or a frequency response, and their weights.
+
+    ``omega`` (K,) in rad/s; ``omega_input`` (K, M) the input's frequencies that fold onto each.
+    ``Y`` (outputs, channels, K) and ``U`` (inputs, channels, K·M): one channel for a record, one
+    for each input for a frequency response. ``scale`` (outputs, channels, K) multiplies the error;
+    where it is one for all channels of a line it is in ``U`` and ``Y`` already (``inside``).
+    """
+
+    omega: FloatArray
+    omega_input: FloatArray
+    U: ComplexArray
+    Y: ComplexArray
+    scale: FloatArray
+    inside: bool
+
+    @classmethod
+    def weighted(
+        cls,
+        omega: FloatArray,
+        omega_input: FloatArray,
+        U: ComplexArray,
+        Y: ComplexArray,
+        scale: FloatArray,
+    ) -> Lines:
+        """The lines with one weight for all channels put into the data once and for all."""
+        one = scale[0, 0]
+        inside = bool((scale == one).all())
+        if inside:
+            U, Y = U * np.repeat(one, omega_input.size // len(omega)), Y * one
+        return cls(omega, omega_input, U, Y, scale, inside)
+
+    @property
+    def aliases(self) -> int:
+        """Input frequencies that fold onto each line, M."""
+        return self.omega_input.size // len(self.omega)
+
+    @property
+    def line_scale(self) -> FloatArray | float:
+        """What is in the data of each line already, (K,) or one."""
+        return self.scale[0, 0] if self.inside else 1.0
+
+    @property
+    def counted(self) -> BoolArray:
+        """Which lines have a weight, (K,)."""
+        kept: BoolArray = np.any(self.scale > 0, axis=(0, 1))
+        return kept
+
+    def error(self, values: ComplexArray) -> ComplexArray:
+        """Values (…, outputs, channels, K) with the weights that are not inside yet."""
+        return values if self.inside else values * self.scale
+
+    def rows(self, values: ComplexArray) -> FloatArray:
+        """Weighted (…, outputs, channels, K) as real rows, (…, 2·outputs·channels·K)."""
+        weighted = self.error(values)
+        return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-3], -1)).view(float)
+
+    def strongest(self) -> IntArray:
+        """Of each line's aliases the one with the most input, as an index into K·M, (K,)."""
+        power = np.abs(self.U).sum(axis=(0, 1)).reshape(-1, self.aliases)
+        return np.arange(len(power)) * self.aliases + power.argmax(axis=1)
+
+    def some(self, lines: IntArray, factor: float) -> Lines:
+        """Some of the lines, the data multiplied so that costs stay comparable."""
+        inputs = runs(lines, self.aliases)
+        return Lines(
+            self.omega[lines],
+            self.omega_input[lines],
+            self.U[..., inputs] * factor,
+            self.Y[..., lines] * factor,
+            self.scale[..., lines],
+            self.inside,
+        )
+
+
+@dataclass(frozen=True)
+class Points:
+    """Where the resolvent of the forced response is taken, (K·M,), and the input it meets there."""
+
+    z: ComplexArray
+    U: ComplexArray
+
+    def some(self, inputs: IntArray, factor: float) -> Points:
+        """At some of the input's lines."""
+        return Points(self.z[inputs], self.U[..., inputs] * factor)
+
+    def in_plane(self, plane: Plane, U: ComplexArray) -> Points:
+        """Points in z seen in another plane, which the inputs ``U`` drive."""
+        z = plane.points(self.z)
+        return Points(z, U * plane.input_factor(z))
+
+
+@dataclass(frozen=True)
+class Transient:
+    """The free motion at the lines: C (zI − Φ)⁻¹ z δ over the sample time ``dt`` (s) of the output.
+
+    ``z`` and ``factor`` (K·aliases,): several where the plant is known only at a faster period,
+    (z^M I − Φ^M)⁻¹ z^M being the mean of (zI − Φ)⁻¹ z over the M aliases. ``shared`` says that the
+    resolvent is that of the forced response.
+    """
+
+    dt: float
+    z: ComplexArray
+    factor: ComplexArray
+    aliases: int
+    shared: bool
+
+    @classmethod
+    def of(
+        cls, lines: Lines, dt: float, hold: Hold, z_forced: ComplexArray, discrete: bool, lift: int
+    ) -> Transient:
+        """In the plane of z; ``discrete`` matrices belong to the period of the ``hold``."""
+        period = hold.period * lift if isinstance(hold, PeriodicHold) else 0.0
+        shared = lines.aliases == 1 and period > 0 and abs(dt / period - 1) < 1e-9
+        aliases = 1
+        if shared:
+            z = z_forced
+        elif discrete and isinstance(hold, PeriodicHold):
+            aliases = round(dt / hold.period)
+            turns = 2 * np.pi * np.arange(aliases) / dt
+            z = on_circle((lines.omega[:, None] + turns).ravel() * hold.period)
+        else:
+            z = on_circle(lines.omega * dt)
+        factor = z / aliases
+        if lines.inside:
+            factor = factor * np.repeat(lines.scale[0, 0], aliases)
+        return cls(dt, z, factor, aliases, shared)
+
+    def some(self, lines: IntArray, factor: float) -> Transient:
+        """At some of the lines."""
+        at = runs(lines, self.aliases)
+        return dataclasses.replace(self, z=self.z[at], factor=self.factor[at] * factor)
+
+    def in_plane(self, plane: Plane) -> Transient:
+        """A transient in z seen in another plane."""
+        z = plane.points(self.z)
+        factor = self.factor / self.z * plane.free_factor(z)
+        return dataclasses.replace(self, z=z, factor=factor)
+
+
+def runs(lines: IntArray, length: int) -> IntArray:
+    """Members of the runs of ``length`` that belong to some lines."""
+    return (lines[:, None] * length + np.arange(length)).ravel()

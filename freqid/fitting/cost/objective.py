@@ -1,0 +1,165 @@
+"""The cost: initial states eliminated, everything at a trial point in one small triangle.
+
+V(x) = min over the initial states of |r(x) + T(x) δ|². The residual handed to the optimiser is
+P r with P the projector off the columns of T, and its Jacobian P (dr + dT δ): Kaufman's
+approximation (BIT 15, 1975), whose gradient is exact. Both are then turned by one orthogonal
+matrix to a triangle of as many rows as there are parameters, so that the optimiser's own work
+does not grow with the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.cost.experiments import Experiment
+from freqid.fitting.cost.priors import Prior
+from freqid.lti.holds import Hold
+from freqid.lti.projection import eliminate, triangle_of
+from freqid.lti.realisation import Realisation
+
+
+class Structure(Protocol):
+    """What the optimiser needs of a model: its unknowns, scaled to be of order one."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    def realise(self, x: FloatArray) -> Realisation:
+        """The plant and its derivatives by x at a trial point; may raise."""
+        ...
+
+    def describe(self, x: FloatArray) -> str:
+        """The trial point in the user's words, for errors."""
+        ...
+
+
+class ScannableStructure(Structure, Protocol):
+    """A structure that can be looked at in many trial points at once."""
+
+    def span(self, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest values to scatter starts over."""
+        ...
+
+    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> ComplexArray:
+        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
+        ...
+
+
+class EstimatedStructure(Structure, Protocol):
+    """A structure that says what a user asks of an estimate, each with its derivatives by x."""
+
+    names: list[str]
+
+    def response(
+        self, x: FloatArray, omega: FloatArray, hold: Hold | None
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Response (outputs, inputs, K) at omega (rad/s), and derivatives (P, …)."""
+        ...
+
+    def poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Poles (n,) in rad/s and their derivatives (n, P)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Point:
+    """Cost at a trial point, with the triangle (P+1, P+1) of Jacobian and residual.
+
+    ``parts`` are the shares of the experiments, in order, and then that of the prior.
+    """
+
+    triangle: FloatArray
+    initial: list[FloatArray | None]
+    parts: list[float]
+
+    @property
+    def cost(self) -> float:
+        """V: the sum of squares."""
+        return float(sum(self.parts))
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Turned Jacobian, (P+1, P)."""
+        return self.triangle[:, :-1]
+
+    @property
+    def residual(self) -> FloatArray:
+        """Turned residual, (P+1,)."""
+        return self.triangle[:, -1]
+
+    @property
+    def n_initial(self) -> int:
+        """Unknowns of all initial states."""
+        return sum(len(d) for d in self.initial if d is not None)
+
+
+class Objective:
+    """The cost of a structure on experiments, remembering the last points it computed."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        experiments: Sequence[Experiment],
+        prior: Prior | None = None,
+    ) -> None:
+        self.structure, self.experiments, self.prior = structure, experiments, prior
+        self.n_evaluations = 0
+        self.failure: Exception | None = None
+        self.energy = float(sum(e.energy for e in experiments))
+        self.n_rows = sum(e.n_rows for e in experiments)
+        # a cost this small is nothing but the rounding of the data's own sums
+        self.rounding = 1e-20 * self.energy
+        self._points: dict[bytes, Point | None] = {}
+
+    def of(self, structure: Structure, prior: Prior | None) -> Objective:
+        """The cost of another structure on the same experiments, evaluations counted on."""
+        other = Objective(structure, self.experiments, prior)
+        other.n_evaluations = self.n_evaluations
+        return other
+
+    def point(self, x: FloatArray) -> Point | None:
+        """Everything at x; None where the model cannot be computed there."""
+        key = x.tobytes()
+        if key not in self._points:
+            if len(self._points) > 3:
+                self._points.pop(next(iter(self._points)))
+            self.n_evaluations += 1
+            with np.errstate(all="ignore"):
+                self._points[key] = self._compute(x)
+        return self._points[key]
+
+    def _compute(self, x: FloatArray) -> Point | None:
+        try:
+            realisation = self.structure.realise(x)
+        except Exception as error:  # the user's function may raise anything at a trial point
+            self.failure = error
+            return None
+        blocks, initial, parts = [], [], []
+        try:
+            for experiment in self.experiments:
+                evaluation = experiment.at(realisation)
+                r, T, delta = evaluation.residual, evaluation.transient, None
+                Q = None
+                if T is not None:
+                    Q, delta = eliminate(T, r)
+                    r = r - (Q @ r) @ Q
+                blocks.append((evaluation.jacobian(delta), r, Q))
+                initial.append(delta)
+                parts.append(float(r @ r))
+        except (np.linalg.LinAlgError, InputError) as error:
+            self.failure = error
+            return None
+        if self.prior is not None:
+            known = self.prior.rows(x)
+            blocks.append((known[:, :-1].T, known[:, -1], None))
+            parts.append(float(known[:, -1] @ known[:, -1]))
+        triangle = triangle_of(blocks)
+        if not np.isfinite(triangle).all():
+            self.failure = ArithmeticError("the response is not finite")
+            return None
+        return Point(triangle, initial, parts)

@@ -1,0 +1,139 @@
+"""What speaks against an estimate: sentences that know their kind, weight and number.
+
+A new warning is one function here, marked with ``@sign``: it reads the evidence and yields
+findings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.models.parameter import Parameter
+
+Severity = Literal["serious", "minor"]
+
+# a bound that is nearer than this part of the value, or of its standard error, is reached
+_AT_BOUND = 1e-6
+# beyond its physical range by so many standard errors a value is unphysical for certain
+_CERTAIN = 2.0
+# an estimated hold of so large a part of the sample time says nothing of decimation
+_FULL = 0.75
+
+
+class Finding(str):
+    """A sentence of ``est.warnings``: a ``str`` with ``kind``, ``severity`` and ``number``.
+
+    >>> found = Finding("edge of a bound", "d=0 is at its bound 0", number=0.0)
+    >>> found, found.kind
+    ('edge of a bound: d=0 is at its bound 0', 'edge of a bound')
+    """
+
+    kind: str
+    severity: Severity
+    number: float | None
+
+    def __new__(
+        cls, kind: str, sentence: str, severity: Severity = "serious", number: float | None = None
+    ) -> Finding:
+        self = super().__new__(cls, f"{kind}: {sentence}")
+        self.kind, self.severity, self.number = kind, severity, number
+        return self
+
+    def __getnewargs__(self) -> tuple[str, str, Severity, float | None]:  # type: ignore[override]
+        return self.kind, self[len(self.kind) + 2 :], self.severity, self.number
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the warnings are read from.
+
+    ``values`` and ``std`` (P,) of ``parameters``; ``loose`` are sentences on what the data leave
+    open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s).
+    """
+
+    parameters: Sequence[Parameter]
+    values: FloatArray
+    std: FloatArray
+    failure: str = ""
+    loose: Sequence[str] = ()
+    hold_period: tuple[float, float] | None = None
+    dt: float = 0.0
+
+
+Sign = Callable[[Evidence], Iterable[Finding]]
+SIGNS: list[Sign] = []
+
+
+def sign(function: Sign) -> Sign:
+    """Mark a function as one that reads warnings from the evidence."""
+    SIGNS.append(function)
+    return function
+
+
+def findings(evidence: Evidence) -> list[Finding]:
+    """All that speaks against an estimate."""
+    return [found for read in SIGNS for found in read(evidence)]
+
+
+@sign
+def not_converged(e: Evidence) -> Iterator[Finding]:
+    """The descent did not end in a minimum."""
+    if e.failure:
+        yield Finding("not converged", e.failure)
+
+
+@sign
+def not_identifiable(e: Evidence) -> Iterator[Finding]:
+    """The data leave a combination of parameters open."""
+    for sentence in e.loose:
+        yield Finding("not identifiable", sentence)
+
+
+@sign
+def not_physical(e: Evidence) -> Iterator[Finding]:
+    """A parameter outside its physical range."""
+    for p, value, error in zip(e.parameters, e.values, e.std, strict=True):
+        low, high = p.physical
+        if low <= value <= high:
+            continue
+        beyond = low - value if value < low else value - high
+        why, severity = "check the hold that was assumed and the band", "serious"
+        if beyond < _CERTAIN * error:
+            why = "by less than two standard errors, so that the data allow a physical value"
+            severity = "minor"
+        named = f"{p.name}={value:.6g} {p.unit}".rstrip()
+        sentence = f"{named} lies outside [{low:g}, {high:g}]; {why}"
+        yield Finding("not physical", sentence, severity, float(value))  # type: ignore[arg-type]
+
+
+@sign
+def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
+    """A parameter at a bound of its search."""
+    for p, value, error in zip(e.parameters, e.values, e.std, strict=True):
+        for bound in (p.lower, p.upper):
+            size = max(abs(bound), abs(value), error if np.isfinite(error) else 0.0)
+            if np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * size:
+                sentence = (
+                    f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
+                )
+                yield Finding("edge of a bound", sentence, number=float(value))
+
+
+@sign
+def decimated(e: Evidence) -> Iterator[Finding]:
+    """An estimated hold that is significantly shorter than the sample time."""
+    if e.hold_period is None:
+        return
+    period, std = e.hold_period
+    if np.isfinite(std) and e.dt - period >= 3 * std and period <= _FULL * e.dt:
+        yield Finding(
+            "decimated",
+            f"the input was held for {period:.4g} s and the sample time is {e.dt:.4g} s; this "
+            f"record was probably decimated by about {e.dt / period:.0f}",
+            number=e.dt / period,
+        )

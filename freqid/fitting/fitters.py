@@ -1,0 +1,61 @@
+"""What fits which kind of model: a new estimator marks its function with ``@fits``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from freqid.checks import InputError
+from freqid.fitting.estimate import Estimate
+from freqid.fitting.reading import Reading
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """Where a search begins and how long it goes on, as in ``fit``: None starts for "auto".
+
+    ``estimated_hold`` makes the period of a zero-order hold one more unknown.
+    """
+
+    n_starts: int | None = None
+    seed: int = 0
+    start: Mapping[str, float] | None = None
+    estimated_hold: bool = False
+
+
+Fitter = Callable[[Any, Sequence[Reading], SearchOptions], Estimate]
+F = TypeVar("F", bound=Fitter)
+FITTERS: dict[type, Fitter] = {}
+
+
+def fits(kind: type, black_box: bool = False) -> Callable[[F], F]:
+    """Mark a function as the one that fits models of a kind.
+
+    A black box needs no start and can imitate any hold: neither may be asked for.
+    """
+
+    def mark(function: F) -> F:
+        def checked(model: Any, readings: Sequence[Reading], options: SearchOptions) -> Estimate:
+            if options.start is not None:
+                raise InputError(
+                    "start has no meaning for a black box, which needs none; leave it out"
+                )
+            if options.estimated_hold:
+                raise InputError(
+                    "hold='estimate' needs a GreyBox; a black box can imitate any delay"
+                )
+            return function(model, readings, options)
+
+        FITTERS[kind] = checked if black_box else function
+        return function
+
+    return mark
+
+
+def fitter_of(model: Any) -> Fitter:
+    """The function that fits a model; ValueError for what nothing fits."""
+    if type(model) not in FITTERS:
+        names = ", ".join(kind.__name__ for kind in FITTERS)
+        raise InputError(f"model={type(model).__name__} is not a model; expected one of {names}")
+    return FITTERS[type(model)]

@@ -1,0 +1,146 @@
+"""What is taken to be known of the noise: from it follow the weights of the lines.
+
+A noise model that has a ``name`` is known by it wherever an argument ``weights`` takes one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray, InputError, choice
+from freqid.data.data_set import DataSet
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+from freqid.fitting.uncertainty.noise_spectrum import noise_weights
+
+
+class NoiseModel(ABC):
+    """Weights of the squared errors of one data set.
+
+    ``plain`` says that there are none. Where the noise's ``variance`` in each real value of the
+    cost is known it is given.
+    """
+
+    name: ClassVar[str] = ""
+    named: ClassVar[dict[str, type[NoiseModel]]] = {}
+    plain: bool = False
+    variance: float | None = None
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "name" in cls.__dict__:
+            NoiseModel.named[cls.name] = cls
+
+    @classmethod
+    def of(cls, data: DataSet) -> NoiseModel:
+        """The model for one data set; InputError where that cannot have it."""
+        return cls()
+
+    @abstractmethod
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        """What multiplies |error|², broadcasting against errors (outputs, lines) of a record or
+        (outputs, inputs, lines) of a response.
+        """
+
+    @property
+    def to_be_learnt(self) -> bool:
+        """Whether a fit has to come before, and tells it anew."""
+        return False
+
+    def learnt(self, error: ComplexArray, n_samples: int) -> NoiseModel:
+        """The model after a fit that left these errors (outputs, lines) of so many samples."""
+        return self
+
+
+class BiasIntegral(NoiseModel):
+    """None at all: ones (the bias integral, paper eq. 2), for a response its input spectrum."""
+
+    plain = True
+
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        if isinstance(data, FrequencyResponse) and data.input_spectrum is not None:
+            return data.input_spectrum
+        return np.ones(shape)
+
+
+@dataclass(frozen=True, eq=False)
+class GivenWeights(NoiseModel):
+    """An array, (lines,) or as the errors are."""
+
+    given: Any
+
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        array = np.asarray(self.given, dtype=float)
+        if array.shape not in ((shape[-1],), shape):
+            raise InputError(f"weights has shape {array.shape}; expected ({shape[-1]},) or {shape}")
+        if not np.isfinite(array).all() or (array < 0).any() or not array.any():
+            raise InputError("weights must be finite and not negative, with at least one above 0")
+        return array
+
+
+class ResponseNoise(NoiseModel):
+    """1/variance of a response, that of its own measurement."""
+
+    # a complex error of unit variance has half of it in each of its parts
+    variance = 0.5
+
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        assert isinstance(data, FrequencyResponse)
+        assert data.variance is not None
+        return 1 / data.variance
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredNoise(NoiseModel):
+    """``weights="noise"``: 1/variance, a response's own, or of what fits leave of a record.
+
+    Every real value of the noise then adds a half to the cost.
+    """
+
+    name: ClassVar[str] = "noise"
+    found: FloatArray | None = None
+
+    @classmethod
+    def of(cls, data: DataSet) -> NoiseModel:
+        if isinstance(data, Record):
+            return cls()
+        if data.variance is None:
+            raise InputError("weights='noise' needs frf.variance, and this response has none")
+        return ResponseNoise()
+
+    @property
+    def variance(self) -> float | None:  # type: ignore[override]
+        """That of each real value, once the noise is known."""
+        return None if self.found is None else 0.5
+
+    @property
+    def plain(self) -> bool:  # type: ignore[override]
+        """Before the noise is known."""
+        return self.found is None
+
+    @property
+    def to_be_learnt(self) -> bool:
+        """Each fit tells the noise better than the one before."""
+        return True
+
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        return np.ones(shape) if self.found is None else self.found
+
+    def learnt(self, error: ComplexArray, n_samples: int) -> NoiseModel:
+        return MeasuredNoise(noise_weights(error, n_samples))
+
+
+def as_noise_model(weights: Any, data: DataSet) -> NoiseModel:
+    """What an argument ``weights`` means for a data set; InputError where it means nothing."""
+    if isinstance(weights, NoiseModel):
+        return weights
+    if weights is None:
+        return BiasIntegral()
+    if isinstance(weights, str):
+        choice("weights", weights, tuple(NoiseModel.named))
+        return NoiseModel.named[weights].of(data)
+    return GivenWeights(weights)

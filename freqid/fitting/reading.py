@@ -1,0 +1,168 @@
+"""Reading: one data set with everything that a fit takes for granted of it, resolved once."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data.band import Band, as_band
+from freqid.data.data_set import DataSet, channel_counts, input_dt
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.time_experiments import TimeExperiment
+from freqid.fitting.noise_models import BiasIntegral, NoiseModel
+from freqid.frf.spectra import spectra
+from freqid.lti.holds import BandLimited, Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.lti.responses import Plane
+
+InitialState = Literal["estimate", "zero", "steady"]
+Domain = Literal["frequency", "time"]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A data set, the hold that is assumed for it, its band, its noise and its initial state.
+
+    ``skip_zero`` leaves out the line at zero, where a plant that integrates answers with anything
+    at all; ``delayed`` keeps a fast input as its alias frequencies, which a delay merely turns.
+    """
+
+    data: DataSet
+    hold: Hold
+    band: Band | None = None
+    noise: NoiseModel = field(default_factory=BiasIntegral)
+    initial_state: InitialState = "estimate"
+    domain: Domain = "frequency"
+    skip_zero: bool = False
+    delayed: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        data: DataSet,
+        hold: Hold | str | None = None,
+        band: tuple[float, float] | None = None,
+        noise: NoiseModel | None = None,
+        initial_state: InitialState = "estimate",
+        domain: Domain = "frequency",
+        skip_zero: bool = False,
+        delayed: bool = False,
+    ) -> Reading:
+        """With hold and band as a user gives them. Raises ValueError where they do not fit."""
+        if isinstance(data, Record):
+            # a name means the hold at the sample time of the input as it was kept
+            assumed = as_hold(hold, data.input_dt, data.hold)
+            nyquist = 0.5 / data.input_dt
+        else:
+            if domain == "time":
+                raise InputError("domain='time' needs a Record, not a FrequencyResponse")
+            if isinstance(hold, str) and hold != "bl" and data.dt == 0:
+                raise InputError(
+                    f"hold={hold!r} needs a sample time and this response has dt=0; give a Hold"
+                )
+            assumed = as_hold(hold, data.dt or 1.0, data.hold or BandLimited())
+            nyquist = np.inf
+        limits = as_band(band, nyquist)
+        noise = noise or BiasIntegral()
+        return cls(data, assumed, limits, noise, initial_state, domain, skip_zero, delayed)
+
+    @property
+    def in_time(self) -> bool:
+        """Whether the errors are those of samples: lines know of no state that is at rest."""
+        return self.initial_state != "steady" and (
+            self.domain == "time" or self.initial_state == "zero"
+        )
+
+    def at_lines(self) -> Reading:
+        """The same data at their lines, the initial state free where it was at rest."""
+        state: InitialState = "steady" if self.initial_state == "steady" else "estimate"
+        return dataclasses.replace(self, domain="frequency", initial_state=state)
+
+    def with_(self, **changes: object) -> Reading:
+        """The same with other settings."""
+        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+
+    @property
+    def sample_time(self) -> float:
+        """Period in s of a sampled model of these data: that of the hold, or of the input."""
+        held = isinstance(self.hold, PeriodicHold)
+        return self.hold.period if held else input_dt(self.data)  # type: ignore[attr-defined]
+
+    def experiment(self, plane: Plane | None = None) -> Experiment:
+        """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
+        if self.in_time:
+            return self._samples(plane)
+        return self.lines(plane)
+
+    def lines(self, plane: Plane | None = None) -> SpectralExperiment:
+        """The lines of the data as residuals, whatever the domain of the fit."""
+        # a sampled model of a band-limited input has z at the input's sample time
+        hold = self.hold
+        if plane is not None and not isinstance(hold, PeriodicHold):
+            hold = ZeroOrderHold(input_dt(self.data) or 1.0)
+        if isinstance(self.data, FrequencyResponse):
+            frf = self.data
+            if plane is not None and frf.dt == 0:
+                raise InputError(
+                    "a sampled model needs a response with a sample time; this one has dt=0"
+                )
+            if self.band is not None:
+                frf = frf.select(self.band)
+            weights = self.noise.weights(frf, frf.response.shape)
+            return SpectralExperiment.of_response(frf, hold, weights, plane)
+        record = self.data
+        at_input = isinstance(hold, PeriodicHold) and np.isclose(
+            hold.period, record.input_dt, rtol=1e-9
+        )
+        lifted = bool(at_input) and plane is None and not self.delayed
+        s = spectra(record, self.band, lifted=lifted)
+        if self.skip_zero:
+            s = s.without_zero()
+        weights = self.noise.weights(record, s.Y.shape)
+        free = self.initial_state != "steady"
+        return SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
+
+    def _samples(self, plane: Plane | None) -> TimeExperiment:
+        assert isinstance(self.data, Record)
+        record, hold = self.data, self.hold
+        if not self.noise.plain:
+            raise InputError("weights need domain='frequency' and an initial state not at rest")
+        if not isinstance(hold, PeriodicHold) or abs(hold.period / record.input_dt - 1) > 1e-9:
+            raise InputError(
+                f"hold={hold!r} cannot be simulated from an input at {record.input_dt:g} s; use "
+                "domain='frequency' with initial_state='estimate', or keep the input when "
+                "decimating"
+            )
+        lines = None if self.band is None else spectra(record, self.band)
+        free = self.initial_state == "estimate"
+        return TimeExperiment(record, hold if plane is None else None, lines, free)
+
+
+def read_for(
+    shape: tuple[int, int], readings: Sequence[Reading], plane: Plane | None = None
+) -> list[Experiment]:
+    """Every reading as residuals of a model with (outputs, inputs); ValueError for other data."""
+    for r in readings:
+        given = channel_counts(r.data)
+        if given != shape:
+            raise InputError(
+                f"data have {given[0]} outputs and {given[1]} inputs; the model has {shape[0]} "
+                f"and {shape[1]}"
+            )
+    return [r.experiment(plane) for r in readings]
+
+
+def enough_rows(experiments: Sequence[Experiment], n_parameters: int) -> None:
+    """ValueError when the data are fewer than the parameters."""
+    n_rows = sum(e.n_rows for e in experiments)
+    if n_rows < n_parameters:
+        raise InputError(
+            f"data hold {n_rows} real values for {n_parameters} free parameters; widen the band, "
+            "lengthen the record or fix parameters"
+        )

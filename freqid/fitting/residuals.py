@@ -1,0 +1,82 @@
+"""What a model leaves of a record: errors at the DFT lines and in time, transient taken off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+
+from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.data.band import Band
+from freqid.data.data_set import channel_counts
+from freqid.data.record import Record
+from freqid.fitting.reading import Reading, read_for
+from freqid.lti.holds import Hold
+from freqid.lti.projection import eliminate
+from freqid.lti.responses import Plane
+from freqid.models.model import Model
+
+
+@dataclass(frozen=True)
+class LineErrors:
+    """Errors Ŷ − Y (outputs, K) at lines ``omega`` (rad/s), and how often each line counts.
+
+    ``n_samples`` is N, the whole output samples, ``dt`` their sample time in s.
+    """
+
+    omega: FloatArray
+    error: ComplexArray
+    multiplicity: FloatArray
+    n_samples: int
+    dt: float
+
+    def in_time(self) -> FloatArray:
+        """The same errors as signals (N, outputs); lines that are left out are zero."""
+        N = self.n_samples
+        E = np.zeros((len(self.error), N // 2 + 1), complex)
+        E[:, np.round(self.omega * N * self.dt / (2 * np.pi)).astype(int)] = self.error
+        signals: FloatArray = scipy.fft.irfft(E, N, axis=-1).T
+        return signals
+
+
+def line_errors(
+    model: Model,
+    record: Record,
+    hold: Hold | str | None = None,
+    band: Band | None = None,
+    initial_state: str = "estimate",
+) -> LineErrors:
+    """Errors of a model on a record at the lines of a band.
+
+    ``hold`` is what the input is taken to do; None is what the record remembers. Raises ValueError
+    for channels that do not match.
+    """
+    if initial_state == "zero":
+        raise InputError("initial_state='zero' has no errors at lines; use 'estimate'")
+    late = bool(model.delay)
+    reading = Reading.of(
+        record, hold, band, initial_state=initial_state,  # type: ignore[arg-type]
+        skip_zero=model.integrates, delayed=late,
+    )  # fmt: skip
+    return errors_of(model, reading)
+
+
+def errors_of(model: Model, reading: Reading) -> LineErrors:
+    """Errors of a model at the lines of a reading, its weights saying which tell the transient."""
+    record = reading.data
+    assert isinstance(record, Record)
+    plane = Plane() if model.dt else None
+    shape = model.n_outputs, model.n_inputs
+    (experiment,) = read_for(shape, [reading.at_lines()], plane)
+    lines = experiment.lines  # type: ignore[attr-defined]
+    evaluation = experiment.at(model.still())
+    rows = evaluation.residual
+    if evaluation.transient is not None:
+        Q, _ = eliminate(evaluation.transient, rows)
+        rows = rows - (Q @ rows) @ Q
+    error = rows.view(complex).reshape(channel_counts(record)[0], -1) / lines.scale[:, 0]
+    N = len(record.u) // record.factor
+    number = np.round(lines.omega * N * record.dt / (2 * np.pi))
+    multiplicity = np.where((number == 0) | (2 * number == N), 1.0, 2.0)
+    return LineErrors(lines.omega, error, multiplicity, N, record.dt)

@@ -1,0 +1,162 @@
+"""Down to a minimum: Levenberg-Marquardt, and Gauss-Newton steps from close by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.objective import Objective, Point, Structure
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the optimiser stopped and why."""
+
+    x: FloatArray
+    point: Point
+    converged: bool
+    message: str
+
+    @property
+    def cost(self) -> float:
+        """V at x."""
+        return self.point.cost
+
+
+# relative gain in cost that ends a search within bounds
+_BOUNDED = 1e-9
+# a trial point that cannot be computed costs this: any step to it is rejected and shortened
+_WALL = 1e100
+
+
+def minimise(
+    objective: Objective, start: FloatArray, tolerance: float = 1e-14, limit: int | None = None
+) -> Solution:
+    """Least squares from one start: Levenberg-Marquardt, or trust-region reflective with bounds.
+
+    ``limit`` is the most evaluations. Raises ValueError when the model cannot be computed at the
+    start.
+    """
+    first = objective.point(start)
+    if first is None:
+        raise InputError(
+            f"the model cannot be computed at {objective.structure.describe(start)}: "
+            f"{objective.failure}; give another start"
+        )
+    size = len(start) + 1
+
+    def residual(x: FloatArray) -> FloatArray:
+        point = objective.point(x)
+        return np.full(size, _WALL) if point is None else _padded(point.residual, size)
+
+    def jacobian(x: FloatArray) -> FloatArray:
+        point = objective.point(x)
+        return np.zeros((size, size - 1)) if point is None else _padded(point.jacobian, size)
+
+    lower, upper = objective.structure.lower, objective.structure.upper
+    bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
+    if bounded:
+        # next to a bound the reflective steps gain ever less, for ever
+        tolerance = max(tolerance, _BOUNDED)
+    result = scipy.optimize.least_squares(
+        residual,
+        start,
+        jac=jacobian,
+        bounds=(lower, upper) if bounded else (-np.inf, np.inf),
+        method="trf" if bounded else "lm",
+        x_scale="jac",
+        ftol=max(tolerance, 1e-15),
+        xtol=max(1e-2 * tolerance, 1e-12),
+        gtol=1e-15,
+        max_nfev=limit or 100 * size,
+    )
+    point = objective.point(result.x)
+    if point is None:
+        return Solution(start, first, False, "no step from the start could be computed")
+    return Solution(result.x, point, result.status > 0, result.message)
+
+
+# a Gauss-Newton step of this relative size needs no second look: the next one is its square
+_LAST_STEP = 1e-7
+
+
+def polish(
+    objective: Objective,
+    x: FloatArray,
+    last_step: float = _LAST_STEP,
+    limit: int | None = None,
+    tolerance: float = 1e-14,
+) -> Solution:
+    """A few Gauss-Newton steps from a point close to the minimum; a full search where they fail
+    or would leave the bounds.
+
+    The unknowns are of order one. A step below ``last_step`` is taken without a second look.
+    """
+    point = objective.point(x)
+    P = len(x)
+    for _ in range(12):
+        if point is None or len(point.triangle) <= P:
+            break
+        if point.cost <= objective.rounding:
+            return Solution(x, point, True, "The cost is down to rounding.")
+        step, c = _gauss_newton(point), point.triangle[:P, P]
+        if step is None or _outside(objective.structure, x + step):
+            break
+        # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain
+        if np.abs(step).max() <= last_step or float(c @ c) <= tolerance * point.cost:
+            left = max(1 - float(c @ c) / max(point.cost, 1e-300), 0.0)
+            triangle = point.triangle.copy()
+            triangle[:P, P] = 0
+            end = Point(triangle, point.initial, [p * left for p in point.parts])
+            return Solution(x + step, end, True, "Gauss-Newton steps became negligible.")
+        trial = objective.point(x + step)
+        if trial is None or trial.cost > point.cost:
+            break
+        x, point = x + step, trial
+    return minimise(objective, x, tolerance, limit)
+
+
+def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
+    """Gauss-Newton steps from a minimum for as long as they shrink.
+
+    A cost that no longer falls in sixteen digits leaves half of them in x; the gradient has more.
+    """
+    P, smallest = len(x), np.inf
+    for _ in range(limit):
+        point = objective.point(x)
+        if point is None or len(point.triangle) <= P:
+            break
+        step = _gauss_newton(point)
+        if step is None:
+            break
+        size = float(np.abs(step / np.maximum(np.abs(x), 1e-3)).max())
+        moved = x + step
+        if not size < smallest or _outside(objective.structure, moved):
+            break
+        x, smallest = moved, size
+        if size < 1e-13:
+            break
+    return x
+
+
+def _gauss_newton(point: Point) -> FloatArray | None:
+    """The step to the minimum of the linearised cost; None where unknowns cannot be told apart."""
+    R, c = point.triangle[:-1, :-1], point.triangle[:-1, -1]
+    pivots = np.abs(R.diagonal())
+    if pivots.min() <= 1e-8 * pivots.max():
+        return None
+    return -np.linalg.solve(R, c)
+
+
+def _outside(structure: Structure, x: FloatArray) -> bool:
+    return bool(((x < structure.lower) | (x > structure.upper)).any())
+
+
+def _padded(rows: FloatArray, size: int) -> FloatArray:
+    """Rows of a triangle that has fewer than ``size``, where the data are fewer than unknowns."""
+    if len(rows) == size:
+        return rows
+    return np.concatenate([rows, np.zeros((size - len(rows), *rows.shape[1:]))])

@@ -1,0 +1,58 @@
+"""Scattered starts, the most promising first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.fitting.cost.objective import Objective, ScannableStructure
+from freqid.fitting.search.log_stage import LogResponse
+
+# scattered points that are looked at before the best of them are walked from, and lines of a look
+_GLANCES, _GLANCE_LINES = 512, 40
+
+
+def promising(
+    objective: Objective,
+    start: FloatArray,
+    targets: Sequence[LogResponse],
+    count: int,
+    seed: int,
+) -> FloatArray:
+    """Scattered points in order of their cost: a look at many is cheaper than a walk from one."""
+    structure = cast(ScannableStructure, objective.structure)
+    if targets:
+        points = _scattered(structure, start, max(_GLANCES, count), seed)
+        cost = np.zeros(len(points))
+        with np.errstate(all="ignore"):
+            for target in targets:
+                few = np.linspace(0, len(target.omega) - 1, _GLANCE_LINES).astype(int)
+                G = structure.responses(points, target.omega[few], target.hold)
+                ratio = G / target.measured[..., few]
+                error = np.log(np.abs(ratio)) ** 2 + np.angle(ratio) ** 2
+                cost += error.sum(axis=(1, 2, 3))
+    else:
+        points = _scattered(structure, start, max(_GLANCES // 8, count), seed)
+        found = [objective.point(x) for x in points]
+        cost = np.array([np.inf if p is None else p.cost for p in found])
+    return points[np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")[:count]]
+
+
+def _scattered(
+    structure: ScannableStructure, start: FloatArray, count: int, seed: int
+) -> FloatArray:
+    """Scrambled Sobol points over the span of the structure, logarithmic where signs allow."""
+    from scipy.stats import qmc
+
+    lower, upper = structure.lower, structure.upper
+    power = int(np.ceil(np.log2(max(count, 2))))
+    u = qmc.Sobol(len(start), scramble=True, rng=seed).random_base2(power)[:count]
+    low, high = structure.span(start)
+    logarithmic = (low * high > 0) & (low != high)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        geometric = low * (np.where(logarithmic, high / low, 1.0)) ** u
+    points = np.where(logarithmic, geometric, low + (high - low) * u)
+    return np.clip(points, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))

@@ -1,0 +1,159 @@
+"""Minimum: where a cost is least, and the one covariance that follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.fitting.cost.experiments import Experiment
+from freqid.fitting.cost.objective import EstimatedStructure, Objective, Point
+from freqid.fitting.cost.priors import Prior
+from freqid.fitting.search.descent import Solution
+from freqid.fitting.uncertainty.covariance import Determined, determined
+from freqid.fitting.uncertainty.noise_spectrum import score_covariance
+
+# a cost of this part of the data's energy is nothing but rounding
+_ROUNDING = 1e-18
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Structure, experiments, prior and noise together, at the point of least cost.
+
+    Everything that asks for more than the estimate itself (error bars, profiles, tests of the hold)
+    asks here, so that a prior or a coloured noise counts in all of them.
+    """
+
+    objective: Objective
+    solution: Solution
+
+    @property
+    def structure(self) -> EstimatedStructure:
+        """The model as the optimiser sees it."""
+        return cast(EstimatedStructure, self.objective.structure)
+
+    @property
+    def experiments(self) -> Sequence[Experiment]:
+        """The data sets as residuals."""
+        return self.objective.experiments
+
+    @property
+    def prior(self) -> Prior | None:
+        """What was known before."""
+        return self.objective.prior
+
+    @property
+    def x(self) -> FloatArray:
+        """The unknowns, (P,)."""
+        return self.solution.x
+
+    @property
+    def point(self) -> Point:
+        """Cost and Jacobian there."""
+        return self.solution.point
+
+    @property
+    def cost(self) -> float:
+        """Weighted sum of squared errors of the data; a prior has no part in it."""
+        return float(sum(self.point.parts[: len(self.experiments)]))
+
+    @property
+    def fit_percent(self) -> float:
+        """100·(1 − √(cost / energy of the data))."""
+        energy = self.objective.energy
+        return float(100 * (1 - np.sqrt(self.cost / energy))) if energy else float("nan")
+
+    @property
+    def freedom(self) -> int:
+        """Real values of the data less unknowns, those of initial states included."""
+        return max(self.objective.n_rows - len(self.x) - self.point.n_initial, 1)
+
+    @property
+    def noise_variance(self) -> float:
+        """Variance of each real value of the weighted residual."""
+        return self.cost / self.freedom
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing but rounding is left of the data."""
+        return self.cost <= _ROUNDING * self.objective.energy
+
+    def outcome(self) -> dict[str, Any]:
+        """What an Estimate says of the descent, whatever its parameters are."""
+        return {
+            "cost": self.cost,
+            "fit_percent": self.fit_percent,
+            "converged": self.solution.converged,
+            "message": self.solution.message,
+            "n_evaluations": self.objective.n_evaluations,
+            "n_rows": self.objective.n_rows,
+        }
+
+    @cached_property
+    def determined(self) -> Determined:
+        """What the data and the prior tell of the unknowns.
+
+        The unknowns of a black box have no names: of those that cancel nothing is said.
+        """
+        J, names = self.point.jacobian, self.structure.names
+        if names:
+            return determined(J, self.x, names, np.sqrt(self.objective.energy))
+        half = np.linalg.pinv(J)
+        return Determined(half @ half.T, np.zeros(len(half), bool), [])
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the unknowns (P, P), infinite for what the data leave open.
+
+        H⁻¹ M H⁻¹ with H = JᵀJ, the prior's rows included, and M what the noise, of whatever colour,
+        and the prior make of the gradient (Ljung, System Identification, 1999, section 9.4).
+        Samples in time, and what is down to rounding, are taken for white.
+        """
+        H = self.determined.inverse
+        score = None if self.exact else score_covariance(self.objective, self.x)
+        if score is None:
+            return self.determined.scatter(self.noise_variance * H)
+        if self.prior is not None:
+            score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
+        return self.determined.scatter(H @ score @ H)
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """How an estimate scatters: the covariance of its unknowns, carried to what has names.
+
+    ``change`` is the derivative of the named values by the unknowns, (names, unknowns), or (names,)
+    where each is one unknown in other units. ``given`` (unknowns, unknowns) stands for the
+    minimum's own covariance where that is not of data.
+    """
+
+    change: FloatArray
+    minimum: Minimum | None = None
+    given: FloatArray | None = None
+
+    @cached_property
+    def of_unknowns(self) -> FloatArray:
+        """Covariance of the unknowns."""
+        if self.given is not None:
+            return self.given
+        assert self.minimum is not None
+        return self.minimum.covariance
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the named values, (names, names)."""
+        inner = self.of_unknowns
+        if self.change.ndim == 1:
+            return inner * np.outer(self.change, self.change)
+        covariance: FloatArray = self.change @ inner @ self.change.T
+        return covariance
+
+    def known(self, unknown: float) -> FloatArray:
+        """Covariance of the unknowns with ``unknown`` for what is infinite."""
+        inner = self.of_unknowns
+        return np.where(np.isfinite(inner), inner, unknown)

@@ -1,0 +1,96 @@
+"""Intervals by profile likelihood: they need not be symmetric."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.optimize
+import scipy.stats
+
+from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.objective import Structure
+from freqid.fitting.search.descent import minimise
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.lti.realisation import Realisation
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# standard errors within which an end is looked for, and evaluations of each fit on the way
+_REACH, _LIMIT = 10.0, 60
+
+
+def profile_intervals(
+    minimum: Minimum, scale: FloatArray, std: FloatArray, level: float = 0.95
+) -> pd.DataFrame:
+    """Lower and upper end of each parameter's interval by profile likelihood.
+
+    A value is inside when the cost, a prior's part in it included, minimised over all others,
+    exceeds the least by no more than σ² χ²(level); where weights leave the noise coloured the
+    threshold is widened as its standard error is. ``scale`` and ``std`` (P,) are the size of each
+    unknown and the standard error of each parameter. Infinite where nothing holds the parameter
+    within ten standard errors.
+
+    Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
+    """
+    import pandas as pd
+
+    noise, own = minimum.noise_variance, std / scale
+    white = noise * np.diag(minimum.determined.inverse)
+    quantile = float(scipy.stats.chi2.ppf(level, 1))
+    rows = []
+    for i, x in enumerate(minimum.x):
+        if not np.isfinite(own[i]):
+            rows.append((-np.inf, np.inf))
+        elif own[i] == 0:
+            rows.append((x, x))
+        else:
+            inflated = max(own[i] ** 2 / white[i], 1e-12)
+            rise = noise * inflated * quantile
+            rows.append((_end(minimum, i, -own[i], rise), _end(minimum, i, own[i], rise)))
+    ends = np.array(rows) * scale[:, None]
+    index = pd.Index(minimum.structure.names, name="parameter")
+    return pd.DataFrame(ends, columns=["lower", "upper"], index=index)
+
+
+class _Held:
+    """A structure with one unknown held at a value."""
+
+    def __init__(self, inner: Structure, index: int, value: float) -> None:
+        self.inner, self.index, self.value = inner, index, value
+        self.lower = np.delete(inner.lower, index)
+        self.upper = np.delete(inner.upper, index)
+
+    def whole(self, x: FloatArray) -> FloatArray:
+        return np.insert(x, self.index, self.value)
+
+    def realise(self, x: FloatArray) -> Realisation:
+        return self.inner.realise(self.whole(x)).without(self.index)
+
+    def describe(self, x: FloatArray) -> str:
+        return self.inner.describe(self.whole(x))
+
+
+def _end(minimum: Minimum, index: int, step: float, rise: float) -> float:
+    """Where the profile has risen by ``rise``, in multiples of a signed step from the estimate."""
+    at, others = minimum.x[index], np.delete(minimum.x, index)
+    least = minimum.point.cost
+
+    def excess(steps: float) -> float:
+        value = at + steps * step
+        held = _Held(minimum.objective.structure, index, value)
+        prior = minimum.prior and minimum.prior.held(index, value)
+        try:
+            found = minimise(minimum.objective.of(held, prior), others, limit=_LIMIT)
+        except InputError:
+            return np.inf
+        return (found.cost - least) / rise - 1
+
+    reach = 2.0
+    while excess(reach) < 0:
+        reach *= 1.5
+        if reach > _REACH:
+            return float(np.sign(step) * np.inf)
+    root = scipy.optimize.brentq(excess, 1e-3, reach, xtol=1e-3, rtol=1e-4)
+    return float(at + root * step)

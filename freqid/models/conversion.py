@@ -1,0 +1,60 @@
+"""Anything that stands for a linear model, as one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.lti.holds import ZeroOrderHold
+from freqid.lti.state_space import StateSpace
+from freqid.models.model import Model
+from freqid.models.output_error import DiscreteModel
+
+
+@dataclass(frozen=True, eq=False)
+class SystemModel(Model):
+    """A continuous-time control system."""
+
+    dt = 0.0
+    delay = 0.0
+
+    matrices: StateSpace
+    inputs: Sequence[str]
+    outputs: Sequence[str]
+
+    def state_space(self) -> StateSpace:
+        """A, B, C, D."""
+        return self.matrices
+
+
+def as_model(thing: Any) -> Model:
+    """The model that a model, an estimate or a control system stands for.
+
+    Raises ValueError for anything else. A discrete control system whose sample time is not said
+    has one of 1 s.
+
+    >>> import control
+    >>> as_model(control.tf([1], [1, 2])).poles
+    array([-2.+0.j])
+    """
+    inner = getattr(thing, "model", thing)
+    if isinstance(inner, Model):
+        return inner
+    import control
+
+    if not isinstance(inner, control.lti.LTI) or isinstance(inner, control.FrequencyResponseData):
+        raise InputError(
+            f"model={type(inner).__name__} is not a model, an estimate or a control system; "
+            "a FrequencyResponse is fitted or drawn as it is"
+        )
+    system = control.ss(inner)
+    at = StateSpace(*(np.asarray(M, dtype=float) for M in (system.A, system.B, system.C, system.D)))
+    names = system.input_labels, system.output_labels
+    if not system.dt:
+        return SystemModel(at, *names)
+    dt = 1.0 if system.dt is True else float(system.dt)
+    return DiscreteModel(at, dt, ZeroOrderHold(dt), *names)

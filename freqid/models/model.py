@@ -1,0 +1,132 @@
+"""What every model can do, whatever it is made of: matrices, response, poles, control system."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from freqid.checks import ComplexArray, InputError
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.lti.bases import basis_of
+from freqid.lti.holds import BandLimited, Hold, PeriodicHold, Sampled
+from freqid.lti.realisation import Realisation, Timing
+from freqid.lti.responses import points, transfer
+from freqid.lti.state_space import Linearisation, StateSpace
+
+if TYPE_CHECKING:
+    import control
+
+
+class Model(ABC):
+    """A linear model: grey box, rational function or plain matrices.
+
+    ``dt`` is the sample time in s of a sampled model, 0 in continuous time; ``delay`` that of all
+    inputs in s; ``inputs`` and ``outputs`` are the names of the channels.
+    """
+
+    dt: float
+    delay: float
+    inputs: Sequence[str] | None
+    outputs: Sequence[str] | None
+
+    @abstractmethod
+    def state_space(self) -> StateSpace:
+        """A (n, n), B (n, inputs), C (outputs, n), D (outputs, inputs)."""
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs."""
+        return len(self.inputs or ())
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return len(self.outputs or ())
+
+    @property
+    def poles(self) -> ComplexArray:
+        """Poles, (n,): in rad/s, or in the z plane where the model is a sampled one."""
+        return np.linalg.eigvals(self.state_space().A).astype(complex)
+
+    @property
+    def integrates(self) -> bool:
+        """Whether a plant in continuous time has a pole at zero, up to rounding."""
+        size = np.abs(self.poles)
+        return not self.dt and bool((size <= 1e-9 * max(size.max(initial=0), 1.0)).any())
+
+    def linearisation(self) -> Linearisation:
+        """The matrices, and their derivatives by the parameters that a fit moves."""
+        at = self.state_space()
+        return Linearisation(at, at.still())
+
+    def still(self) -> Realisation:
+        """The model at its values, for what moves none of them."""
+        at = self.state_space()
+        delay = Timing(self.delay) if self.delay else None
+        return Realisation.of(Linearisation(at, at.still()), delay=delay)
+
+    def sampled(self, hold: Hold) -> Sampled:
+        """Matrices of x(k+1) = Φ x + Γ u(k) + Γ⁺ u(k+1) under a hold; a sampled model has its own.
+
+        >>> from freqid import ZeroOrderHold, first_order
+        >>> first_order().sampled(ZeroOrderHold(1e-3)).phi.round(6)
+        array([[0.904837]])
+        """
+        at = self.state_space()
+        if self.dt or not isinstance(hold, PeriodicHold):
+            return Sampled(at.A, at.B, 0 * at.B)
+        return hold.sampled(at.A, at.B)
+
+    def frequency_response(self, omega: ArrayLike, hold: Hold | None = None) -> FrequencyResponse:
+        """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
+
+        Returns a FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega
+        that is not finite or a hold that is not one.
+
+        >>> import freqid as fq
+        >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
+        np.float64(0.7071)
+        """
+        at = np.atleast_1d(np.asarray(omega, dtype=float))
+        if at.ndim != 1 or not np.isfinite(at).all():
+            raise InputError(
+                f"omega has shape {at.shape}; expected finite frequencies (rad/s), (K,)"
+            )
+        if hold is not None and not isinstance(hold, Hold):
+            raise InputError(
+                f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
+                "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
+            )
+        between = BandLimited() if hold is None else hold
+        z = points(at, between)
+        if self.delay:
+            plant, late = self.still().delayed(between, at, z)
+            G = transfer(plant, z) * late
+        else:
+            G = transfer(basis_of(self.state_space()).through(between), z)
+        dt = hold.period if isinstance(hold, PeriodicHold) else 0.0
+        return FrequencyResponse(
+            at / (2 * np.pi), G, dt=dt, hold=hold,
+            input_names=self.inputs, output_names=self.outputs,
+        )  # fmt: skip
+
+    def to_control(self) -> control.StateSpace:
+        """The model as a ``control.StateSpace``, continuous or discrete as it is.
+
+        Raises ValueError for a model with a delay, which control systems do not have.
+        """
+        import control
+
+        if self.delay:
+            raise InputError(
+                f"control systems have no delay and this model has {self.delay:g} s; use "
+                "dataclasses.replace(model, delay=0).to_control() with control.pade(delay, order)"
+            )
+        return control.ss(
+            *self.state_space(), self.dt,
+            inputs=list(self.inputs or ()), outputs=list(self.outputs or ()),
+        )  # fmt: skip

@@ -1,0 +1,116 @@
+"""The same fit once more: with another hold, without one repeat, with repeats drawn again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import InputError, whole
+from freqid.data.record import Record
+from freqid.fitting.entry import fit
+from freqid.fitting.estimate import Estimate
+from freqid.models.grey_box import GreyBox
+from freqid.validation.comparison import compare
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def hold_bias(
+    est: Estimate,
+    data: Record | Sequence[Record],
+    *,
+    band: tuple[float, float] | None = None,
+    weights: Any = None,
+) -> pd.DataFrame:
+    """The bias bar: what the assumed hold has added to each parameter, to modes of a black box.
+
+    The same model is fitted with the hold that the records remember, ``band`` and ``weights`` being
+    those of the estimate; ``bias`` is the estimate less that, to be drawn beside ``std``, the error
+    bar of the noise. Columns estimate, remembered, bias and std; the ratio of bias to std says
+    which of the two rules. Coefficients of a black box mean another thing under another hold, so
+    that there the rows are frequency (Hz) and damping of its modes in turn.
+    """
+    import pandas as pd
+
+    if not isinstance(est.model, GreyBox):
+        remembered = fit(est.model.spec, data, band=band, weights=weights)
+        columns = _mode_values(est), _mode_values(remembered)
+    else:
+        nominal = dict(zip(est.names, est.nominal, strict=True))
+        usable = {n: v for n, v in nominal.items() if n in est.model.values and np.isfinite(v)}
+        remembered = fit(est.model.with_values(**usable), data, band=band, weights=weights)
+        columns = est.parameters, remembered.parameters
+    own, other = columns
+    names = [n for n in own.index if n in other.index]
+    own, other = own.loc[names], other.loc[names]
+    return pd.DataFrame(
+        {
+            "estimate": own["value"],
+            "remembered": other["value"],
+            "bias": own["value"] - other["value"],
+            "std": own["std"],
+        },
+        index=pd.Index(names, name="parameter"),
+    )
+
+
+def _mode_values(est: Estimate) -> pd.DataFrame:
+    """Frequency and damping of each mode, value and std, under names that count them."""
+    import pandas as pd
+
+    rows = {}
+    for number, mode in enumerate(est.modes().to_dict("records"), 1):
+        for what in ("frequency", "damping"):
+            rows[f"{what} {number}"] = (mode[what], mode[f"{what}_std"])
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "std"])
+
+
+def cross_validate(model: Any, records: Sequence[Record], **options: Any) -> pd.DataFrame:
+    """Fit to all repeats but one, and compare with that one, each in turn.
+
+    ``options`` go to ``fit``. Returns a DataFrame with one row a repeat: ``held_out``, the fit in
+    per cent of each output, and the parameters. Raises ValueError for fewer than two records.
+    """
+    import pandas as pd
+
+    sets = list(records)
+    if len(sets) < 2:
+        raise InputError(f"records holds {len(sets)}; cross-validation needs two or more repeats")
+    rows = []
+    for i, held_out in enumerate(sets):
+        est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
+        fits = compare(est, held_out).fit_percent
+        named = {f"fit {n}": float(v) for n, v in zip(held_out.output_names, fits, strict=True)}
+        rows.append({"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))})
+    return pd.DataFrame(rows)
+
+
+def bootstrap(
+    model: Any, records: Sequence[Record], n: int = 200, seed: int = 0, **options: Any
+) -> pd.DataFrame:
+    """Estimates from repeats drawn again with replacement: their scatter without a noise model.
+
+    ``options`` go to ``fit``; each resample starts from the estimate of all repeats. Returns a
+    DataFrame (n, parameters) whose ``describe`` and ``quantile`` give error bars. Raises ValueError
+    for fewer than three records.
+
+    Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6.
+    """
+    import pandas as pd
+
+    sets, count = list(records), whole("n", n)
+    if len(sets) < 3:
+        raise InputError(f"records holds {len(sets)}; a bootstrap needs three or more repeats")
+    rng = np.random.default_rng(whole("seed", seed, least=0))
+    whole_fit = fit(model, sets, **options)
+    if "start" not in options and hasattr(whole_fit.model, "values"):
+        free = [p.name for p in whole_fit.model.free_parameters]
+        options = {**options, "start": {k: whole_fit[k] for k in free}, "n_starts": 1}
+    rows = []
+    for _ in range(count):
+        drawn = [sets[i] for i in rng.integers(0, len(sets), len(sets))]
+        rows.append(fit(model, drawn, **options).values)
+    return pd.DataFrame(rows, columns=list(whole_fit.names))

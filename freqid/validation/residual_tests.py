@@ -1,0 +1,148 @@
+"""What a model leaves, tested for structure: whiteness, independence, and the cost's own size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.stats
+
+from freqid.checks import FloatArray, InputError, whole
+from freqid.data.band import Band, as_band
+from freqid.data.record import Record
+from freqid.fitting.estimate import Estimate
+from freqid.fitting.residuals import line_errors
+from freqid.lti.holds import Hold
+from freqid.models.conversion import as_model
+from freqid.validation.comparison import own_hold, part_inside
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# lags of the correlations, and the level at which a test is failed
+_LAGS = 25
+_LEVEL = 0.01
+
+
+def residual_test(
+    model: Any,
+    record: Record,
+    *,
+    lags: int = _LAGS,
+    hold: Hold | str | None = None,
+    band: tuple[float, float] | None = None,
+) -> pd.DataFrame:
+    """Whiteness of what a model leaves, and its independence of the input.
+
+    Rows: ``whiteness`` of each output (Ljung and Box's statistic of the autocorrelations) and
+    ``independence`` of each output of each input (the cross-correlations in units of their standard
+    error, which the residual's own colour makes wider). Columns: test, output, input, statistic,
+    limit (99 %), p_value and passed. ``attrs["correlations"]`` holds the correlations themselves
+    with their limits, which ``plot_residuals`` draws. With ``band`` (Hz) only its lines inside
+    are tested. Raises ValueError for fewer samples than four times the ``lags``.
+
+    Source: Ljung, System Identification, 1999, section 16.6; with a band, whiteness is Bartlett's
+    test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series, 1981, 6.2.5).
+
+    >>> import freqid as fq
+    >>> record = fq.simulate(fq.first_order(), fq.white_noise(2000), 1e-3).with_noise(0.1)
+    >>> bool(fq.residual_test(fq.first_order(), record)["passed"].all())
+    True
+    """
+    import pandas as pd
+
+    lags = whole("lags", lags)
+    if record.n_samples < 4 * lags:
+        raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
+    limits = as_band(band, record.nyquist)
+    hold = own_hold(model, hold)
+    e = -line_errors(as_model(model), record, hold).in_time()
+    u = record.inputs[:: record.factor][: len(e)]
+    N = len(e)
+    if limits is not None:
+        e, u = part_inside(e, record.dt, limits), part_inside(u, record.dt, limits)
+    e, u = e - e.mean(axis=0), u - u.mean(axis=0)
+    rows, curves = [], []
+    quantile = float(scipy.stats.norm.ppf(1 - _LEVEL / 2))
+    # a filtered signal has as many independent values as it has lines
+    freedom = N if limits is None else max(2 * (limits.high - limits.low) * N * record.dt, 4.0)
+    for o, output in enumerate(record.output_names):
+        if limits is not None:
+            # a part of a white signal is not white in time: its lines are alike
+            statistic = _bartlett(e[:, o], record.dt, limits)
+            p = float(scipy.stats.kstwobign.sf(statistic))
+            most = float(scipy.stats.kstwobign.isf(_LEVEL))
+            rows.append(_row("whiteness", output, "", statistic, most, p))
+        auto = _correlation(e[:, o], e[:, o], lags)
+        white = auto[lags + 1 :]
+        q = N * (N + 2) * float(np.sum(white**2 / (N - np.arange(1, lags + 1))))
+        limit = float(scipy.stats.chi2.ppf(1 - _LEVEL, lags))
+        if limits is None:
+            p = float(scipy.stats.chi2.sf(q, lags))
+            rows.append(_row("whiteness", output, "", q, limit, p))
+            curves.append(("whiteness", output, "", white, quantile / np.sqrt(N)))
+        for i, name in enumerate(record.input_names):
+            cross = _correlation(e[:, o], u[:, i], lags)
+            # variance of the cross-correlation of independent signals: Σ R_e(τ) R_u(τ) / N
+            span = min(N // 4, 2 * lags)
+            full = _correlation(e[:, o], e[:, o], span) * _correlation(u[:, i], u[:, i], span)
+            spread = np.sqrt(max(float(full.sum()), 1.0) / freedom)
+            z = float(np.abs(cross).max() / spread)
+            # the largest of so many lags
+            count = len(cross)
+            p = float(1 - (1 - scipy.stats.norm.sf(z) * 2) ** count)
+            most = float(scipy.stats.norm.ppf(1 - (1 - (1 - _LEVEL) ** (1 / count)) / 2))
+            rows.append(_row("independence", output, name, z, most, p))
+            curves.append(("independence", output, name, cross, most * spread))
+    table = pd.DataFrame(rows)
+    table.attrs["correlations"] = [
+        {"test": t, "output": o, "input": i, "values": v.tolist(), "limit": float(lim)}
+        for t, o, i, v, lim in curves
+    ]
+    return table
+
+
+def _bartlett(e: FloatArray, dt: float, band: Band) -> float:
+    """√K times the largest gap between the cumulated periodogram of K lines and a straight line."""
+    f = np.fft.rfftfreq(len(e), dt)
+    power = np.abs(np.fft.rfft(e)[band.inside(f) & (f > 0)]) ** 2
+    share = np.cumsum(power) / max(float(power.sum()), 1e-300)
+    K = len(power)
+    return float(np.sqrt(K) * np.abs(share - np.arange(1, K + 1) / K).max())
+
+
+def _row(
+    test: str, output: str, input: str, statistic: float, limit: float, p: float
+) -> dict[str, Any]:
+    return {
+        "test": test, "output": output, "input": input, "statistic": statistic, "limit": limit,
+        "p_value": p, "passed": bool(statistic <= limit),
+    }  # fmt: skip
+
+
+def _correlation(a: FloatArray, b: FloatArray, lags: int) -> FloatArray:
+    """Normalised correlation Σ a(t) b(t − τ) for τ from −lags to lags."""
+    from scipy.signal import correlate
+
+    size = np.linalg.norm(a) * np.linalg.norm(b)
+    full = correlate(a, b, mode="full", method="fft") / (size if size > 0 else 1)
+    middle = len(b) - 1
+    return np.asarray(full[middle - lags : middle + lags + 1])
+
+
+def cost_test(est: Estimate) -> dict[str, float]:
+    """Cost of a fit with known noise (weights 1/variance) against what the noise explains.
+
+    2·V is then chi-square with as many degrees of freedom as real values less parameters (Pintelon
+    and Schoukens, 2012, section 11.4.3). Returns cost, expected, ratio and p_value: a small p says
+    that the model is too simple, one next to 1 that the variances are too large.
+    """
+    freedom = max(est.n_rows - len(est.names), 1)
+    # a complex error of unit variance has half of it in each of its parts
+    twice = 2 * est.cost
+    return {
+        "cost": float(est.cost),
+        "expected": freedom / 2,
+        "ratio": float(twice / freedom),
+        "p_value": float(scipy.stats.chi2.sf(twice, freedom)),
+    }
