@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, unknown
 from freqid.data.data_set import DataSet
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.fitting.cost.objective import EstimatedStructure
+from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
@@ -95,6 +97,28 @@ class Estimate:
             return self.uncertainty
         return Spread(np.ones(len(self.values)), given=self.uncertainty)
 
+    @property
+    def _unknowns(self) -> tuple[EstimatedStructure, FloatArray, Spread]:
+        """The model as the optimiser saw it, its unknowns, and how they scatter."""
+        if self.problem is not None and isinstance(self.uncertainty, Spread):
+            return self.problem.structure, self.problem.x, self.uncertainty
+        if not isinstance(self.model, GreyBox):
+            return self.minimum.structure, self.minimum.x, self.spread
+        # an estimate that is not of a fit: the grey box itself still tells all that is asked
+        structure = GreyStructure(self.model)
+        own = self.covariance_matrix[: structure.count, : structure.count]
+        given = own / np.outer(structure.scale, structure.scale)
+        return structure, structure.start, Spread(structure.scale, given=given)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore; an estimate of version 0.1.0 has lost its cost, and what it had not computed."""
+        if not isinstance(state.get("problem"), Minimum):
+            state["problem"] = None
+        if not isinstance(state["uncertainty"], Spread | np.ndarray):
+            unknown = np.full((len(state["values"]),) * 2, np.nan)
+            state["uncertainty"] = state.get("covariance_matrix", unknown)
+        self.__dict__.update(state)
+
     def __getitem__(self, name: str) -> float:
         if name in self.names:
             return float(self.values[list(self.names).index(name)])
@@ -160,7 +184,7 @@ class Estimate:
         if omega is None:
             omega = np.geomspace(1e-3, 1, 200) * np.pi / self.dt
         frf: FrequencyResponse = self.model.frequency_response(omega, hold)
-        variance = response_variance(self.minimum, self.spread, frf.omega, hold)
+        variance = response_variance(*self._unknowns, frf.omega, hold)
         return dataclasses.replace(frf, variance=variance)
 
     def to_control(self) -> Any:
@@ -190,11 +214,11 @@ class Estimate:
 
     def modes(self) -> pd.DataFrame:
         """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
-        return modes(self.minimum, self.spread)
+        return modes(*self._unknowns)
 
     def pole_scatter(self) -> tuple[ComplexArray, FloatArray]:
         """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
-        return pole_scatter(self.minimum, self.spread)
+        return pole_scatter(*self._unknowns)
 
     def intervals(self, method: str = "linear", level: float = 0.95) -> pd.DataFrame:
         """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.

@@ -1,0 +1,1 @@
+from freqid.models.grey_box import GreyBox

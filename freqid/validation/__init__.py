@@ -1,0 +1,1 @@
+from freqid.validation.comparison import Comparison

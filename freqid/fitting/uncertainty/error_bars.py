@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.cost.objective import EstimatedStructure
+from freqid.fitting.uncertainty.minimum import Spread
+from freqid.lti.holds import Hold
 from freqid.models.grey_box import GreyBox
 
 if TYPE_CHECKING:
@@ -36,14 +38,14 @@ def derived(
     return at, np.sqrt(np.einsum("...a,ab,...b->...", J, covariance, J))
 
 
-def modes(minimum: Minimum, spread: Spread) -> pd.DataFrame:
+def modes(structure: EstimatedStructure, x: FloatArray, spread: Spread) -> pd.DataFrame:
     """Natural frequency (Hz) and damping ratio of each mode, with standard errors.
 
     Real poles have a damping ratio of 1 (−1 where they are unstable).
     """
     import pandas as pd
 
-    poles, change = minimum.structure.poles(minimum.x)
+    poles, change = structure.poles(x)
     covariance = spread.known(np.nan)
     rows = []
     for k in np.argsort(np.abs(poles)):
@@ -66,18 +68,26 @@ def modes(minimum: Minimum, spread: Spread) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def pole_scatter(minimum: Minimum, spread: Spread) -> tuple[ComplexArray, FloatArray]:
+def pole_scatter(
+    structure: EstimatedStructure, x: FloatArray, spread: Spread
+) -> tuple[ComplexArray, FloatArray]:
     """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
-    poles, change = minimum.structure.poles(minimum.x)
+    poles, change = structure.poles(x)
     parts = np.stack([change.real, change.imag], axis=1)
     return poles, parts @ spread.of_unknowns @ parts.swapaxes(-1, -2)
 
 
-def response_variance(minimum: Minimum, spread: Spread, omega: FloatArray, hold: Any) -> FloatArray:
+def response_variance(
+    structure: EstimatedStructure,
+    x: FloatArray,
+    spread: Spread,
+    omega: FloatArray,
+    hold: Hold | None,
+) -> FloatArray:
     """Variance J Σ Jᴴ of the response at omega (rad/s) through a hold, (outputs, inputs, K).
 
     What the data leave open is left out.
     """
-    _, J = minimum.structure.response(minimum.x, omega, hold)
+    _, J = structure.response(x, omega, hold)
     variance: FloatArray = np.einsum("apmk,ab,bpmk->pmk", J.conj(), spread.known(0.0), J).real
     return variance

@@ -79,6 +79,9 @@ def _end(minimum: Minimum, index: int, step: float, rise: float) -> float:
 
     def excess(steps: float) -> float:
         value = at + steps * step
+        if not len(others):
+            alone = minimum.objective.point(np.array([value]))
+            return np.inf if alone is None else (alone.cost - least) / rise - 1
         held = _Held(minimum.objective.structure, index, value)
         prior = minimum.prior and minimum.prior.held(index, value)
         try:

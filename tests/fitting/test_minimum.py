@@ -1,0 +1,120 @@
+"""The Minimum: one covariance for every consumer, and a prior that counts in all of them."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import freqid as fq
+
+Z = 1.959963984540054
+
+
+def gain_posterior(record, sigma, mean, std):
+    """Mean and deviation of the gain of a known lag beside a prior: linear, so in closed form."""
+    unit = fq.simulate(fq.first_order(b=1.0), record.u, record.dt).y
+    # a free initial state takes its own part of the data
+    decay = np.exp(-100.0 * record.time)
+    unit = unit - decay * (decay @ unit) / (decay @ decay)
+    y = record.y - decay * (decay @ record.y) / (decay @ decay)
+    precision = unit @ unit / sigma**2 + 1 / std**2
+    return (unit @ y / sigma**2 + mean / std**2) / precision, precision**-0.5
+
+
+@pytest.fixture(scope="module")
+def weak():
+    """A record that tells the gain no better than the prior does."""
+    return fq.simulate(fq.first_order(), fq.white_noise(2000), 1e-3).with_noise(0.5, seed=3)
+
+
+def test_a_prior_moves_estimate_error_bar_and_profile_alike(weak):
+    mean, std = gain_posterior(weak, 0.5, 130.0, 4.0)
+    est = fq.fit(fq.first_order().fix("a").with_prior(b=(130.0, 4.0)), weak)
+    assert est["b"] == pytest.approx(mean, abs=0.1 * std)
+    assert est.parameters["std"]["b"] == pytest.approx(std, rel=0.05)
+    for method in ("linear", "profile"):
+        ends = est.intervals(method).loc["b"]
+        assert ends["lower"] == pytest.approx(mean - Z * std, abs=0.2 * std)
+        assert ends["upper"] == pytest.approx(mean + Z * std, abs=0.2 * std)
+
+
+def test_a_prior_counts_once_beside_the_noise_of_a_response():
+    """Each of K complex lines of known variance v tells a real gain to v/(2 Re|g|²)."""
+    rng = np.random.default_rng(5)
+    omega = 2 * np.pi * np.linspace(2, 40, 50)
+    unit = 1 / (1j * omega + 100)
+    v = 2 * (0.1 / 100) ** 2
+    noise = np.sqrt(v / 2) * (rng.standard_normal(50) + 1j * rng.standard_normal(50))
+    frf = fq.FrequencyResponse(omega / (2 * np.pi), 100 * unit + noise, variance=np.full(50, v))
+    precision = np.sum(np.abs(unit) ** 2) * 2 / v
+    told = np.sum((unit.conj() * frf.response[0, 0]).real) * 2 / v
+    mean, std = 104.0, 1.0
+    expected = (told + mean / std**2) / (precision + 1 / std**2)
+    est = fq.fit(fq.first_order().fix("a").with_prior(b=(mean, std)), frf, weights="noise")
+    assert est["b"] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_prior_is_no_part_of_the_fit_to_the_data(weak):
+    """A prior far off leaves the gain where it wants it; the cost is that of the data there."""
+    model = fq.first_order().fix("a").with_prior(b=(300.0, 1.0))
+    est = fq.fit(model, weak)
+    there = fq.fit(fq.first_order(b=est["b"]).fix("b"), weak, start={"a": 100.0}, n_starts=1)
+    left = fq.compare(fq.first_order(b=est["b"]), weak).residuals
+    assert est.cost == pytest.approx(left @ left, rel=1e-6)
+    assert est.cost >= there.cost
+    energy = weak.y @ weak.y
+    assert est.fit_percent == pytest.approx(100 * (1 - np.sqrt(est.cost / energy)), abs=1e-6)
+
+
+def test_the_right_hold_is_not_rejected_for_a_prior(plant, slow):
+    """A prior that is 2 % off and sure of itself speaks against the data, not against the hold."""
+    record = slow.with_noise(0.02, seed=1)
+    sure = plant.with_prior(Ja=(1.02 * plant["Ja"], 1e-4 * plant["Ja"]))
+    est = fq.fit(sure, record, hold=fq.ZeroOrderHold(0.5e-3), band=(10, 80))
+    free = fq.fit(plant, record, hold=fq.ZeroOrderHold(0.5e-3), band=(10, 80))
+    assert not [w for w in free.warnings if "hold rejected" in w]
+    assert est["Ja"] == pytest.approx(1.02 * plant["Ja"], rel=2e-3)
+    assert not [w for w in est.warnings if "hold rejected" in w]
+
+
+@pytest.mark.parametrize("spec", [fq.OutputError(2), fq.TransferFunction(1, 2)])
+def test_modes_of_black_boxes_hold_in_coloured_noise(spec):
+    """Noise with a resonance beside the plant's: bars of white noise are half of the scatter."""
+    runs, dt = 60, 0.01
+    a = np.poly([0.7 + 0.5j, 0.7 - 0.5j])
+    colour = np.poly([0.72 + 0.55j, 0.72 - 0.55j])
+    rng = np.random.default_rng(11)
+    found = []
+    for _ in range(runs):
+        u = rng.standard_normal(2000)
+        noise = lfilter([1], colour, rng.standard_normal(2000))
+        record = fq.Record(u, lfilter([0, 0.5, -0.2], a, u) + 0.2 * noise, dt=dt)
+        mode = fq.fit(spec, record).modes().iloc[0]
+        found.append(
+            [mode["frequency"], mode["frequency_std"], mode["damping"], mode["damping_std"]]
+        )
+    found = np.array(found)
+    for value, std in ((found[:, 0], found[:, 1]), (found[:, 2], found[:, 3])):
+        assert value.std() / np.median(std) == pytest.approx(1, abs=0.3)
+
+
+def test_the_covariance_is_that_of_a_linear_problem(weak):
+    """White noise, one linear parameter: σ²/Σ x², whichever way it is asked for."""
+    _, std = gain_posterior(weak, 0.5, 0.0, np.inf)
+    est = fq.fit(fq.first_order().fix("a"), weak)
+    claimed = est.parameters["std"]["b"]
+    assert claimed == pytest.approx(std, rel=0.05)
+    value, derived = est.derived(lambda model: 2 * model["b"])
+    assert (value, derived) == (2 * est["b"], pytest.approx(2 * claimed, rel=1e-6))
+    seen = est.frequency_response([50.0], fq.ZeroOrderHold(1e-3))
+    expected = (np.abs(seen.response[0, 0, 0]) / est["b"] * claimed) ** 2
+    assert seen.variance[0, 0, 0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_variance_of_a_black_boxes_response_goes_through_the_hold():
+    """A continuous black box seen through a slow hold scatters as its simulated estimates do."""
+    hold, omega = fq.ZeroOrderHold(0.02), [120.0]
+    record = fq.simulate(fq.first_order(), fq.white_noise(2000, seed=1), 1e-3)
+    fits = [fq.fit(fq.TransferFunction(0, 1), record.with_noise(0.2, seed=s)) for s in range(60)]
+    seen = np.array([e.model.frequency_response(omega, hold).response[0, 0, 0] for e in fits])
+    claimed = fits[0].frequency_response(omega, hold).variance[0, 0, 0]
+    assert np.mean(np.abs(seen - seen.mean()) ** 2) / claimed == pytest.approx(1, abs=0.4)
