@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
 from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
@@ -24,7 +25,7 @@ from freqid.lti.bases import basis_of
 from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold
 from freqid.lti.responses import points, transfer
 from freqid.lti.state_space import StateSpace
-from freqid.models.conversion import as_model
+from freqid.models.conversion import ModelLike, as_model
 from freqid.models.model import Model
 
 
@@ -69,7 +70,7 @@ class Sampling:
         """Sample time of what is kept, in s."""
         return self.base_dt * self.factor
 
-    def filter_power(self, frequency: Any) -> FloatArray:
+    def filter_power(self, frequency: FloatArray) -> FloatArray:
         """What the anti-alias filter multiplies a power at ``frequency`` (Hz) by."""
         if not self.antialias:
             return np.ones(np.shape(frequency))
@@ -90,7 +91,7 @@ class Apparent:
     coherence: FloatArray
 
 
-def true_plant(plant: Any) -> Model:
+def true_plant(plant: ModelLike) -> Model:
     """The plant as a model in continuous time; ValueError for anything else."""
     model = as_model(plant)
     if model.dt:
@@ -160,14 +161,14 @@ def slow_edges(spectrum: InputSpectrum, sampling: Sampling) -> FloatArray:
 
 
 def apparent_response(
-    plant: Any,
+    plant: ModelLike,
     spectrum: InputSpectrum,
     dt: float,
     true_hold: Hold | None = None,
     *,
     base_dt: float | None = None,
     antialias: bool = False,
-    frequency: Any = None,
+    frequency: ArrayLike | None = None,
 ) -> FrequencyResponse:
     """The response that decimated data show, aliasing included, with the coherence that is left.
 

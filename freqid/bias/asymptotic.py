@@ -30,7 +30,9 @@ from freqid.lti.projection import triangle
 from freqid.lti.realisation import sampled_response
 from freqid.lti.responses import points, response_and_derivatives
 from freqid.lti.state_space import StateSpace
+from freqid.models.conversion import ModelLike
 from freqid.models.grey_box import GreyBox
+from freqid.models.model import Model
 from freqid.models.output_error import OutputError
 from freqid.models.transfer_function import TransferFunction
 
@@ -39,13 +41,13 @@ _ROUNDS = 6
 
 
 def asymptotic_fit(
-    plant: Any,
+    plant: ModelLike,
     spectrum: InputSpectrum,
     dt: float,
     hold: Hold | str | None = None,
     true_hold: Hold | None = None,
     *,
-    model: Any = None,
+    model: GreyBox | OutputError | TransferFunction | None = None,
     base_dt: float | None = None,
     band: tuple[float, float] | None = None,
     antialias: bool = False,
@@ -182,7 +184,7 @@ def _grey(
 
 def _black(
     spec: OutputError | TransferFunction,
-    plant: Any,
+    plant: ModelLike,
     at: StateSpace,
     conditions: Conditions,
     hold: Hold | str | None,
@@ -207,7 +209,7 @@ def _black(
     return dataclasses.replace(est, uncertainty=dataclasses.replace(est.spread, given=none))
 
 
-def _responses_of(model: Any, hold: Hold) -> Responses:
+def _responses_of(model: Model, hold: Hold) -> Responses:
     """The response of a fitted black box, (rows, K), at frequencies in Hz in any order."""
 
     def at(f: FloatArray) -> Array:

@@ -30,6 +30,7 @@ from freqid.fitting.reading import Reading
 from freqid.lti.holds import Hold
 from freqid.lti.quadrature import panel_nodes, resolved
 from freqid.lti.state_space import StateSpace
+from freqid.models.conversion import ModelLike
 
 Responses = Callable[[FloatArray], Array]
 
@@ -50,7 +51,7 @@ class Expected:
     error_power: FloatArray
     panels: FloatArray
 
-    def as_response(self, sampling: Sampling, plant: Any) -> FrequencyResponse:
+    def as_response(self, sampling: Sampling, plant: ModelLike) -> FrequencyResponse:
         """The same as a FrequencyResponse at the slow rate."""
         return FrequencyResponse(
             self.frequency,
@@ -61,7 +62,7 @@ class Expected:
             output_names=getattr(plant, "outputs", None),
         )
 
-    def as_reading(self, sampling: Sampling, plant: Any, hold: Hold) -> Reading:
+    def as_reading(self, sampling: Sampling, plant: ModelLike, hold: Hold) -> Reading:
         """What a fit under ``hold`` minimises."""
         response = self.as_response(sampling, plant)
         return Reading.of(response, hold, noise=GivenWeights(self.weight))

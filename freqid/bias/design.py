@@ -151,7 +151,7 @@ def _bias_and_scatter(
 
 def _score(
     names: Sequence[str], bias: FloatArray, std: FloatArray, criterion: str
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Columns of one design: the error that ranks it, and those of each parameter."""
     error = np.hypot(bias, std)
     total = error.max() if criterion == "worst" else np.sqrt(np.mean(error**2))

@@ -12,7 +12,7 @@ from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.asymptotic import asymptotic_fit, model_responses
 from freqid.bias.batched_fit import Answers, Batch, Problem, descend, solve
 from freqid.bias.conditions import Conditions
-from freqid.checks import FloatArray, InputError
+from freqid.checks import BoolArray, FloatArray, InputError
 from freqid.excitation.input_spectra import InputSpectrum
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Evidence, findings
@@ -79,7 +79,7 @@ def answer_chunk(model: GreyBox, rows: Sequence[Row], setting: Setting) -> list[
         try:
             problems.append(_problem(model, row, setting))
             kept.append(i)
-        except (ValueError, ArithmeticError) as error:
+        except (InputError, ArithmeticError) as error:
             answers[i].message = str(error)
     bounded = any(np.isfinite([p.lower, p.upper]).any() for p in model.free_parameters)
     single = list(kept)
@@ -145,7 +145,7 @@ def _together(
     return [i for place, i in enumerate(kept) if not settled[place]]
 
 
-def _determined(batch: Batch, found: Answers) -> Any:
+def _determined(batch: Batch, found: Answers) -> BoolArray:
     """Whether the parameters of each problem are told apart by its spectrum, (S,)."""
     H = batch.normal(found.values, np.arange(len(found.values)))[2]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -169,7 +169,7 @@ def _alone(model: GreyBox, row: Row, setting: Setting) -> Answer:
             prefilter=setting.prefilter,
             noise_model=setting.noise_model,
         )
-    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+    except (InputError, ArithmeticError, np.linalg.LinAlgError) as error:
         count = len(model.free_parameters)
         return Answer(np.full(count, np.nan), np.nan, False, str(error))
     return Answer(est.values, est.cost, est.converged, "; ".join(est.warnings))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,8 @@ import numpy as np
 from freqid.bias.apparent import weight_of
 from freqid.bias.map_rows import Answer, Row, Setting, answer_chunk
 from freqid.bias.map_store import MapStore
-from freqid.checks import InputError, whole
+from freqid.bias.progress import Bar
+from freqid.checks import Array, InputError, whole
 from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum
 from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
 from freqid.models.grey_box import GreyBox
@@ -35,7 +36,7 @@ def bias_map(
     antialias: bool = False,
     prefilter: Any = None,
     noise_model: Any = None,
-    path: Any = None,
+    path: str | Path | None = None,
     n_jobs: int | None = None,
     progress: bool | None = None,
     chunk: int = _CHUNK,
@@ -85,7 +86,7 @@ def bias_map(
         tables = {n: t for n, t in kept.items() if t is not None}
     todo = [n for n in range(len(chunks)) if n not in tables]
     jobs = [(n, plants[rows[chunks[n][0]].plant_label], [rows[i] for i in chunks[n]]) for n in todo]
-    with _bar(progress, len(rows), sum(len(chunks[n]) for n in tables)) as advance:
+    with Bar(progress, len(rows), sum(len(chunks[n]) for n in tables)) as advance:
         for n, answers in _run(jobs, setting, n_jobs):
             model = plants[rows[chunks[n][0]].plant_label]
             tables[n] = _table(model, chunks[n], [rows[i] for i in chunks[n]], answers)
@@ -210,7 +211,7 @@ def _table(
     with np.errstate(divide="ignore", invalid="ignore"):
         bias = np.where(true == 0, np.nan, (estimate - true) / np.abs(true))
 
-    def each(values: Sequence[Any]) -> Any:
+    def each(values: Sequence[object]) -> Array:
         return np.repeat(np.array(values), P)
 
     return pd.DataFrame(
@@ -248,7 +249,7 @@ def _identity(
             dt = setting.base_dt
             for array in (spectrum.density(f, dt), spectrum.edges(dt), *spectrum.lines(dt)):
                 seen.update(np.ascontiguousarray(array).tobytes())
-        except ValueError as error:
+        except InputError as error:
             seen.update(str(error).encode())
     for row in rows:
         labels = (row.plant_label, row.spectrum_label, row.hold_label, row.factor)
@@ -260,48 +261,3 @@ def _identity(
     shared = (setting.true_hold, setting.base_dt, setting.band, setting.antialias, chunk)
     seen.update(repr(shared).encode())
     return seen.hexdigest()
-
-
-class _bar:
-    """Progress for the length of a ``with`` block; entering gives the function to advance.
-
-    A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth.
-    """
-
-    def __init__(self, wanted: bool | None, total: int, done: int) -> None:
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-
-        self.console = Console(stderr=True)
-        live = self.console.is_terminal or self.console.is_jupyter
-        self.lines = bool(wanted) and not live
-        self.total, self.done = total, done
-        self.progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-            console=self.console,
-            disable=not live if wanted is None else not (wanted and live),
-        )
-        self.task = self.progress.add_task("bias map", total=total, completed=done)
-
-    def __enter__(self) -> Any:
-        self.progress.start()
-        return self.advance
-
-    def advance(self, count: int) -> None:
-        """``count`` more are done."""
-        before, self.done = self.done, self.done + count
-        self.progress.advance(self.task, count)
-        if self.lines and 10 * before // self.total != 10 * self.done // self.total:
-            print(f"bias map: {self.done} of {self.total}", file=sys.stderr, flush=True)
-
-    def __exit__(self, *reason: Any) -> None:
-        self.progress.stop()

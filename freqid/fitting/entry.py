@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from freqid.fitting.black_box import output_error, transfer_function
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.hold_tests import rejected_hold
-from freqid.fitting.noise_models import NoiseModel, as_noise_model
+from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.residuals import errors_of
 from freqid.lti.holds import Hold
@@ -32,12 +31,12 @@ _STANDS = 0.01
 
 @in_one_blas_thread
 def fit(
-    model: Any,
+    model: object,
     data: DataSet | Sequence[DataSet],
     *,
     hold: Hold | str | None = None,
     band: tuple[float, float] | None = None,
-    weights: Any = None,
+    weights: Weights | Sequence[Weights] = None,
     initial_state: InitialState = "estimate",
     start: Mapping[str, float] | None = None,
     n_starts: int | str = "auto",
@@ -110,16 +109,16 @@ def fit(
     return dataclasses.replace(est, data=sets, band=band, weights=weights, call=call)
 
 
-def _noise_models(weights: Any, data: Any, sets: Sequence[DataSet]) -> list[NoiseModel]:
+def _noise_models(weights: object, data: object, sets: Sequence[DataSet]) -> list[NoiseModel]:
     """One for each data set; ValueError for a list of another length."""
     each = isinstance(weights, (list, tuple)) and not isinstance(data, DataSet)
-    given = list(weights) if each else [weights] * len(sets)
+    given: list[object] = [*weights] if each else [weights] * len(sets)  # type: ignore[misc]
     if len(given) != len(sets):
         raise InputError(f"weights has {len(given)} entries for {len(sets)} experiments")
     return [as_noise_model(w, d) for w, d in zip(given, sets, strict=True)]
 
 
-def _call(model: Any, count: int, given: Mapping[str, Any]) -> str:
+def _call(model: object, count: int, given: Mapping[str, object]) -> str:
     """The call of ``fit`` as a user would type it, arguments at their defaults left out."""
     usual = {"initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency"}
     shown = []
@@ -128,7 +127,7 @@ def _call(model: Any, count: int, given: Mapping[str, Any]) -> str:
                              and value == usual[name]):  # fmt: skip
             continue
         if name == "start":
-            value = dict(value)
+            value = dict(value)  # type: ignore[call-overload]
         text = repr(value) if not hasattr(value, "shape") else f"<array {value.shape}>"
         shown.append(f"{name}={text}")
     data = "data" if count == 1 else f"[{count} data sets]"

@@ -26,6 +26,7 @@ from freqid.lti.holds import Hold
 from freqid.models.grey_box import GreyBox
 
 if TYPE_CHECKING:
+    import control
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -175,7 +176,9 @@ class Estimate:
 
         return pd.DataFrame(matrix, index=list(self.names), columns=list(self.names))
 
-    def frequency_response(self, omega: Any = None, hold: Hold | None = None) -> FrequencyResponse:
+    def frequency_response(
+        self, omega: ArrayLike | None = None, hold: Hold | None = None
+    ) -> FrequencyResponse:
         """Response of the estimated model at ``omega`` (rad/s) with its variance.
 
         ``hold=None`` gives the continuous response of a continuous-time model. Without ``omega``,
@@ -187,11 +190,11 @@ class Estimate:
         variance = response_variance(*self._unknowns, frf.omega, hold)
         return dataclasses.replace(frf, variance=variance)
 
-    def to_control(self) -> Any:
+    def to_control(self) -> control.StateSpace:
         """The estimated model as a ``control.StateSpace``."""
         return self.model.to_control()
 
-    def to_continuous(self, hold: Hold | str | None = None) -> Any:
+    def to_continuous(self, hold: Hold | str | None = None) -> control.StateSpace:
         """A black-box model in continuous time, by inverting its hold (see ``OutputError``)."""
         if not hasattr(self.model, "to_continuous"):
             raise InputError("the model is in continuous time already; use to_control()")
@@ -265,7 +268,7 @@ class Estimate:
 
         write_report(self, path, title)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Everything that a file needs, in plain numbers and strings."""
         table = self.parameters.astype(object).where(self.parameters.notna(), None)
         return {

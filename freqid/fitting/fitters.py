@@ -36,7 +36,7 @@ def fits(kind: type, black_box: bool = False) -> Callable[[F], F]:
     """
 
     def mark(function: F) -> F:
-        def checked(model: Any, readings: Sequence[Reading], options: SearchOptions) -> Estimate:
+        def checked(model: object, readings: Sequence[Reading], options: SearchOptions) -> Estimate:
             if options.start is not None:
                 raise InputError(
                     "start has no meaning for a black box, which needs none; leave it out"
@@ -53,7 +53,7 @@ def fits(kind: type, black_box: bool = False) -> Callable[[F], F]:
     return mark
 
 
-def fitter_of(model: Any) -> Fitter:
+def fitter_of(model: object) -> Fitter:
     """The function that fits a model; ValueError for what nothing fits."""
     if type(model) not in FITTERS:
         names = ", ".join(kind.__name__ for kind in FITTERS)

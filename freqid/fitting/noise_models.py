@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice
 from freqid.data.data_set import DataSet
@@ -71,10 +72,10 @@ class BiasIntegral(NoiseModel):
 class GivenWeights(NoiseModel):
     """An array, (lines,) or as the errors are."""
 
-    given: Any
+    given: FloatArray
 
     def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
-        array = np.asarray(self.given, dtype=float)
+        array = self.given
         if array.shape not in ((shape[-1],), shape):
             raise InputError(f"weights has shape {array.shape}; expected ({shape[-1]},) or {shape}")
         if not np.isfinite(array).all() or (array < 0).any() or not array.any():
@@ -134,7 +135,11 @@ class MeasuredNoise(NoiseModel):
         return MeasuredNoise(noise_weights(error, n_samples))
 
 
-def as_noise_model(weights: Any, data: DataSet) -> NoiseModel:
+# an argument ``weights``: none, a name, or an array
+Weights = ArrayLike | NoiseModel | None
+
+
+def as_noise_model(weights: object, data: DataSet) -> NoiseModel:
     """What an argument ``weights`` means for a data set; InputError where it means nothing."""
     if isinstance(weights, NoiseModel):
         return weights
@@ -143,4 +148,4 @@ def as_noise_model(weights: Any, data: DataSet) -> NoiseModel:
     if isinstance(weights, str):
         choice("weights", weights, tuple(NoiseModel.named))
         return NoiseModel.named[weights].of(data)
-    return GivenWeights(weights)
+    return GivenWeights(np.asarray(weights, dtype=float))

@@ -10,7 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, wraps
 from threading import Lock
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    import threadpoolctl
 
 Args = ParamSpec("Args")
 Result = TypeVar("Result")
@@ -19,7 +22,7 @@ _held = Lock()
 
 
 @cache
-def _controller() -> Any:
+def _controller() -> threadpoolctl.ThreadpoolController:
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()

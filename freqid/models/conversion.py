@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from freqid.lti.holds import ZeroOrderHold
 from freqid.lti.state_space import StateSpace
 from freqid.models.model import Model
 from freqid.models.output_error import DiscreteModel
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +34,19 @@ class SystemModel(Model):
         return self.matrices
 
 
-def as_model(thing: Any) -> Model:
+class HasModel(Protocol):
+    """An estimate: what has a model inside."""
+
+    @property
+    def model(self) -> Model:
+        """The model at the estimate."""
+        ...
+
+
+ModelLike: TypeAlias = "Model | HasModel | control.lti.LTI"
+
+
+def as_model(thing: ModelLike) -> Model:
     """The model that a model, an estimate or a control system stands for.
 
     Raises ValueError for anything else. A discrete control system whose sample time is not said

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,8 +10,8 @@ from freqid.checks import Array, FloatArray, InputError
 from freqid.lti.state_space import Linearisation, StateSpace
 from freqid.models.ties import Ties
 
-Matrices = Callable[..., Sequence[Any]]
-Jacobian = Callable[..., Mapping[str, Sequence[Any]]]
+Matrices = Callable[..., Sequence[object]]
+Jacobian = Callable[..., Mapping[str, Sequence[object]]]
 
 # small enough that its square vanishes beside any matrix entry
 _COMPLEX_STEP = 1e-100
@@ -125,7 +124,7 @@ class MatrixFunction:
             stacked[row[name], :, i + 1] += _COMPLEX_STEP * 1j
         flat = dict(zip(names, stacked.reshape(len(names), -1), strict=True))
         matrices = [
-            np.asarray(M).reshape(S, count + 1, *np.shape(M)[1:])
+            np.asarray(M).reshape(S, count + 1, *np.asarray(M).shape[1:])
             for M in self.matrices(**self.ties.resolve(flat))
         ]
         return (
@@ -190,19 +189,19 @@ class MatrixFunction:
         )
 
 
-def _dense(matrices: Sequence[Any], dtype: type) -> list[Array]:
+def _dense(matrices: Sequence[object], dtype: type) -> list[Array]:
     A, B, C, D = matrices
     A, B, C = (np.asarray(M, dtype=dtype) for M in (A, B, C))
-    if D is None or np.ndim(D) == 0:
+    if D is None or np.asarray(D).ndim == 0:
         D = np.full((C.shape[0], B.shape[1]), 0 if D is None else D, dtype)
     return [A, B, C, np.asarray(D, dtype=dtype)]
 
 
-def _shaped(matrices: Sequence[Any], values: Mapping[str, float]) -> StateSpace:
+def _shaped(matrices: Sequence[object], values: Mapping[str, float]) -> StateSpace:
     """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
     if len(matrices) != 4:
         raise InputError(f"matrices returned {len(matrices)} items; expected A, B, C, D")
-    shapes = [np.shape(M) for M in matrices]
+    shapes = [np.asarray(M).shape for M in matrices]
     text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
     expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"
     if any(len(shape) != 2 for shape in shapes[:3]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -22,6 +22,9 @@ from freqid.lti.holds import (
 from freqid.lti.responses import transfer
 from freqid.lti.state_space import StateSpace
 from freqid.models.model import Model
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ class DiscreteModel(Model):
         names += [f"a{k}" for k in range(1, self.order + 1)]
         return names, coefficients_of(self.matrices)
 
-    def to_continuous(self, hold: Hold | str | None = None) -> Any:
+    def to_continuous(self, hold: Hold | str | None = None) -> control.StateSpace:
         """The continuous plant that this hold samples to the model, a ``control.StateSpace``.
 
         Raises ValueError where there is none: a pole at zero or on the negative real axis has no

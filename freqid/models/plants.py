@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from freqid.checks import InputError, choice, whole
+from freqid.checks import Array, InputError, choice, whole
 from freqid.models.grey_box import GreyBox
 from freqid.models.parameter import Parameter
 
@@ -111,7 +110,7 @@ _DRIVETRAIN_OUTPUTS = tuple(
 )
 
 
-def _drivetrain(n: int, outputs: tuple[str, ...], **v: Any) -> tuple[Any, ...]:
+def _drivetrain(n: int, outputs: tuple[str, ...], **v: Array) -> tuple[Array, ...]:
     """States: n − 1 twists, n velocities, and a position of each mass whose position is wanted."""
     positions = [mass for mass in ("motor", "arm") if f"{mass} position" in outputs]
     zero = 0 * v["J1"]
@@ -149,11 +148,13 @@ def _drivetrain(n: int, outputs: tuple[str, ...], **v: Any) -> tuple[Any, ...]:
     return _stack(A), _stack(B), _stack(C), _stack(D)
 
 
-def _first_order(b: Any, a: Any) -> tuple[Any, ...]:
+def _first_order(b: Array, a: Array) -> tuple[Array, ...]:
     return _stack([[-a]]), _stack([[b]]), _stack([[1 + 0 * a]]), _stack([[0 * a]])
 
 
-def _two_mass(Jm: Any, k: Any, Ja: Any, fm: Any, d: Any, gear: Any) -> tuple[Any, ...]:
+def _two_mass(
+    Jm: Array, k: Array, Ja: Array, fm: Array, d: Array, gear: Array
+) -> tuple[Array, ...]:
     r = gear
     shape, kind = np.shape(k), np.result_type(Jm, k, Ja, fm, d, gear)
     A, B = np.zeros((*shape, 3, 3), kind), np.zeros((*shape, 3, 1), kind)
@@ -167,7 +168,7 @@ def _two_mass(Jm: Any, k: Any, Ja: Any, fm: Any, d: Any, gear: Any) -> tuple[Any
     return A, B, C, np.zeros((*shape, 1, 1))
 
 
-def _stack(rows: list[list[Any]]) -> Any:
+def _stack(rows: list[list[Array]]) -> Array:
     """A matrix of scalars, or of equally long arrays with their axis moved to the front."""
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.linalg
 import scipy.signal
+from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive, samples
 from freqid.data.record import Record
 from freqid.lti.holds import Hold, PeriodicHold, Sampled, as_hold
-from freqid.models.conversion import as_model
+from freqid.models.conversion import ModelLike, as_model
 
 
 def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
@@ -83,13 +84,13 @@ def forcing(sampled: Sampled, u: FloatArray) -> FloatArray:
 
 
 def simulate(
-    model: Any,
-    u: Any,
+    model: ModelLike,
+    u: ArrayLike,
     dt: float,
     hold: Hold | str | None = None,
-    initial_state: Any = None,
-    input_names: Any = None,
-    output_names: Any = None,
+    initial_state: ArrayLike | None = None,
+    input_names: Sequence[str] | None = None,
+    output_names: Sequence[str] | None = None,
 ) -> Record:
     """Response of a model to an input, exact at the samples.
 
@@ -144,6 +145,6 @@ def simulate(
         y[:, 0] if y.shape[1] == 1 and u.ndim == 1 else y,
         dt,
         hold=between,
-        input_names=input_names,
-        output_names=output_names,
+        input_names=input_names,  # type: ignore[arg-type]
+        output_names=output_names,  # type: ignore[arg-type]
     )

@@ -13,7 +13,7 @@ from freqid.checks import InputError, unknown
 
 
 @cache
-def _interpreter() -> Any:
+def _interpreter() -> asteval.Interpreter:
     return asteval.Interpreter(minimal=True, use_numpy=True)
 
 

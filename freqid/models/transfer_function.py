@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -152,7 +151,7 @@ def _sections(poles: ComplexArray) -> list[FloatArray]:
 
 
 def _chain_matrices(
-    shape: tuple[int, ...], zeros: int, p: int, m: int, scale: float, **v: Any
+    shape: tuple[int, ...], zeros: int, p: int, m: int, scale: float, **v: Array
 ) -> tuple[Array, ...]:
     any_value = v["p0_0"]
     lead, kind = np.shape(any_value), np.result_type(*v.values())

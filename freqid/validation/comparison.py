@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,8 +13,11 @@ from freqid.data.band import Band, as_band, chosen
 from freqid.data.record import Record
 from freqid.fitting.residuals import line_errors
 from freqid.lti.holds import Hold
-from freqid.models.conversion import as_model
+from freqid.models.conversion import ModelLike, as_model
 from freqid.models.output_error import DiscreteModel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +36,7 @@ class Comparison:
     fit_percent: FloatArray
     hold: Hold
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: Sequence[Axes] | None = None) -> Any:
         """Measured and simulated outputs above their difference; returns the axes."""
         from freqid.plots.validation_plots import plot_comparison
 
@@ -47,7 +51,7 @@ class Comparison:
 
 
 def compare(
-    model: Any,
+    model: ModelLike,
     record: Record,
     *,
     hold: Hold | str | None = None,
@@ -88,7 +92,7 @@ def compare(
     return Comparison(record, y, simulated, residual.reshape(shape), percent, used)
 
 
-def own_hold(model: Any, hold: Hold | str | None) -> Hold | str | None:
+def own_hold(model: ModelLike, hold: Hold | str | None) -> Hold | str | None:
     """The hold asked for, or the one that a sampled model has inside."""
     inner = as_model(model)
     return inner.hold if hold is None and isinstance(inner, DiscreteModel) else hold

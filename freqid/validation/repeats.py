@@ -11,6 +11,7 @@ from freqid.checks import InputError, whole
 from freqid.data.record import Record
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.noise_models import Weights
 from freqid.models.grey_box import GreyBox
 from freqid.validation.comparison import compare
 
@@ -23,7 +24,7 @@ def hold_bias(
     data: Record | Sequence[Record],
     *,
     band: tuple[float, float] | None = None,
-    weights: Any = None,
+    weights: Weights | Sequence[Weights] = None,
 ) -> pd.DataFrame:
     """The bias bar: what the assumed hold has added to each parameter, to modes of a black box.
 
@@ -68,7 +69,7 @@ def _mode_values(est: Estimate) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "std"])
 
 
-def cross_validate(model: Any, records: Sequence[Record], **options: Any) -> pd.DataFrame:
+def cross_validate(model: object, records: Sequence[Record], **options: Any) -> pd.DataFrame:
     """Fit to all repeats but one, and compare with that one, each in turn.
 
     ``options`` go to ``fit``. Returns a DataFrame with one row a repeat: ``held_out``, the fit in
@@ -89,7 +90,7 @@ def cross_validate(model: Any, records: Sequence[Record], **options: Any) -> pd.
 
 
 def bootstrap(
-    model: Any, records: Sequence[Record], n: int = 200, seed: int = 0, **options: Any
+    model: object, records: Sequence[Record], n: int = 200, seed: int = 0, **options: Any
 ) -> pd.DataFrame:
     """Estimates from repeats drawn again with replacement: their scatter without a noise model.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.stats
@@ -13,7 +13,7 @@ from freqid.data.record import Record
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.residuals import line_errors
 from freqid.lti.holds import Hold
-from freqid.models.conversion import as_model
+from freqid.models.conversion import ModelLike, as_model
 from freqid.validation.comparison import own_hold, part_inside
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _LEVEL = 0.01
 
 
 def residual_test(
-    model: Any,
+    model: ModelLike,
     record: Record,
     *,
     lags: int = _LAGS,
@@ -113,7 +113,7 @@ def _bartlett(e: FloatArray, dt: float, band: Band) -> float:
 
 def _row(
     test: str, output: str, input: str, statistic: float, limit: float, p: float
-) -> dict[str, Any]:
+) -> dict[str, object]:
     return {
         "test": test, "output": output, "input": input, "statistic": statistic, "limit": limit,
         "p_value": p, "passed": bool(statistic <= limit),

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 import freqid as fq
-from freqid.lti.bases import EigenBasis, SchurBasis, basis_of
+from freqid.lti.bases import basis_of
+from freqid.lti.eigen_basis import EigenBasis
+from freqid.lti.schur_basis import SchurBasis
 from freqid.lti.responses import points, response_and_derivatives
 from freqid.lti.state_space import Linearisation, StateSpace
 

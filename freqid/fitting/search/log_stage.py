@@ -8,14 +8,13 @@ of the parameters make gains and frequencies additive, so this stage walks in fr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Structure
-from freqid.lti.holds import PeriodicHold
+from freqid.lti.holds import Hold, PeriodicHold
 from freqid.lti.realisation import Realisation, sampled_response
 
 # lines of the first stage: enough to show every mode, few enough to cost next to nothing
@@ -27,7 +26,7 @@ _REACH = 16.0
 class LogResponse:
     """log(G/Ĝ) on a few lines of an experiment: the residual of the first stage."""
 
-    def __init__(self, omega: FloatArray, response: ComplexArray, hold: Any) -> None:
+    def __init__(self, omega: FloatArray, response: ComplexArray, hold: Hold) -> None:
         self.omega, self.measured, self.hold = omega, response, hold
         self.n_rows = 2 * response.size
 

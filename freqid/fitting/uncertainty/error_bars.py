@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.objective import EstimatedStructure
@@ -21,7 +22,7 @@ _STEP = 1e-6
 
 
 def derived(
-    model: GreyBox, function: Callable[[GreyBox], Any], covariance: FloatArray
+    model: GreyBox, function: Callable[[GreyBox], ArrayLike], covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Value and standard error of a function of the model, a number or an array, to first order.
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import scipy.ndimage
 
-from freqid.checks import FloatArray
+from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.lti.projection import eliminate
@@ -16,7 +14,7 @@ from freqid.lti.projection import eliminate
 _LINES = 4000
 
 
-def smoothed_power(error: Any) -> FloatArray:
+def smoothed_power(error: ComplexArray) -> FloatArray:
     """Local mean of |error|² over neighbouring lines, (…, K), for errors (…, K)."""
     power = np.abs(error) ** 2
     K = power.shape[-1]
@@ -25,7 +23,7 @@ def smoothed_power(error: Any) -> FloatArray:
     return smooth
 
 
-def noise_weights(error: Any, n_samples: int) -> FloatArray:
+def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     """1/variance at each line from the errors (outputs, K) that a fit left there.
 
     In a record's cost, Σ 2|E|²/N, every real value then adds a half, as it does to a response's

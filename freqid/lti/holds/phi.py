@@ -7,11 +7,10 @@ in its eigenbasis (Higham, Functions of Matrices, 2008, theorem 3.11).
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray
+from freqid.checks import Array, ComplexArray, FloatArray, IntArray
 
 # below this size the integrals of φ are summed, above it their recurrences are stable; ten
 # Gauss-Legendre nodes integrate exp(xs) on [0, 1] to rounding for |x| < 4
@@ -51,7 +50,7 @@ def phi_functions(x: ComplexArray) -> tuple[tuple[ComplexArray, ...], tuple[Comp
 
 
 @cache
-def _pairs(n: int) -> tuple[Any, Any, Any, Any]:
+def _pairs(n: int) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """First and second of the pairs i ≤ j, where each (i, j) and each (i, i) stand among them."""
     first, second = np.triu_indices(n)
     place = np.zeros((n, n), int)

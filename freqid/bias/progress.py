@@ -1,0 +1,51 @@
+"""Progress of a map: a bar on a terminal, lines in a log file."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+
+class Bar:
+    """Progress for the length of a ``with`` block; entering gives the function to advance.
+
+    A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth.
+    """
+
+    def __init__(self, wanted: bool | None, total: int, done: int) -> None:
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        self.console = Console(stderr=True)
+        live = self.console.is_terminal or self.console.is_jupyter
+        self.lines = bool(wanted) and not live
+        self.total, self.done = total, done
+        self.progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            console=self.console,
+            disable=not live if wanted is None else not (wanted and live),
+        )
+        self.task = self.progress.add_task("bias map", total=total, completed=done)
+
+    def __enter__(self) -> Callable[[int], None]:
+        self.progress.start()
+        return self.advance
+
+    def advance(self, count: int) -> None:
+        """``count`` more are done."""
+        before, self.done = self.done, self.done + count
+        self.progress.advance(self.task, count)
+        if self.lines and 10 * before // self.total != 10 * self.done // self.total:
+            print(f"bias map: {self.done} of {self.total}", file=sys.stderr, flush=True)
+
+    def __exit__(self, *reason: object) -> None:
+        self.progress.stop()
