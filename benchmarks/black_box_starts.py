@@ -15,13 +15,13 @@ import numpy as np
 import scipy.interpolate
 import scipy.linalg
 from freqid.fitting.cost.minimum import Objective
+from freqid.fitting.preparation import Options
 
 import freqid as fq
 from freqid.fitting.black_box.output_error import _descend, lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.subspace import identify, inputs_of
 from freqid.fitting.cost.charts import Chart
-from freqid.fitting.preparation import Options
 from freqid.lti.state_space import StateSpace
 
 

@@ -58,8 +58,9 @@ def coverage(count):
 def bound(clean, kind, std):
     """(Jᵀ S⁻¹ J)⁻¹ at the true parameters with the true spectrum of the noise."""
     from freqid.fitting.cost.minimum import Objective
-    from freqid.fitting.cost.structures import GreyStructure
     from freqid.fitting.preparation import Options, prepare
+
+    from freqid.fitting.cost.structures import GreyStructure
 
     f = np.arange(100, 801) / 10
     power = np.full(701, std**2)

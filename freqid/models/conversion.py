@@ -11,7 +11,7 @@ import numpy as np
 from freqid.checks import InputError
 from freqid.lti.holds import ZeroOrderHold
 from freqid.lti.state_space import StateSpace
-from freqid.models.model import Model
+from freqid.models.model import MatrixModel, Model
 from freqid.models.output_error import DiscreteModel
 
 if TYPE_CHECKING:
@@ -19,19 +19,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class SystemModel(Model):
+class SystemModel(MatrixModel):
     """A continuous-time control system."""
 
     dt = 0.0
     delay = 0.0
 
     matrices: StateSpace
-    inputs: Sequence[str]
-    outputs: Sequence[str]
-
-    def state_space(self) -> StateSpace:
-        """A, B, C, D."""
-        return self.matrices
+    input_names: Sequence[str]
+    output_names: Sequence[str]
 
 
 class HasModel(Protocol):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.lti.bases import basis_of
 from freqid.lti.holds import BandLimited, Hold, PeriodicHold, Sampled
 from freqid.lti.realisation import Realisation, Timing
-from freqid.lti.responses import points, transfer
+from freqid.lti.responses import on_circle, points, transfer
 from freqid.lti.state_space import Linearisation, StateSpace
 
 if TYPE_CHECKING:
@@ -53,6 +53,11 @@ class Model(ABC):
         return np.linalg.eigvals(self.state_space().A).astype(complex)
 
     @property
+    def own_hold(self) -> Hold | None:
+        """The hold that a sampled model has inside, None in continuous time."""
+        return None
+
+    @property
     def integrates(self) -> bool:
         """Whether a plant in continuous time has a pole at zero, up to rounding."""
         size = np.abs(self.poles)
@@ -84,8 +89,9 @@ class Model(ABC):
     def frequency_response(self, omega: ArrayLike, hold: Hold | None = None) -> FrequencyResponse:
         """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
 
-        Returns a FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega
-        that is not finite or a hold that is not one.
+        That of a sampled model is taken at exp(jω·dt): it has its hold inside. Returns a
+        FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega that is not
+        finite or a hold that is not one.
 
         >>> import freqid as fq
         >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
@@ -101,14 +107,15 @@ class Model(ABC):
                 f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
                 "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
             )
-        between = BandLimited() if hold is None else hold
-        z = points(at, between)
+        between = BandLimited() if hold is None or self.dt else hold
+        z = on_circle(at * self.dt) if self.dt else points(at, between)
         if self.delay:
             plant, late = self.still().delayed(between, at, z)
             G = transfer(plant, z) * late
         else:
             G = transfer(basis_of(self.state_space()).through(between), z)
-        dt = hold.period if isinstance(hold, PeriodicHold) else 0.0
+        hold = self.own_hold or hold
+        dt = self.dt or (hold.period if isinstance(hold, PeriodicHold) else 0.0)
         return FrequencyResponse(
             at / (2 * np.pi), G, dt=dt, hold=hold,
             input_names=self.inputs, output_names=self.outputs,
@@ -130,3 +137,32 @@ class Model(ABC):
             *self.state_space(), self.dt,
             inputs=list(self.inputs or ()), outputs=list(self.outputs or ()),
         )  # fmt: skip
+
+
+class MatrixModel(Model):
+    """A model that holds its matrices, (outputs, inputs) with names."""
+
+    matrices: StateSpace
+    input_names: Sequence[str]
+    output_names: Sequence[str]
+
+    def state_space(self) -> StateSpace:
+        """A, B, C, D."""
+        return self.matrices
+
+    @property
+    def inputs(self) -> Sequence[str]:  # type: ignore[override]
+        """Names of the inputs."""
+        return self.input_names
+
+    @property
+    def outputs(self) -> Sequence[str]:  # type: ignore[override]
+        """Names of the outputs."""
+        return self.output_names
+
+    def coefficient_names(self, b: Iterable[int], a: Iterable[int]) -> list[str]:
+        """Names of coefficients with these numbers: b of each channel pair in turn, then a."""
+        pairs = [f"[{y},{u}]" for y in self.output_names for u in self.input_names]
+        numbers = list(b)
+        above = [f"b{k}{pair if len(pairs) > 1 else ''}" for pair in pairs for k in numbers]
+        return [*above, *(f"a{k}" for k in a)]

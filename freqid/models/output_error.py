@@ -8,20 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, whole
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.lti.bases import basis_of
 from freqid.lti.holds import (
-    BandLimited,
     Hold,
     PeriodicHold,
     as_hold,
 )
-from freqid.lti.responses import transfer
 from freqid.lti.state_space import StateSpace
-from freqid.models.model import Model
+from freqid.models.model import MatrixModel
 
 if TYPE_CHECKING:
     import control
@@ -47,7 +42,7 @@ class OutputError:
 
 
 @dataclass(frozen=True, eq=False)
-class DiscreteModel(Model):
+class DiscreteModel(MatrixModel):
     """A sampled model x(k+1) = Φ x + Γ u, y = C x + D u at the period of its hold (s)."""
 
     delay = 0.0
@@ -58,19 +53,10 @@ class DiscreteModel(Model):
     input_names: Sequence[str]
     output_names: Sequence[str]
 
-    def state_space(self) -> StateSpace:
-        """Φ, Γ, C, D."""
-        return self.matrices
-
     @property
-    def inputs(self) -> Sequence[str]:  # type: ignore[override]
-        """Names of the inputs."""
-        return self.input_names
-
-    @property
-    def outputs(self) -> Sequence[str]:  # type: ignore[override]
-        """Names of the outputs."""
-        return self.output_names
+    def own_hold(self) -> Hold:
+        """The hold inside."""
+        return self.hold
 
     @property
     def spec(self) -> OutputError:
@@ -97,29 +83,10 @@ class DiscreteModel(Model):
         """b(z) from one input to one output, highest power first, (order + 1,)."""
         return numerator_of(self.matrices, self.denominator(), output, input)
 
-    def frequency_response(self, omega: ArrayLike, hold: Hold | None = None) -> FrequencyResponse:
-        """Response at ``omega`` (rad/s), taken at exp(jω·dt)."""
-        at = np.atleast_1d(np.asarray(omega, dtype=float))
-        plant = basis_of(self.matrices).through(BandLimited())
-        return FrequencyResponse(
-            at / (2 * np.pi),
-            transfer(plant, np.exp(1j * at * self.dt)),
-            dt=self.dt,
-            hold=self.hold,
-            input_names=self.input_names,
-            output_names=self.output_names,
-        )
-
     def coefficients(self) -> tuple[list[str], FloatArray]:
         """Names and values of the coefficients: b of each channel pair, then a."""
-        p, m = self.matrices.D.shape
-        names = []
-        for o in range(p):
-            for i in range(m):
-                pair = "" if p * m == 1 else f"[{self.output_names[o]},{self.input_names[i]}]"
-                first = 0 if self.matrices.D.any() else 1
-                names += [f"b{k}{pair}" for k in range(first, self.order + 1)]
-        names += [f"a{k}" for k in range(1, self.order + 1)]
+        first = 0 if self.matrices.D.any() else 1
+        names = self.coefficient_names(range(first, self.order + 1), range(1, self.order + 1))
         return names, coefficients_of(self.matrices)
 
     def to_continuous(self, hold: Hold | str | None = None) -> control.StateSpace:

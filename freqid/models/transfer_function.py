@@ -11,7 +11,7 @@ import numpy as np
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, finite, whole
 from freqid.lti.state_space import StateSpace
 from freqid.models.grey_box import GreyBox
-from freqid.models.model import Model
+from freqid.models.model import MatrixModel
 from freqid.models.parameter import Parameter
 
 _ANY = (-np.inf, np.inf)
@@ -48,7 +48,7 @@ class TransferFunction:
 
 
 @dataclass(frozen=True, eq=False)
-class ContinuousModel(Model):
+class ContinuousModel(MatrixModel):
     """An estimated continuous-time rational model, x' = A x + B u, y = C x + D u."""
 
     dt = 0.0
@@ -59,20 +59,6 @@ class ContinuousModel(Model):
     input_names: Sequence[str]
     output_names: Sequence[str]
     delay: float = 0.0
-
-    def state_space(self) -> StateSpace:
-        """A, B, C, D."""
-        return self.matrices
-
-    @property
-    def inputs(self) -> Sequence[str]:  # type: ignore[override]
-        """Names of the inputs."""
-        return self.input_names
-
-    @property
-    def outputs(self) -> Sequence[str]:  # type: ignore[override]
-        """Names of the outputs."""
-        return self.output_names
 
     @property
     def spec(self) -> TransferFunction:
@@ -205,12 +191,6 @@ def rational_model(model: GreyBox, zeros: int, delay: float = 0.0) -> Continuous
 
 def coefficients(model: ContinuousModel) -> tuple[list[str], FloatArray]:
     """Names and values of the coefficients: b of each channel pair, highest power first, then a."""
-    p, m, count = model.numerators.shape
-    names = []
-    for o in range(p):
-        for i in range(m):
-            pair = "" if p * m == 1 else f"[{model.output_names[o]},{model.input_names[i]}]"
-            names += [f"b{count - 1 - k}{pair}" for k in range(count)]
-    n = len(model.denominator) - 1
-    names += [f"a{n - 1 - k}" for k in range(n)]
+    zeros, poles = model.numerators.shape[2], len(model.denominator) - 1
+    names = model.coefficient_names(reversed(range(zeros)), reversed(range(poles)))
     return names, np.concatenate([model.numerators.ravel(), model.denominator[1:]])

@@ -14,7 +14,6 @@ from freqid.data.record import Record
 from freqid.fitting.residuals import line_errors
 from freqid.lti.holds import Hold
 from freqid.models.conversion import ModelLike, as_model
-from freqid.models.output_error import DiscreteModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -94,8 +93,7 @@ def compare(
 
 def own_hold(model: ModelLike, hold: Hold | str | None) -> Hold | str | None:
     """The hold asked for, or the one that a sampled model has inside."""
-    inner = as_model(model)
-    return inner.hold if hold is None and isinstance(inner, DiscreteModel) else hold
+    return as_model(model).own_hold if hold is None else hold
 
 
 def part_inside(x: FloatArray, dt: float, band: Band) -> FloatArray:

@@ -137,7 +137,9 @@ def test_a_noise_model_weighs_records_and_responses(weights, record):
     for data, band in ((noisy, (10, 80)), (frf, None)):
         reading = Reading.of(data, band=band)
         shape = reading.lines().lines.Y[:, 0].shape if data is noisy else frf.response.shape
-        given = np.full(shape[-1], 2.0) if isinstance(weights, str) and weights == "array" else weights
+        given = (
+            np.full(shape[-1], 2.0) if isinstance(weights, str) and weights == "array" else weights
+        )
         model = as_noise_model(given, data)
         w = np.broadcast_to(model.weights(data, shape), shape)
         assert np.isfinite(w).all()
@@ -192,7 +194,7 @@ def test_an_estimator_fits_explains_and_survives_a_copy(kind, from_response, rec
     assert (np.linalg.eigvalsh(est.covariance_matrix) > -1e-9 * est.covariance_matrix.max()).all()
 
 
-# gradients: structures x experiments ---------------------------------------------------------------
+# gradients: structures x experiments -------------------------------------------------------------
 
 
 def structures(plant):

@@ -4,8 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 import scipy.signal
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import freqid as fq
 from freqid.lti.holds import phi_functions

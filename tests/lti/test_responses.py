@@ -7,8 +7,8 @@ import pytest
 import freqid as fq
 from freqid.lti.bases import basis_of
 from freqid.lti.eigen_basis import EigenBasis
-from freqid.lti.schur_basis import SchurBasis
 from freqid.lti.responses import points, response_and_derivatives
+from freqid.lti.schur_basis import SchurBasis
 from freqid.lti.state_space import Linearisation, StateSpace
 
 OMEGA = 2 * np.pi * np.linspace(10, 80, 71)

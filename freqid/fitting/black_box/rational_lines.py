@@ -36,7 +36,7 @@ _GAIN = 1e-9
 
 
 @dataclass(frozen=True)
-class Minimum:
+class Fitted:
     """x = (b, t, a) in a basis, its cost, and whether every step on the way there succeeded."""
 
     basis: Basis
@@ -69,7 +69,7 @@ class RationalLines:
                 own[end - e.n_lines : end] = e.transient.factor
                 self.free.append(own)
 
-    def minimum(self, poles: ComplexArray) -> Minimum | None:
+    def minimum(self, poles: ComplexArray) -> Fitted | None:
         """Where both iterations lead from these poles; None where the polynomials vanish."""
         try:
             with np.errstate(all="ignore"):
@@ -114,10 +114,10 @@ class RationalLines:
         parts = [basis.Q[: n + self.feedthrough] * (self.driven * inverse)]
         return parts + [basis.Q[:n] * (own * inverse) for own in self.free]
 
-    def _descend(self, basis: Basis, x: FloatArray) -> Minimum:
+    def _descend(self, basis: Basis, x: FloatArray) -> Fitted:
         """Gauss-Newton steps from x, damped (Levenberg and Marquardt) where they fail."""
         n = len(basis.Q) - 1
-        best, damping, straight = Minimum(basis, x, np.inf, True), 0.0, True
+        best, damping, straight = Fitted(basis, x, np.inf, True), 0.0, True
         R = np.zeros((0, 0))
         for _ in range(_DESCENTS):
             inverse = 1 / basis.denominator(x)
@@ -127,7 +127,7 @@ class RationalLines:
             cost = float(np.vdot(error, error).real)
             if cost < best.cost:
                 gain = best.cost - cost
-                best = Minimum(basis, x, cost, straight)
+                best = Fitted(basis, x, cost, straight)
                 R = _triangle([*columns, basis.Q[:n] * (-output * inverse)], error)
                 if damping and gain <= _GAIN * cost:
                     break
@@ -140,10 +140,10 @@ class RationalLines:
                     break
             x = best.x + _least(R, damping)
             if not damping and cost - R[-1, -1] ** 2 <= _GAIN * cost:
-                return Minimum(basis, x, R[-1, -1] ** 2, straight)
+                return Fitted(basis, x, R[-1, -1] ** 2, straight)
         return best
 
-    def state_space(self, found: Minimum) -> StateSpace:
+    def state_space(self, found: Fitted) -> StateSpace:
         """Modal and real: the poles are the roots of a, and the inputs b's residues there."""
         basis, x = found.basis, found.x
         n = len(basis.Q) - 1

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, InputError
-from freqid.fitting.black_box.rational_lines import FEW, Minimum, RationalLines
+from freqid.fitting.black_box.rational_lines import FEW, Fitted, RationalLines
 from freqid.fitting.black_box.subspace import identify, observed
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.search.noise_floor import noise_floor
@@ -41,7 +41,7 @@ def first_model(
     # of very many lines a part will do: its minimum is next to that of all
     few = thinned_to(experiments, _LINES)
     lines = RationalLines(few, feedthrough)
-    best: Minimum | None = None
+    best: Fitted | None = None
     for poles in _begun(lines, order):
         found = lines.minimum(poles)
         if found is not None and (best is None or found.cost < best.cost):
@@ -54,7 +54,7 @@ def first_model(
     return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
 
 
-def _believed(lines: RationalLines, found: Minimum) -> bool:
+def _believed(lines: RationalLines, found: Fitted) -> bool:
     if not found.straight:
         return False
     energy = sum(e.energy for e in lines.experiments)

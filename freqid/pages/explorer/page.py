@@ -154,8 +154,7 @@ def _layout(dash: Any, record: Record | None) -> Any:
 
 
 def _wire(dash: Any, app: Any, record: Record | None) -> None:
-    from dash import ALL, Input, Output
-    from dash import State as Kept
+    from dash import ALL, Input, Output, State as Kept
 
     @app.callback(Output("sliders", "children"), Input("plant", "value"), Kept("url", "search"))
     def sliders(plant: str, search: str | None) -> Any:
