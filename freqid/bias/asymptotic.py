@@ -8,7 +8,7 @@ The fit itself is that of measured responses, at the nodes of Gauss's rule (see 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -97,21 +97,26 @@ def asymptotic_fit(
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
     conditions = Conditions(spectrum, sampling, band, prefilter, noise_model)
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
-    whole("seed", seed, least=0)
+    options = SearchOptions(count, whole("seed", seed, least=0), start, hold == "estimate")
     if duration is not None:
         positive("duration", duration, "s")
     if not np.isfinite(noise_std) or noise_std < 0:
         raise InputError(f"noise_std={noise_std!r} must be finite and not negative")
     fitted = plant if model is None else model
     if isinstance(fitted, GreyBox):
-        est, expected, structure = _grey(fitted, at, conditions, hold, start, count, seed)
-        return _with_errors(est, structure, expected, sampling, noise_std, duration)
-    if isinstance(fitted, (OutputError, TransferFunction)):
-        return _black(fitted, plant, at, conditions, hold)
-    raise InputError(
-        f"model={type(fitted).__name__} is not a model; expected a GreyBox, OutputError or "
-        "TransferFunction"
-    )
+        est, expected = grey_asymptote(fitted, at, conditions, hold, options)
+        N = None if duration is None else duration / sampling.dt
+        structure = cast(GreyStructure, est.minimum.structure)
+        covariance = error_covariance(est.minimum.x, structure, expected, est.hold, noise_std, N)
+    elif isinstance(fitted, OutputError | TransferFunction):
+        est = _black(fitted, plant, at, conditions, as_hold(hold, sampling.dt, sampling.hold))
+        covariance = np.zeros((len(est.minimum.x),) * 2)
+    else:
+        raise InputError(
+            f"model={type(fitted).__name__} is not a model; expected a GreyBox, OutputError or "
+            "TransferFunction"
+        )
+    return dataclasses.replace(est, uncertainty=dataclasses.replace(est.spread, given=covariance))
 
 
 def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Responses:
@@ -125,42 +130,35 @@ def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Resp
     return at
 
 
-def _grey(
+def grey_asymptote(
     model: GreyBox,
     at: StateSpace,
     conditions: Conditions,
     hold: Hold | str | None,
-    start: Mapping[str, float] | None,
-    count: int | None,
-    seed: int,
-) -> tuple[Estimate, Expected, GreyStructure]:
+    options: SearchOptions,
+) -> tuple[Estimate, Expected]:
+    """The estimate of a grey box, and the data at the nodes that it took."""
     sampling = conditions.sampling
-    estimated = isinstance(hold, str) and hold == "estimate"
-    assumed = as_hold("zoh" if estimated else hold, sampling.dt, sampling.hold)
+    assumed = as_hold("zoh" if options.estimated_hold else hold, sampling.dt, sampling.hold)
     plain = GreyStructure(model)
     if not plain.physical_names:
         raise InputError("model has no free parameter; free one with model.free(name)")
-    count_physical = len(plain.physical_names)
-    known = [model_responses(plain, plain.start, assumed)]
 
-    def responses(f: FloatArray) -> Array:
-        return np.concatenate([r(f) for r in known])
+    def seen(est: Estimate | None) -> list[Responses]:
+        start = model_responses(plain, plain.start, assumed)
+        if est is None:
+            return [start]
+        found = est.values[: plain.count] / plain.scale
+        return [start, model_responses(plain, found, est.hold)]
 
-    def solve(expected: Expected, begin: Mapping[str, float] | None, n: int | None) -> Estimate:
-        reading = expected.as_reading(sampling, model, assumed)
-        return fit_grey_box(model, [reading], SearchOptions(n, seed, begin, estimated))
+    def solve(expected: Expected, est: Estimate | None) -> Estimate:
+        reading, own = expected.as_reading(sampling, model, assumed), options
+        if est is not None:
+            near = {n: est[n] for n in plain.physical_names}
+            own = dataclasses.replace(options, n_starts=1, start=near)
+        return fit_grey_box(model, [reading], own)
 
-    expected = conditions.expected(at, responses)
-    first = solve(expected, start, count)
-    est = first
-    for _ in range(_ROUNDS):
-        found = est.values[:count_physical] / plain.scale
-        known = [known[0], model_responses(plain, found, est.hold)]
-        finer = conditions.expected(at, responses)
-        if len(finer.panels) == len(expected.panels):
-            break
-        expected = finer
-        est = solve(expected, {n: est[n] for n in plain.physical_names}, 1)
+    first, est, expected = _refined(conditions, at, seen, solve)
     minimum = est.minimum
     x = settled(minimum.objective, minimum.x)
     minimum = Minimum(minimum.objective, dataclasses.replace(minimum.solution, x=x))
@@ -168,18 +166,19 @@ def _grey(
     values = x * structure.scale
     # what is left of the cost is no noise: no parameter is unphysical by chance
     kept = [w for w in est.warnings if w.kind not in ("not physical", "edge of a bound")]
-    certain = Evidence(plain.parameters, values[:count_physical], np.zeros(count_physical))
-    est = dataclasses.replace(
+    certain = Evidence(plain.parameters, values[: plain.count], np.zeros(plain.count))
+    settled_there = dataclasses.replace(
         est,
         values=values,
         warnings=kept + findings(certain),
         model=structure.at(x),
         problem=minimum,
+        uncertainty=Spread(structure.scale, minimum),
         nominal=first.nominal,
         n_starts=first.n_starts,
         n_agreed=first.n_agreed,
     )
-    return est, expected, structure
+    return settled_there, expected
 
 
 def _black(
@@ -187,26 +186,33 @@ def _black(
     plant: ModelLike,
     at: StateSpace,
     conditions: Conditions,
-    hold: Hold | str | None,
+    hold: Hold,
 ) -> Estimate:
-    sampling = conditions.sampling
-    assumed = as_hold(hold, sampling.dt, sampling.hold)
+    def seen(est: Estimate | None) -> list[Responses]:
+        return [] if est is None else [_responses_of(est.model, hold)]
 
-    def solve(expected: Expected) -> Estimate:
-        reading = expected.as_reading(sampling, plant, assumed)
+    def solve(expected: Expected, est: Estimate | None) -> Estimate:
+        reading = expected.as_reading(conditions.sampling, plant, hold)
         return fitter_of(spec)(spec, [reading], SearchOptions())
 
-    expected = conditions.expected(at)
-    est = solve(expected)
+    return _refined(conditions, at, seen, solve)[1]
+
+
+def _refined(
+    conditions: Conditions,
+    at: StateSpace,
+    seen: Callable[[Estimate | None], list[Responses]],
+    solve: Callable[[Expected, Estimate | None], Estimate],
+) -> tuple[Estimate, Estimate, Expected]:
+    """First and last fit, and the nodes of the last, chosen anew for what each fit led to."""
+    expected = conditions.expected(at, *seen(None))
+    first = est = solve(expected, None)
     for _ in range(_ROUNDS):
-        finer = conditions.expected(at, _responses_of(est.model, assumed))
+        finer = conditions.expected(at, *seen(est))
         if len(finer.panels) == len(expected.panels):
             break
-        expected = finer
-        est = solve(expected)
-    minimum = est.minimum
-    none = np.zeros((len(minimum.x),) * 2)
-    return dataclasses.replace(est, uncertainty=dataclasses.replace(est.spread, given=none))
+        expected, est = finer, solve(finer, est)
+    return first, est, expected
 
 
 def _responses_of(model: Model, hold: Hold) -> Responses:
@@ -218,20 +224,6 @@ def _responses_of(model: Model, hold: Hold) -> Responses:
         return G[..., np.argsort(order)].reshape(-1, len(f))
 
     return at
-
-
-def _with_errors(
-    est: Estimate,
-    structure: GreyStructure,
-    expected: Expected,
-    sampling: Sampling,
-    noise_std: float,
-    duration: float | None,
-) -> Estimate:
-    N = None if duration is None else duration / sampling.dt
-    x = est.values / structure.scale
-    covariance = error_covariance(x, structure, expected, est.hold, noise_std, N)
-    return dataclasses.replace(est, uncertainty=Spread(structure.scale, est.minimum, covariance))
 
 
 def error_covariance(

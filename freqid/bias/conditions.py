@@ -6,7 +6,7 @@ need, so that a fit to them is the one of measured responses.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,7 +78,7 @@ class Conditions:
     prefilter: Any = None
     noise_model: Any = None
 
-    def expected(self, at: StateSpace, responses: Responses | None = None) -> Expected:
+    def expected(self, at: StateSpace, *responses: Responses) -> Expected:
         """The data, at nodes that resolve them and the ``responses`` (any, K) of frequencies in Hz.
 
         Raises ValueError where the spectrum has no energy below the slow Nyquist limit.
@@ -127,10 +127,8 @@ class Conditions:
             panels,
         )
 
-    def _columns(self, held: Held, f: FloatArray, responses: Responses | None) -> Array:
+    def _columns(self, held: Held, f: FloatArray, responses: Sequence[Responses]) -> Array:
         seen = apparent_density(held, self.spectrum, self.sampling, f)
         weight = seen.power * weight_of(f, self.sampling.dt, self.prefilter, self.noise_model)
-        rows = [weight[None], seen.response.reshape(-1, len(f))]
-        if responses is not None:
-            rows.append(responses(f))
+        rows = [weight[None], seen.response.reshape(-1, len(f)), *(r(f) for r in responses)]
         return np.concatenate(rows)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from freqid.bias.apparent import Sampling, true_plant
-from freqid.bias.asymptotic import asymptotic_fit, model_responses
+from freqid.bias.apparent import true_plant
+from freqid.bias.asymptotic import grey_asymptote, model_responses
 from freqid.bias.batched_fit import Answers, Batch, Problem, descend, solve
 from freqid.bias.conditions import Conditions
 from freqid.checks import BoolArray, FloatArray, InputError
 from freqid.excitation.input_spectra import InputSpectrum
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Evidence, findings
+from freqid.fitting.fitters import SearchOptions
 from freqid.lti.holds import Hold, as_hold
 from freqid.lti.quadrature import TOLERANCE
 from freqid.models.grey_box import GreyBox
@@ -37,26 +38,10 @@ class Row:
     spectrum: InputSpectrum
     hold: Hold | str | None
 
-
-@dataclass(frozen=True)
-class Setting:
-    """What all rows share."""
-
-    true_hold: Hold
-    base_dt: float
-    band: tuple[float, float] | None = None
-    antialias: bool = False
-    prefilter: Any = None
-    noise_model: Any = None
-
-    def conditions(self, row: Row) -> Conditions:
-        """Spectrum and sampling of a row."""
-        sampling = Sampling(self.true_hold, self.base_dt, row.factor, self.antialias)
-        return Conditions(row.spectrum, sampling, self.band, self.prefilter, self.noise_model)
-
-    def assumed(self, row: Row) -> Hold:
-        """The hold that a row's fit assumes."""
-        return as_hold(row.hold, self.base_dt * row.factor, self.true_hold)
+    def conditions(self, shared: Conditions) -> Conditions:
+        """Those of all rows, with this one's spectrum and factor."""
+        sampling = dataclasses.replace(shared.sampling, factor=self.factor)
+        return dataclasses.replace(shared, spectrum=self.spectrum, sampling=sampling)
 
 
 @dataclass
@@ -69,7 +54,7 @@ class Answer:
     message: str = ""
 
 
-def answer_chunk(model: GreyBox, rows: Sequence[Row], setting: Setting) -> list[Answer]:
+def answer_chunk(model: GreyBox, rows: Sequence[Row], shared: Conditions) -> list[Answer]:
     """All rows of one plant and one kind of hold. A row that fails says so; the others stand."""
     count = len(model.free_parameters)
     answers = [Answer(np.full(count, np.nan), np.nan, False) for _ in rows]
@@ -77,16 +62,16 @@ def answer_chunk(model: GreyBox, rows: Sequence[Row], setting: Setting) -> list[
     kept: list[int] = []
     for i, row in enumerate(rows):
         try:
-            problems.append(_problem(model, row, setting))
+            problems.append(_problem(model, row, shared))
             kept.append(i)
         except (InputError, ArithmeticError) as error:
             answers[i].message = str(error)
     bounded = any(np.isfinite([p.lower, p.upper]).any() for p in model.free_parameters)
     single = list(kept)
     if kept and not bounded:
-        single = _together(model, [rows[i] for i in kept], setting, problems, kept, answers)
+        single = _together(model, [rows[i] for i in kept], shared, problems, kept, answers)
     for i in single:
-        answers[i] = _alone(model, rows[i], setting)
+        answers[i] = _alone(model, rows[i], shared)
     for i in kept:
         if answers[i].converged and not answers[i].message:
             certain = Evidence(model.free_parameters, answers[i].values, np.zeros(count))
@@ -95,15 +80,14 @@ def answer_chunk(model: GreyBox, rows: Sequence[Row], setting: Setting) -> list[
     return answers
 
 
-def _problem(model: GreyBox, row: Row, setting: Setting, at: FloatArray | None = None) -> Problem:
+def _problem(model: GreyBox, row: Row, shared: Conditions, at: FloatArray | None = None) -> Problem:
     """Nodes for a row, fine enough for the model at its own values and at ``at`` (scaled)."""
     structure = GreyStructure(model)
-    hold = setting.assumed(row)
+    conditions = row.conditions(shared)
+    hold = as_hold(row.hold, conditions.sampling.dt, conditions.sampling.hold)
     points = [structure.start] if at is None else [structure.start, at]
     seen = [model_responses(structure, x, hold) for x in points]
-    expected = setting.conditions(row).expected(
-        true_plant(model).state_space(), lambda f: np.concatenate([r(f) for r in seen])
-    )
+    expected = conditions.expected(true_plant(model).state_space(), *seen)
     count = 2 * expected.response.size
     if count < len(structure.names):
         raise InputError(
@@ -118,7 +102,7 @@ def _problem(model: GreyBox, row: Row, setting: Setting, at: FloatArray | None =
 def _together(
     model: GreyBox,
     rows: Sequence[Row],
-    setting: Setting,
+    shared: Conditions,
     problems: list[Problem],
     kept: Sequence[int],
     answers: list[Answer],
@@ -132,7 +116,7 @@ def _together(
         if len(coarse) == 0:
             break
         for i in coarse.tolist():
-            problems[i] = _problem(model, rows[i], setting, found.values[i])
+            problems[i] = _problem(model, rows[i], shared, found.values[i])
         batch = Batch(model, problems)
         part = Batch(model, [problems[i] for i in coarse.tolist()])
         again = descend(part, found.values[coarse])
@@ -155,20 +139,10 @@ def _determined(batch: Batch, found: Answers) -> BoolArray:
     return np.linalg.eigvalsh(scaled)[:, 0] > _DETERMINED
 
 
-def _alone(model: GreyBox, row: Row, setting: Setting) -> Answer:
+def _alone(model: GreyBox, row: Row, shared: Conditions) -> Answer:
     try:
-        est = asymptotic_fit(
-            model,
-            row.spectrum,
-            setting.base_dt * row.factor,
-            row.hold,
-            setting.true_hold,
-            base_dt=setting.base_dt,
-            band=setting.band,
-            antialias=setting.antialias,
-            prefilter=setting.prefilter,
-            noise_model=setting.noise_model,
-        )
+        at = true_plant(model).state_space()
+        est, _ = grey_asymptote(model, at, row.conditions(shared), row.hold, SearchOptions())
     except (InputError, ArithmeticError, np.linalg.LinAlgError) as error:
         count = len(model.free_parameters)
         return Answer(np.full(count, np.nan), np.nan, False, str(error))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -9,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.bias.apparent import weight_of
-from freqid.bias.map_rows import Answer, Row, Setting, answer_chunk
+from freqid.bias.apparent import Sampling, weight_of
+from freqid.bias.conditions import Conditions
+from freqid.bias.map_rows import Answer, Row, answer_chunk
 from freqid.bias.map_store import MapStore
 from freqid.bias.progress import Bar
 from freqid.checks import Array, InputError, whole
@@ -73,10 +75,12 @@ def bias_map(
     import pandas as pd
 
     plants = {"": plant} if isinstance(plant, GreyBox) else dict(plant)
-    setting, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
-    setting = Setting(setting.true_hold, setting.base_dt, band, antialias, prefilter, noise_model)
+    sampling, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
+    sampling = dataclasses.replace(sampling, antialias=antialias)
+    # each row puts its own spectrum and factor in
+    shared = Conditions(rows[0].spectrum, sampling, band, prefilter, noise_model)
     chunks = _chunks(rows, whole("chunk", chunk))
-    store = None if path is None else MapStore(path, _identity(plants, rows, setting, chunk))
+    store = None if path is None else MapStore(path, _identity(plants, rows, shared, chunk))
     finished = None if store is None else store.whole()
     if finished is not None:
         return finished
@@ -87,7 +91,7 @@ def bias_map(
     todo = [n for n in range(len(chunks)) if n not in tables]
     jobs = [(n, plants[rows[chunks[n][0]].plant_label], [rows[i] for i in chunks[n]]) for n in todo]
     with Bar(progress, len(rows), sum(len(chunks[n]) for n in tables)) as advance:
-        for n, answers in _run(jobs, setting, n_jobs):
+        for n, answers in _run(jobs, shared, n_jobs):
             model = plants[rows[chunks[n][0]].plant_label]
             tables[n] = _table(model, chunks[n], [rows[i] for i in chunks[n]], answers)
             if store is not None:
@@ -112,7 +116,7 @@ def _asked(
     holds: Iterable[Hold | str | None],
     base_dt: float | None,
     true_hold: Hold | None,
-) -> tuple[Setting, list[Row]]:
+) -> tuple[Sampling, list[Row]]:
     """The checked arguments as rows, spectra running fastest: neighbours resemble one another."""
     for name, model in plants.items():
         if not isinstance(model, GreyBox):
@@ -152,7 +156,7 @@ def _asked(
         for factor in counts
         for name, spectrum in spectra.items()
     ]
-    return Setting(true_hold, base_dt), rows
+    return Sampling(true_hold, base_dt, 1), rows
 
 
 def hold_label(hold: Hold | str | None) -> str:
@@ -177,13 +181,13 @@ def _chunks(rows: Sequence[Row], size: int) -> list[list[int]]:
 Job = tuple[int, GreyBox, list[Row]]
 
 
-def _work(job: Job, setting: Setting) -> tuple[int, list[Answer]]:
+def _work(job: Job, shared: Conditions) -> tuple[int, list[Answer]]:
     number, model, rows = job
-    return number, answer_chunk(model, rows, setting)
+    return number, answer_chunk(model, rows, shared)
 
 
 def _run(
-    jobs: Sequence[Job], setting: Setting, n_jobs: int | None
+    jobs: Sequence[Job], shared: Conditions, n_jobs: int | None
 ) -> Iterator[tuple[int, list[Answer]]]:
     """Answers of the chunks in the order in which they are finished."""
     try:
@@ -193,10 +197,10 @@ def _run(
             raise InputError(
                 f"n_jobs={n_jobs} needs joblib; pip install 'freqid[parallel]'"
             ) from None
-        yield from (_work(job, setting) for job in jobs)
+        yield from (_work(job, shared) for job in jobs)
         return
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")
-    yield from parallel(joblib.delayed(_work)(job, setting) for job in jobs)
+    yield from parallel(joblib.delayed(_work)(job, shared) for job in jobs)
 
 
 def _table(
@@ -233,20 +237,21 @@ def _table(
 
 
 def _identity(
-    plants: Mapping[str, GreyBox], rows: Sequence[Row], setting: Setting, chunk: int
+    plants: Mapping[str, GreyBox], rows: Sequence[Row], shared: Conditions, chunk: int
 ) -> str:
     """A fingerprint of what is asked: plants by matrices and slopes, spectra by their values."""
-    seen = hashlib.sha256()
+    seen, s = hashlib.sha256(), shared.sampling
+    base_dt = s.base_dt
     for name, model in plants.items():
         free = [(p.name, p.lower, p.upper) for p in model.free_parameters]
         seen.update(repr((name, free)).encode())
         lin = model.linearise(model.values, [p.name for p in model.free_parameters])
         for matrix in (*lin.at, *lin.derivative):
             seen.update(np.ascontiguousarray(matrix).tobytes())
-    f = np.linspace(0, 0.5 / setting.base_dt, 97)
+    f = np.linspace(0, 0.5 / base_dt, 97)
     for spectrum in {r.spectrum_label: r.spectrum for r in rows}.values():
         try:
-            dt = setting.base_dt
+            dt = base_dt
             for array in (spectrum.density(f, dt), spectrum.edges(dt), *spectrum.lines(dt)):
                 seen.update(np.ascontiguousarray(array).tobytes())
         except InputError as error:
@@ -255,9 +260,8 @@ def _identity(
         labels = (row.plant_label, row.spectrum_label, row.hold_label, row.factor)
         seen.update(repr(labels).encode())
     for factor in sorted({row.factor for row in rows}):
-        dt = setting.base_dt * factor
-        weight = weight_of(f / factor, dt, setting.prefilter, setting.noise_model)
+        dt = base_dt * factor
+        weight = weight_of(f / factor, dt, shared.prefilter, shared.noise_model)
         seen.update(weight.tobytes())
-    shared = (setting.true_hold, setting.base_dt, setting.band, setting.antialias, chunk)
-    seen.update(repr(shared).encode())
+    seen.update(repr((s.hold, base_dt, shared.band, s.antialias, chunk)).encode())
     return seen.hexdigest()
