@@ -14,14 +14,14 @@ refined by a few Sanathanan-Koerner and then Gauss-Newton steps in orthonormal p
 import numpy as np
 import scipy.interpolate
 import scipy.linalg
-from freqid.fitting.cost.minimum import Objective
-from freqid.fitting.preparation import Options
 
 import freqid as fq
 from freqid.fitting.black_box.output_error import _descend, lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.subspace import identify, inputs_of
 from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.reading import Reading
 from freqid.lti.state_space import StateSpace
 
 
@@ -103,13 +103,14 @@ def orthogonal(w, weight, degree):
 
 
 def sanathanan_koerner(experiment, order, feedthrough):
-    w, U, Y = experiment.z, experiment.U[0, 0], experiment.Y[0, 0]
+    lines = experiment.lines
+    w, U, Y = experiment.points.z, lines.U[0, 0], lines.Y[0, 0]
     previous = np.ones(len(w), complex)
     for _ in range(20):
         weight = np.abs(U) / np.abs(previous)
         Q, H = orthogonal(w, weight, order)
         top = order + 1
-        free = Q * experiment.line_scale[:, None]
+        free = Q * lines.scale[0, 0][:, None]
         columns = np.hstack([Q[:, :top] * U[:, None], free[:, :top], -Q[:, :order] * Y[:, None]])
         columns, right = columns / previous[:, None], Y * Q[:, order] / previous
         stacked = np.concatenate([columns.real, columns.imag])
@@ -123,7 +124,7 @@ def sanathanan_koerner(experiment, order, feedthrough):
 
 
 def aaa(experiment, order, feedthrough):
-    w, G = experiment.z, experiment.Y[0, 0] / experiment.U[0, 0]
+    w, G = experiment.points.z, experiment.lines.Y[0, 0] / experiment.lines.U[0, 0]
     # both halves of the circle, so that the poles come in pairs
     r = scipy.interpolate.AAA(
         np.concatenate([w, w.conj()]), np.concatenate([G, G.conj()]), max_terms=order + 1,
@@ -147,13 +148,13 @@ METHODS = {
 
 
 def compare(record, order, hold, band):
-    options = Options(hold, band)
-    (experiment,), _, plane = lines_in_plane([record], (1, 1), [None], options)
+    reading = Reading.of(record, hold, band)
+    (experiment,), plane = lines_in_plane([reading])
     found = {}
     for name, method in METHODS.items():
         try:
             first: StateSpace = method(experiment, order, False)
-            chart = Chart(first, False, plane)
+            chart = Chart(first, False, plane, reading.sample_time)
             at = Objective(chart, [experiment]).point(np.zeros(chart.size))
             _, solution, objective = _descend(chart, [experiment])
             found[name] = at.cost, solution.point.cost, objective.n_evaluations

@@ -57,16 +57,16 @@ def coverage(count):
 
 def bound(clean, kind, std):
     """(Jᵀ S⁻¹ J)⁻¹ at the true parameters with the true spectrum of the noise."""
-    from freqid.fitting.cost.minimum import Objective
-    from freqid.fitting.preparation import Options, prepare
-
+    from freqid.fitting.cost.objective import Objective
     from freqid.fitting.cost.structures import GreyStructure
+    from freqid.fitting.noise_models import GivenWeights
+    from freqid.fitting.reading import Reading
 
     f = np.arange(100, 801) / 10
     power = np.full(701, std**2)
     if kind == "coloured":
         power = power * np.abs(0.3 / (1 - 0.95 * np.exp(-2j * np.pi * f * clean.dt))) ** 2
-    experiment, _ = prepare(clean, (1, 1), 1 / power, Options(band=BAND))
+    experiment = Reading.of(clean, band=BAND, noise=GivenWeights(1 / power)).lines()
     structure = GreyStructure(PLANT)
     point = Objective(structure, [experiment]).point(structure.start)
     J = point.jacobian / structure.scale

@@ -100,6 +100,7 @@ def simulate(
         u: input samples, (N,) or (N, inputs), ``dt`` seconds apart.
         hold: what the input does between its samples: None or ``"zoh"``, ``"foh"``, ``"bl"``
             (then the response is the periodic one, the input repeating for ever).
+        input_names, output_names: of the channels, ``u`` and ``y`` where not given.
         initial_state: state of the plant at the first sample, (n,); None starts from rest.
 
     Returns a Record with that hold. Raises ValueError for wrong shapes or a hold whose period is

@@ -28,8 +28,8 @@ def hold_bias(
 ) -> pd.DataFrame:
     """The bias bar: what the assumed hold has added to each parameter, to modes of a black box.
 
-    The same model is fitted with the hold that the records remember, ``band`` and ``weights`` being
-    those of the estimate; ``bias`` is the estimate less that, to be drawn beside ``std``, the error
+    The model of ``est`` is fitted to the same ``data`` with the hold that the records remember,
+    ``band`` and ``weights`` being those of the estimate; ``bias`` is the estimate less that, to be drawn beside ``std``, the error
     bar of the noise. Columns estimate, remembered, bias and std; the ratio of bias to std says
     which of the two rules. Coefficients of a black box mean another thing under another hold, so
     that there the rows are frequency (Hz) and damping of its modes in turn.
@@ -70,7 +70,7 @@ def _mode_values(est: Estimate) -> pd.DataFrame:
 
 
 def cross_validate(model: object, records: Sequence[Record], **options: Any) -> pd.DataFrame:
-    """Fit to all repeats but one, and compare with that one, each in turn.
+    """Fit a model to all repeats but one, and compare with that one, each in turn.
 
     ``options`` go to ``fit``. Returns a DataFrame with one row a repeat: ``held_out``, the fit in
     per cent of each output, and the parameters. Raises ValueError for fewer than two records.
@@ -94,7 +94,8 @@ def bootstrap(
 ) -> pd.DataFrame:
     """Estimates from repeats drawn again with replacement: their scatter without a noise model.
 
-    ``options`` go to ``fit``; each resample starts from the estimate of all repeats. Returns a
+    ``options`` go to ``fit``; ``seed`` is that of the ``n`` resamples, each of which starts from
+    the estimate of all repeats. Returns a
     DataFrame (n, parameters) whose ``describe`` and ``quantile`` give error bars. Raises ValueError
     for fewer than three records.
 

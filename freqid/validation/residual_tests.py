@@ -131,7 +131,7 @@ def _correlation(a: FloatArray, b: FloatArray, lags: int) -> FloatArray:
 
 
 def cost_test(est: Estimate) -> dict[str, float]:
-    """Cost of a fit with known noise (weights 1/variance) against what the noise explains.
+    """Cost of ``est``, a fit with known noise (weights 1/variance), against what that explains.
 
     2·V is then chi-square with as many degrees of freedom as real values less parameters (Pintelon
     and Schoukens, 2012, section 11.4.3). Returns cost, expected, ratio and p_value: a small p says

@@ -7,10 +7,10 @@ import importlib
 import pkgutil
 
 from freqid.lti.holds.band_limited import BandLimited
-from freqid.lti.holds.first_order import FirstOrderHold
+from freqid.lti.holds.first_order_hold import FirstOrderHold
 from freqid.lti.holds.hold import Hold, ModalSampled, PeriodicHold, Sampled, as_hold
 from freqid.lti.holds.phi import phi_functions
-from freqid.lti.holds.zero_order import ZeroOrderHold
+from freqid.lti.holds.zero_order_hold import ZeroOrderHold
 
 # every file here is read, so that a new hold needs no line elsewhere to be known by its name
 for _file in pkgutil.iter_modules(__path__):
