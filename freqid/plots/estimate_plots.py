@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +12,16 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.fitting.estimate import Estimate
 from freqid.plots.bode_nyquist import bode
-from freqid.plots.style import COLOURS, context, line
+from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
+from freqid.plots.style import COLOURS, Panels, context, line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# squared radius of a 95 % ellipse of two normal variables
-_CHI2 = 5.991464547107979
 
-
-def plot_response(*responses: Any, labels: Sequence[str] | None = None, unit: str = "Hz") -> Any:
+def plot_response(
+    *responses: Drawable, labels: Sequence[str] | None = None, unit: str = "Hz"
+) -> Panels:
     """Bode with its bands, and under it the coherence and the input's spectrum, where known.
 
     Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them.
@@ -29,33 +29,26 @@ def plot_response(*responses: Any, labels: Sequence[str] | None = None, unit: st
     """
     import matplotlib.pyplot as plt
 
-    measured = [r for r in responses if isinstance(r, FrequencyResponse)]
-    coherent = [r for r in measured if r.coherence is not None]
-    driven = [r for r in measured if r.input_spectrum is not None]
-    rows = 2 + bool(coherent) + bool(driven)
-    scale = 1.0 if unit == "Hz" else 2 * np.pi
+    measured = [(i, r) for i, r in enumerate(responses) if isinstance(r, FrequencyResponse)]
+    coherent = [(i, r, r.coherence[0, 0]) for i, r in measured if r.coherence is not None]
+    driven = [(i, r, r.input_spectrum[0]) for i, r in measured if r.input_spectrum is not None]
+    below = []
+    if coherent:
+        below.append((coherent, {"ylabel": "coherence", "ylim": (0, 1.05)}))
+    if driven:
+        below.append((driven, {"ylabel": "input |U|²", "yscale": "log"}))
     with context():
-        heights = [2.2, 1.6, *[0.9] * (rows - 2)]
+        heights = [2.2, 1.6, *[0.9] * len(below)]
         _, axes = plt.subplots(
-            rows, 1, sharex=True, figsize=(6.4, 1.2 * sum(heights)), height_ratios=heights
+            len(heights), 1, sharex=True, figsize=(6.4, 1.2 * sum(heights)), height_ratios=heights
         )
         bode(*responses, labels=labels, ax=axes[:2], unit=unit)
-        place = 2
-        for group, name, limits in ((coherent, "coherence", (0, 1.05)), (driven, "input", None)):
-            if not group:
-                continue
-            axis = axes[place]
-            place += 1
-            for r in group:
-                style = line(list(responses).index(r))
-                values = r.coherence[0, 0] if name == "coherence" else r.input_spectrum[0]  # type: ignore[index]
-                axis.plot(r.frequency * scale, values, **style)
-            axis.set_ylabel(name if limits else "input |U|²")
-            axis.set_yscale("linear" if limits else "log")
-            if limits:
-                axis.set_ylim(*limits)
+        for axis, (group, looks) in zip(axes[2:], below, strict=True):
+            for index, r, values in group:
+                axis.plot(r.frequency * UNITS[unit], values, **line(index))
+            axis.set(**looks)
         axes[1].set_xlabel("")
-        axes[-1].set_xlabel(f"frequency / {'Hz' if unit == 'Hz' else '(rad/s)'}")
+        axes[-1].set_xlabel(frequency_label(unit))
     return axes
 
 
@@ -87,7 +80,7 @@ def plot_poles(
                 if not np.isfinite(covariance).all():
                     continue
                 sizes, axes = np.linalg.eigh(covariance)
-                width, height = 2 * np.sqrt(_CHI2 * np.maximum(sizes[::-1], 0))
+                width, height = 2 * np.sqrt(CHI2 * np.maximum(sizes[::-1], 0))
                 angle = np.rad2deg(np.arctan2(axes[1, 1], axes[0, 1]))
                 shape = Ellipse((pole.real, pole.imag), width, height, angle=angle)
                 shape.set(facecolor=colour, alpha=0.25, linewidth=0)

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# several axes of one figure
+Panels: TypeAlias = "Sequence[Axes] | npt.NDArray[np.object_]"
+Dash: TypeAlias = str | tuple[int, tuple[int, ...]]
+
+
+class Style(TypedDict, total=False):
+    """The look of a line, in matplotlib's words; any other of them may stand there too."""
+
+    color: str
+    linestyle: Dash
+    linewidth: float
+    alpha: float
+
 
 # colours of Okabe and Ito (2008), told apart by colour-blind readers; lines differ in dash too
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-DASHES: list[Any] = [
+DASHES: list[Dash] = [
     "-",
     "--",
     "-.",
@@ -17,7 +38,7 @@ DASHES: list[Any] = [
     (0, (3, 1)),
 ]
 
-SETTINGS: dict[str, Any] = {
+SETTINGS: dict[str, object] = {
     "figure.figsize": (6.4, 4.8),
     "figure.dpi": 100,
     "savefig.dpi": 200,
@@ -43,6 +64,6 @@ def context() -> AbstractContextManager[None]:
     return matplotlib.rc_context(SETTINGS)
 
 
-def line(index: int) -> dict[str, Any]:
+def line(index: int) -> Style:
     """Colour and dash of the index-th curve of a figure."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
