@@ -77,7 +77,7 @@ def shown(
         at = at[at > 0]
     else:
         at = np.asarray(omega, dtype=float)
-    names = labels or [None] * len(things)
+    names: Sequence[str | None] = labels or [None] * len(things)
     looks = [line(i) if styles is None else styles[i] for i in range(len(things))]
     each = zip(things, names, looks, strict=True)
     return [Shown(response_of(thing, at), name, look) for thing, name, look in each]
@@ -108,6 +108,12 @@ def response_of(thing: Drawable, omega: FloatArray) -> FrequencyResponse:
 
 def _below(omega: FloatArray, dt: float) -> FloatArray:
     return omega[omega <= np.pi / dt * (1 + 1e-9)] if dt else omega
+
+
+def resonances(plant: Model) -> FloatArray:
+    """Natural frequencies (Hz) of a plant's complex pole pairs, near which curves bend."""
+    poles = plant.poles
+    return np.abs(poles[poles.imag > 0]) / (2 * np.pi)
 
 
 def bode_curve(
