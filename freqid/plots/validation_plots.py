@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.plots.style import COLOURS, context, line
+from freqid.plots.style import COLOURS, Panels, context, line
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from freqid.validation.comparison import Comparison
 
 
-def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
+def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
     """Measured and simulated above their difference, two axes for each output. Returns the axes."""
     import matplotlib.pyplot as plt
 
@@ -26,11 +26,11 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
     time = record.time[: len(simulated)]
     with context():
         if ax is None:
-            _, ax = plt.subplots(
+            _, axes = plt.subplots(
                 2 * count, 1, sharex=True, figsize=(7.2, 4.2 * count), squeeze=False,
                 height_ratios=[2.5, 1] * count,
             )  # fmt: skip
-            ax = ax[:, 0]
+            ax = axes[:, 0]
         for o, name in enumerate(record.output_names):
             unit = (record.units or {}).get(name, "")
             label = f"{name} / {unit}" if unit else name
@@ -46,7 +46,7 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
     return ax
 
 
-def plot_residuals(table: pd.DataFrame, ax: Any = None) -> Any:
+def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     """Correlations of ``residual_test`` with their 99 % limits; returns one axes a test."""
     import matplotlib.pyplot as plt
 
@@ -54,8 +54,8 @@ def plot_residuals(table: pd.DataFrame, ax: Any = None) -> Any:
     with context():
         if ax is None:
             size = (7.2, 1.2 + 1.7 * len(curves))
-            _, ax = plt.subplots(len(curves), 1, figsize=size, squeeze=False)
-            ax = ax[:, 0]
+            _, axes = plt.subplots(len(curves), 1, figsize=size, squeeze=False)
+            ax = axes[:, 0]
         for axis, curve in zip(ax, curves, strict=True):
             values = np.asarray(curve["values"])
             white = curve["test"] == "whiteness"
@@ -83,7 +83,7 @@ def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
         if ax is None:
             _, ax = plt.subplots()
         n = np.exp((table["mdl"] - table["aic"]) / table["parameters"] + 2).iloc[0]
-        curves: dict[str, Any] = {
+        curves = {
             "AIC": table["aic"],
             "MDL": table["mdl"],
             "cross-validation": n * np.log(table["cross_validation"]),
