@@ -18,7 +18,7 @@ from freqid.models.model import Model
 from freqid.plots.bode_nyquist import bode, nyquist
 from freqid.plots.curves import resonances
 from freqid.plots.heat_maps import heat_map
-from freqid.plots.style import COLOURS, Panels, context, line
+from freqid.plots.style import COLOURS, Panels, context, line, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,10 +29,7 @@ _SMALL = 1e-3
 
 
 def plot_bias_map(
-    table: pd.DataFrame,
-    parameter: str,
-    ax: Panels | None = None,
-    mark: Sequence[str] | None = None,
+    table: pd.DataFrame, parameter: str, ax: Panels | None = None, mark: Sequence[str] | None = None
 ) -> Panels:
     """Heat map of one parameter's relative bias: spectrum across, factor up, one panel a hold.
 
@@ -112,8 +109,6 @@ def plot_bias_curves(
     where not given. One panel a parameter, one curve a hold. Returns the axes. Raises ValueError
     for an unknown factor or parameter.
     """
-    import matplotlib.pyplot as plt
-
     known = list(dict.fromkeys(table["parameter"]))
     wanted = list(parameters or known)
     chosen = int(table["factor"].max()) if factor is None else factor
@@ -123,11 +118,8 @@ def plot_bias_curves(
     upper = table.attrs.get("upper_frequency", {})
     numeric = all(n in upper for n in names)
     x = np.array([upper[n] for n in names]) if numeric else np.arange(len(names))
-    with context():
-        figure, axes = plt.subplots(
-            len(wanted), 1, sharex=True, figsize=(6.4, 1.2 + 1.3 * len(wanted)), squeeze=False
-        )
-        for axis, parameter in zip(axes[:, 0], wanted, strict=True):
+    with stacked(None, len(wanted), (6.4, 1.2 + 1.3 * len(wanted))) as axes:
+        for axis, parameter in zip(axes, wanted, strict=True):
             rows = _of_parameter(table, parameter)
             rows = rows[rows["factor"] == chosen]
             axis.axhline(1, color="#999999", linewidth=0.8)
@@ -139,12 +131,12 @@ def plot_bias_curves(
             if reach > 3:
                 axis.set_yscale("symlog", linthresh=2)
             axis.set_ylabel(f"{parameter} / true")
-        axes[-1, 0].set_xlabel(title)
+        axes[-1].set_xlabel(title)
         if not numeric:
-            axes[-1, 0].set_xticks(x, labels, rotation=90)
-        axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1.0))
-        figure.align_ylabels()
-    return axes[:, 0]
+            axes[-1].set_xticks(x, labels, rotation=90)
+        axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1.0))
+        axes[0].figure.align_ylabels()
+    return axes
 
 
 def plot_bias(

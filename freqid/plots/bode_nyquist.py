@@ -12,7 +12,7 @@ from freqid.checks import FloatArray, InputError, choice
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.plots.curves import CHI2, UNITS, BodeCurve, Drawable, bode_curve, frequency_label, shown
-from freqid.plots.style import Panels, Style, context, line
+from freqid.plots.style import Panels, Style, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,13 +47,9 @@ def bode(
     >>> len(axes)
     2
     """
-    import matplotlib.pyplot as plt
-
     choice("unit", unit, list(UNITS))
     curves = shown(responses, labels, omega, styles)
-    with context():
-        if ax is None:
-            _, ax = plt.subplots(2, 1, sharex=True)
+    with stacked(ax, 2) as ax:
         amplitude, phase = ax
         for one in curves:
             for pair in np.ndindex(one.response.response.shape[:2]):
@@ -100,13 +96,11 @@ def nyquist(
     >>> import freqid as fq
     >>> ax = fq.nyquist(fq.first_order())
     """
-    import matplotlib.pyplot as plt
+    from matplotlib.patches import Circle
 
     choice("unit", unit, list(UNITS))
     curves = shown(responses, labels, omega, styles)
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         for index, (frf, label, style) in enumerate(curves):
             colour = style.get("color")
             for pair in np.ndindex(frf.response.shape[:2]):
@@ -122,7 +116,7 @@ def nyquist(
                     if frf.variance is not None:
                         # the disc that holds 95 %: radius² = χ²₂ variance/2
                         radius = np.sqrt(CHI2 * np.interp(f, frf.frequency, frf.variance[pair]) / 2)
-                        disc = plt.Circle(point, radius, linewidth=0, alpha=0.2, color=colour)
+                        disc = Circle(point, radius, linewidth=0, alpha=0.2, color=colour)
                         ax.add_patch(disc)
                     # each curve's labels stand off in a direction of their own
                     ax.annotate(
@@ -143,11 +137,7 @@ def plot_record(record: Record, ax: Panels | None = None) -> Panels:
     >>> import freqid as fq
     >>> axes = fq.plot_record(fq.Record([0.0, 1.0], [0.0, 0.5], dt=0.1))
     """
-    import matplotlib.pyplot as plt
-
-    with context():
-        if ax is None:
-            _, ax = plt.subplots(2, 1, sharex=True)
+    with stacked(ax, 2) as ax:
         steps = "steps-post" if record.hold.constant else "default"
         for axis, what, names, time, signals, drawn in (
             (ax[0], "input", record.input_names, record.input_time, record.inputs, steps),
@@ -166,14 +156,10 @@ def plot_record(record: Record, ax: Panels | None = None) -> Panels:
 
 def plot_coherence(frf: FrequencyResponse, ax: Axes | None = None, unit: str = "Hz") -> Axes:
     """Coherence of a measured response against frequency; ValueError where it has none."""
-    import matplotlib.pyplot as plt
-
     choice("unit", unit, list(UNITS))
     if frf.coherence is None:
         raise InputError("frf has no coherence; an average over segments or repeats has one")
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         for index, pair in enumerate(np.ndindex(frf.response.shape[:2])):
             name = f"{(frf.input_names or 'u')[pair[1]]} to {(frf.output_names or 'y')[pair[0]]}"
             ax.plot(frf.frequency * UNITS[unit], frf.coherence[pair], label=name, **line(index))

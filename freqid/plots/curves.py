@@ -140,10 +140,7 @@ def bode_curve(
 
 
 def _next_to(
-    beside: FrequencyResponse | None,
-    frf: FrequencyResponse,
-    pair: tuple[int, ...],
-    scattered: bool,
+    beside: FrequencyResponse | None, frf: FrequencyResponse, pair: tuple[int, ...], scattered: bool
 ) -> FloatArray:
     f, phase = frf.frequency, frf.phase[pair]
     away, both = phase, np.ones(len(f), dtype=bool)

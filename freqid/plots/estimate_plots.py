@@ -13,7 +13,7 @@ from freqid.data.record import Record
 from freqid.fitting.estimate import Estimate
 from freqid.plots.bode_nyquist import bode
 from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
-from freqid.plots.style import COLOURS, Panels, context, line
+from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,8 +27,6 @@ def plot_response(
     Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them.
     Returns the axes: amplitude, phase, then coherence and spectrum as far as there are any.
     """
-    import matplotlib.pyplot as plt
-
     measured = [(i, r) for i, r in enumerate(responses) if isinstance(r, FrequencyResponse)]
     coherent = [(i, r, r.coherence[0, 0]) for i, r in measured if r.coherence is not None]
     driven = [(i, r, r.input_spectrum[0]) for i, r in measured if r.input_spectrum is not None]
@@ -37,11 +35,8 @@ def plot_response(
         below.append((coherent, {"ylabel": "coherence", "ylim": (0, 1.05)}))
     if driven:
         below.append((driven, {"ylabel": "input |U|²", "yscale": "log"}))
-    with context():
-        heights = [2.2, 1.6, *[0.9] * len(below)]
-        _, axes = plt.subplots(
-            len(heights), 1, sharex=True, figsize=(6.4, 1.2 * sum(heights)), height_ratios=heights
-        )
+    heights = [2.2, 1.6, *[0.9] * len(below)]
+    with stacked(None, len(heights), (6.4, 1.2 * sum(heights)), heights) as axes:
         bode(*responses, labels=labels, ax=axes[:2], unit=unit)
         for axis, (group, looks) in zip(axes[2:], below, strict=True):
             for index, r, values in group:
@@ -63,14 +58,11 @@ def plot_poles(
     >>> record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 5, 1e-3), 1e-3).with_noise(0.1)
     >>> ax = plot_poles(fq.fit(fq.two_mass(), record, band=(10, 80)))
     """
-    import matplotlib.pyplot as plt
     from matplotlib.patches import Ellipse
 
     if labels is not None and len(labels) != len(estimates):
         raise InputError(f"labels has {len(labels)} entries for {len(estimates)} estimates")
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         for index, est in enumerate(estimates):
             colour = COLOURS[index % len(COLOURS)]
             poles, scatter = est.pole_scatter()
@@ -94,16 +86,12 @@ def plot_poles(
 
 def plot_parameters(est: Estimate, ax: Axes | None = None) -> Axes:
     """The parameters as a table in a figure: value, standard error, interval, unit."""
-    import matplotlib.pyplot as plt
-
     table = est.parameters
     rows = [
         [f"{p['value']:.5g}", f"{p['std']:.2g}", f"{p['lower']:.5g} to {p['upper']:.5g}", p["unit"]]
         for _, p in table.iterrows()
     ]
-    with context():
-        if ax is None:
-            _, ax = plt.subplots(figsize=(6.4, 0.5 + 0.32 * (len(rows) + 1)))
+    with drawing(ax, (6.4, 0.5 + 0.32 * (len(rows) + 1))) as ax:
         ax.axis("off")
         drawn = ax.table(
             rows,
@@ -128,7 +116,6 @@ def plot_spectrogram(
     ``segment`` is the length of the pieces in samples, by default a fiftieth of the record. Raises
     ValueError for an unknown channel.
     """
-    import matplotlib.pyplot as plt
     import scipy.signal
 
     name = record.output_names[0] if channel is None else channel
@@ -141,9 +128,7 @@ def plot_spectrogram(
     length = max(len(x) // 50, 16) if segment is None else segment
     f, t, power = scipy.signal.spectrogram(x, 1 / dt, nperseg=length, noverlap=length // 2)
     level = 10 * np.log10(np.maximum(power, power.max() * 1e-12))
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         image = ax.pcolormesh(t, f, level, vmin=level.max() - 80, shading="auto", cmap="viridis")
         ax.figure.colorbar(image, ax=ax, label=f"power of {name} / dB")
         ax.set(xlabel="time / s", ylabel="frequency / Hz")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, TypeAlias, TypedDict
 
 import numpy as np
@@ -62,6 +62,34 @@ def context() -> AbstractContextManager[None]:
     import matplotlib
 
     return matplotlib.rc_context(SETTINGS)
+
+
+@contextmanager
+def drawing(ax: Axes | None, size: tuple[float, float] | None = None) -> Iterator[Axes]:
+    """The settings, and axes to draw on: new ones of a ``size`` (inches) where not given."""
+    import matplotlib.pyplot as plt
+
+    with context():
+        yield plt.subplots(figsize=size)[1] if ax is None else ax
+
+
+@contextmanager
+def stacked(
+    ax: Panels | None,
+    rows: int,
+    size: tuple[float, float] | None = None,
+    heights: Sequence[float] | None = None,
+    sharex: bool = True,
+) -> Iterator[Panels]:
+    """The settings, and axes above each other: new ones, of such heights, where not given."""
+    import matplotlib.pyplot as plt
+
+    with context():
+        if ax is None:
+            ax = plt.subplots(
+                rows, 1, sharex=sharex, figsize=size, height_ratios=heights, squeeze=False
+            )[1][:, 0]
+        yield ax
 
 
 def line(index: int) -> Style:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.plots.style import COLOURS, Panels, context, line
+from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,20 +17,12 @@ if TYPE_CHECKING:
 
 def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
     """Measured and simulated above their difference, two axes for each output. Returns the axes."""
-    import matplotlib.pyplot as plt
-
     record = comparison.record
     count = record.n_outputs
     simulated = comparison.simulated.reshape(len(comparison.simulated), -1)
     residuals = comparison.residuals.reshape(simulated.shape)
     time = record.time[: len(simulated)]
-    with context():
-        if ax is None:
-            _, axes = plt.subplots(
-                2 * count, 1, sharex=True, figsize=(7.2, 4.2 * count), squeeze=False,
-                height_ratios=[2.5, 1] * count,
-            )  # fmt: skip
-            ax = axes[:, 0]
+    with stacked(ax, 2 * count, (7.2, 4.2 * count), [2.5, 1] * count) as ax:
         for o, name in enumerate(record.output_names):
             unit = (record.units or {}).get(name, "")
             label = f"{name} / {unit}" if unit else name
@@ -48,14 +40,8 @@ def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
 
 def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     """Correlations of ``residual_test`` with their 99 % limits; returns one axes a test."""
-    import matplotlib.pyplot as plt
-
     curves = table.attrs["correlations"]
-    with context():
-        if ax is None:
-            size = (7.2, 1.2 + 1.7 * len(curves))
-            _, axes = plt.subplots(len(curves), 1, figsize=size, squeeze=False)
-            ax = axes[:, 0]
+    with stacked(ax, len(curves), (7.2, 1.2 + 1.7 * len(curves)), sharex=False) as ax:
         for axis, curve in zip(ax, curves, strict=True):
             values = np.asarray(curve["values"])
             white = curve["test"] == "whiteness"
@@ -77,11 +63,7 @@ def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
 
     Takes the table of ``select_order`` and returns the axes.
     """
-    import matplotlib.pyplot as plt
-
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         n = np.exp((table["mdl"] - table["aic"]) / table["parameters"] + 2).iloc[0]
         curves = {
             "AIC": table["aic"],
