@@ -1,10 +1,10 @@
-"""What the commands share: progress, holds as text, folders, files, JSON and tables."""
+"""What the commands share on the screen and on the disk: progress, folders, files and tables."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -12,7 +12,10 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from freqid.checks import InputError
 from freqid.data.files import whole_file
-from freqid.lti.holds import Hold
+from freqid.plots.style import Panels
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 notes = Console(stderr=True)
 
@@ -29,19 +32,6 @@ def progress() -> Progress:
     )
 
 
-def hold_of(text: str | None) -> Any:
-    """The hold that ``--hold`` names; a name alone is left to the record."""
-    if text is None or ":" not in text:
-        return text
-    kind, _, period = text.partition(":")
-    try:
-        return Hold.named[kind].at(float(period))
-    except (KeyError, ValueError):
-        raise InputError(
-            f"--hold {text} is not a hold; expected zoh, foh, bl, zoh:PERIOD or foh:PERIOD (s)"
-        ) from None
-
-
 def folder(out: Path) -> None:
     """Make the folder; ValueError where a file stands."""
     if out.exists() and not out.is_dir():
@@ -49,24 +39,37 @@ def folder(out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
 
 
-def write(path: Path, save: Callable[[Path], Any]) -> None:
-    """Save beside the path and rename into place."""
+def write_table(path: Path, frame: pd.DataFrame) -> None:
+    """Write a CSV file, whole or not at all."""
     with whole_file(path) as beside:
-        save(beside)
+        frame.to_csv(beside, index=False)
 
 
-def plain(value: Any) -> Any:
+def write_picture(path: Path, axes: Panels) -> None:
+    """Write the figure to which axes belong, whole or not at all."""
+    with whole_file(path) as beside:
+        axes[0].figure.savefig(beside)  # type: ignore[union-attr]
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write a JSON file, whole or not at all."""
+    text = json.dumps(_plain(content), indent=2, allow_nan=False)
+    with whole_file(path) as beside:
+        beside.write_text(text + "\n")
+
+
+def _plain(value: object) -> object:
     """JSON has neither infinity nor NaN: null stands for both."""
     if isinstance(value, dict):
-        return {k: plain(v) for k, v in value.items()}
+        return {k: _plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
+        return [_plain(v) for v in value]
     if isinstance(value, (float, np.floating)):
         return float(value) if np.isfinite(value) else None
     return value
 
 
-def show(title: str, frame: Any) -> None:
+def show(title: str, frame: pd.DataFrame) -> None:
     """A table whose columns are as wide as they need, for screens, pipes and papers alike."""
     shown = frame.map(lambda v: f"{v:.5g}" if isinstance(v, float) else str(v))
     print(f"{title}\n{shown.replace('nan', '').to_string(index=False)}\n")

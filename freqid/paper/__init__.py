@@ -1,12 +1,13 @@
 """The reproduction of "On identification of a flexible mechanical system using decimated data".
 
 IFAC, 2005: ``figures``, ``table2`` and ``equations``, each with the paper's numbers beside ours.
+It may import all packages but ``pages`` and ``cli``.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from freqid.paper.drawings import draw, save_all
 from freqid.paper.study import (
@@ -20,6 +21,9 @@ from freqid.paper.study import (
     study_records,
     table2,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "NOTES",
@@ -36,7 +40,7 @@ __all__ = [
 ]
 
 
-def figure(number: int) -> Any:
+def figure(number: int) -> Figure:
     """Figure 1 to 10 of the paper as a matplotlib Figure; ValueError for another number.
 
     >>> len(figure(1).axes)

@@ -9,11 +9,16 @@ import numpy as np
 
 from freqid.bias.apparent import apparent_response
 from freqid.bias.asymptotic import asymptotic_fit
-from freqid.checks import FloatArray, InputError, unknown
+from freqid.checks import InputError, unknown
+from freqid.data.frequency_response import FrequencyResponse
 from freqid.excitation.input_spectra import InputSpectrum
+from freqid.fitting.estimate import Estimate
 from freqid.lti.holds import Hold, PeriodicHold, as_hold
+from freqid.models.model import Model
 from freqid.plots.bode_nyquist import bode, nyquist
-from freqid.plots.style import COLOURS, context, line
+from freqid.plots.curves import resonances
+from freqid.plots.heat_maps import heat_map
+from freqid.plots.style import COLOURS, Panels, context, line, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,7 +28,9 @@ if TYPE_CHECKING:
 _SMALL = 1e-3
 
 
-def plot_bias_map(table: pd.DataFrame, parameter: str, ax: Any = None, mark: Any = None) -> Any:
+def plot_bias_map(
+    table: pd.DataFrame, parameter: str, ax: Panels | None = None, mark: Sequence[str] | None = None
+) -> Panels:
     """Heat map of one parameter's relative bias: spectrum across, factor up, one panel a hold.
 
     Args:
@@ -49,8 +56,8 @@ def plot_bias_map(table: pd.DataFrame, parameter: str, ax: Any = None, mark: Any
         if ax is None:
             width = max(3.2, 1.4 + 0.42 * len(names))
             size = (width * len(holds), 1.6 + 0.45 * len(factors))
-            _, ax = plt.subplots(1, len(holds), sharey=True, figsize=size, squeeze=False)
-            ax = ax[0]
+            _, axes = plt.subplots(1, len(holds), sharey=True, figsize=size, squeeze=False)
+            ax = axes[0]
         for axis, hold in zip(ax, holds, strict=True):
             part = rows[rows["hold"] == hold]
             bias = part.pivot(index="factor", columns="spectrum", values="relative_bias")
@@ -58,15 +65,12 @@ def plot_bias_map(table: pd.DataFrame, parameter: str, ax: Any = None, mark: Any
             bias, good = (x.reindex(index=factors, columns=names) for x in (bias, good))
             values = bias.to_numpy(dtype=float)
             values = np.where(good.to_numpy(dtype=bool), values, np.nan)
-            axis.set_facecolor("#bbbbbb")
-            image = axis.pcolormesh(
-                np.ma.masked_invalid(values), norm=norm, cmap="RdBu_r", edgecolors="white",
-                linewidth=0.5,
+            image = heat_map(
+                axis, values, norm, "RdBu_r", labels, [str(f) for f in factors],
+                text=_percent if len(names) <= 24 else _missing,
+                # the ends of the scale are dark
+                dark=lambda part: abs(part - 0.5) > 0.32,
             )  # fmt: skip
-            _write_cells(axis, values, norm)
-            axis.grid(False)
-            axis.set_xticks(np.arange(len(names)) + 0.5, labels, rotation=90)
-            axis.set_yticks(np.arange(len(factors)) + 0.5, [str(f) for f in factors])
             axis.set(xlabel=title, title=hold_title(hold))
             for name in mark or ():
                 if name in names:
@@ -84,30 +88,27 @@ def plot_bias_map(table: pd.DataFrame, parameter: str, ax: Any = None, mark: Any
     return ax
 
 
-def _write_cells(axis: Axes, values: FloatArray, norm: Any) -> None:
-    for (row, column), value in np.ndenumerate(values):
-        where = (column + 0.5, row + 0.5)
-        if not np.isfinite(value):
-            axis.text(*where, "×", ha="center", va="center")
-        elif values.shape[1] <= 24:
-            # the ends of the scale are dark
-            colour = "white" if abs(float(norm(value)) - 0.5) > 0.32 else "black"
-            text = "0" if abs(value) < 5e-6 else f"{100 * value:+.2g}"
-            text = f"{100 * value:+.0f}" if abs(value) >= 1 else text
-            axis.text(*where, text, ha="center", va="center", fontsize=7, color=colour)
+def _missing(value: float) -> str:
+    return "" if np.isfinite(value) else "×"
+
+
+def _percent(value: float) -> str:
+    if not np.isfinite(value):
+        return _missing(value)
+    if abs(value) < 5e-6:
+        return "0"
+    return f"{100 * value:+.0f}" if abs(value) >= 1 else f"{100 * value:+.2g}"
 
 
 def plot_bias_curves(
     table: pd.DataFrame, factor: int | None = None, parameters: Sequence[str] | None = None
-) -> Any:
+) -> Panels:
     """Each parameter's estimate over its true value against the chirps' upper frequency.
 
     Args: the table of ``bias_map``; ``factor``, the largest where not given; ``parameters``, all
     where not given. One panel a parameter, one curve a hold. Returns the axes. Raises ValueError
     for an unknown factor or parameter.
     """
-    import matplotlib.pyplot as plt
-
     known = list(dict.fromkeys(table["parameter"]))
     wanted = list(parameters or known)
     chosen = int(table["factor"].max()) if factor is None else factor
@@ -117,11 +118,8 @@ def plot_bias_curves(
     upper = table.attrs.get("upper_frequency", {})
     numeric = all(n in upper for n in names)
     x = np.array([upper[n] for n in names]) if numeric else np.arange(len(names))
-    with context():
-        figure, axes = plt.subplots(
-            len(wanted), 1, sharex=True, figsize=(6.4, 1.2 + 1.3 * len(wanted)), squeeze=False
-        )
-        for axis, parameter in zip(axes[:, 0], wanted, strict=True):
+    with stacked(None, len(wanted), (6.4, 1.2 + 1.3 * len(wanted))) as axes:
+        for axis, parameter in zip(axes, wanted, strict=True):
             rows = _of_parameter(table, parameter)
             rows = rows[rows["factor"] == chosen]
             axis.axhline(1, color="#999999", linewidth=0.8)
@@ -133,22 +131,25 @@ def plot_bias_curves(
             if reach > 3:
                 axis.set_yscale("symlog", linthresh=2)
             axis.set_ylabel(f"{parameter} / true")
-        axes[-1, 0].set_xlabel(title)
+        axes[-1].set_xlabel(title)
         if not numeric:
-            axes[-1, 0].set_xticks(x, labels, rotation=90)
-        axes[0, 0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1.0))
-        figure.align_ylabels()
-    return axes[:, 0]
+            axes[-1].set_xticks(x, labels, rotation=90)
+        axes[0].legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1.0))
+        axes[0].figure.align_ylabels()
+    return axes
 
 
 def plot_bias(
-    plant: Any,
+    plant: Model,
     spectrum: InputSpectrum,
     dt: float,
     hold: Hold | str | None = "zoh",
     true_hold: Hold | None = None,
+    *,
+    base_dt: float | None = None,
+    antialias: bool = False,
     **options: Any,
-) -> Any:
+) -> tuple[Axes, Axes, Axes]:
     """Why an estimate is biased: what the data show, what the assumption makes of the true plant.
 
     Bode and Nyquist of the response that the decimated data show, of the true plant under the
@@ -158,19 +159,20 @@ def plot_bias(
     """
     import matplotlib.pyplot as plt
 
-    est = asymptotic_fit(plant, spectrum, dt, hold, true_hold, **options)
+    est = asymptotic_fit(
+        plant, spectrum, dt, hold, true_hold, base_dt=base_dt, antialias=antialias, **options
+    )
     between = as_hold(hold, dt, est.hold)
-    sampling = {k: v for k, v in options.items() if k in ("base_dt", "antialias")}
-    nyquist_limit = 0.5 / dt
-    f = np.unique(
-        np.concatenate([np.geomspace(nyquist_limit / 200, nyquist_limit, 600), _dense(plant, dt)])
-    )
-    f = f[f < nyquist_limit * (1 - 1e-9)]
-    shown = (
-        apparent_response(plant, spectrum, dt, true_hold, frequency=f, **sampling)
-        if len(spectrum.edges(_base(dt, true_hold, options)))
-        else apparent_response(plant, spectrum, dt, true_hold, **sampling)
-    )
+    limit = 0.5 / dt
+    near = [c * (1 + np.linspace(-0.4, 0.4, 301) ** 3 * 6) for c in resonances(plant)]
+    f = np.unique(np.concatenate([np.geomspace(limit / 200, limit, 600), *near]))
+    f = f[(f > 0) & (f < limit * (1 - 1e-9))]
+    input_dt = true_hold.period if isinstance(true_hold, PeriodicHold) else dt
+    lines = not len(spectrum.edges(input_dt if base_dt is None else base_dt))
+    shown = apparent_response(
+        plant, spectrum, dt, true_hold,
+        base_dt=base_dt, antialias=antialias, frequency=None if lines else f,
+    )  # fmt: skip
     omega = 2 * np.pi * f
     responses = {
         "what the data show": shown,
@@ -194,31 +196,16 @@ def plot_bias(
             inside = [r.select(band) for r in inside]
         nyquist(*inside, ax=plane, unit="Hz", styles=styles)
         plane.set_title("in the band of the input")
-        _shade(amplitude, shown, spectrum)
+        _shade(amplitude, shown)
         amplitude.legend(fontsize=8)
         figure.suptitle(_sentence(est, plant))
     return amplitude, phase, plane
 
 
-def _base(dt: float, true_hold: Hold | None, options: dict[str, Any]) -> float:
-    if options.get("base_dt") is not None:
-        return float(options["base_dt"])
-    return true_hold.period if isinstance(true_hold, PeriodicHold) else dt
-
-
-def _dense(plant: Any, dt: float) -> FloatArray:
-    """Frequencies (Hz) close to the plant's resonances, where curves bend."""
-    poles = np.linalg.eigvals(plant.state_space().A)
-    centres = np.abs(poles[poles.imag > 0]) / (2 * np.pi)
-    each = [c * (1 + np.linspace(-0.4, 0.4, 301) ** 3 * 6) for c in centres]
-    f = np.concatenate([*each, np.zeros(0)])
-    return f[(f > 0) & (f < 0.5 / dt)]
-
-
-def _shade(axis: Axes, shown: Any, spectrum: InputSpectrum) -> None:
+def _shade(axis: Axes, shown: FrequencyResponse) -> None:
     """The input's spectrum after decimation, under the amplitude, in its own scale."""
     twin = axis.twinx()
-    power = shown.input_spectrum[0]
+    power = shown.input_spectrum[0]  # type: ignore[index]
     colour = COLOURS[5]
     if len(power) > 1 and np.median(np.diff(shown.frequency)) < 0.5 * np.ptp(shown.frequency):
         twin.fill_between(shown.frequency, power, step="mid", color=colour, alpha=0.25, linewidth=0)
@@ -232,7 +219,7 @@ def _shade(axis: Axes, shown: Any, spectrum: InputSpectrum) -> None:
     axis.patch.set_visible(False)
 
 
-def _sentence(est: Any, plant: Any) -> str:
+def _sentence(est: Estimate, plant: Model) -> str:
     """The worst parameters in words."""
     true = getattr(plant, "values", {})
     worst = sorted(

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from freqid.plots.bias_plots import hold_title
-from freqid.plots.style import COLOURS, context
+from freqid.plots.heat_maps import heat_map
+from freqid.plots.style import COLOURS, Panels, context
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
 
-def plot_design(table: pd.DataFrame, ax: Any = None) -> Any:
+def plot_design(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     """Error to expect of every chirp of ``experiment_design``, low end across, high end up.
 
     One panel for each rate and hold; the best chirp is marked. Returns the axes.
@@ -37,36 +38,31 @@ def plot_design(table: pd.DataFrame, ax: Any = None) -> Any:
                 len(holds), across, sharex=True, sharey=True, squeeze=False,
                 figsize=(1.2 + 2.6 * across, 0.9 + 2.3 * len(holds)),
             )  # fmt: skip
-        axes: list[Axes] = list(np.ravel(ax))
+        grid = np.atleast_2d(np.asarray(ax, dtype=object))
+        axes: list[Axes] = list(grid.ravel())
         for axis, (hold, factor) in zip(axes, panels, strict=True):
             part = chirps[(chirps["hold"] == hold) & (chirps["factor"] == factor)]
-            grid = part.pivot(index="high", columns="low", values="error").reindex(
-                highs, columns=lows
-            )
-            values = grid.to_numpy(dtype=float)
-            axis.set_facecolor("#bbbbbb")
-            shown = np.ma.masked_invalid(np.where(np.isfinite(values), values, np.nan))
-            image = axis.pcolormesh(
-                shown, norm=norm, cmap="viridis_r", edgecolors="w", linewidth=0.5
-            )
-            for (row, column), value in np.ndenumerate(values):
-                if np.isfinite(value):
-                    text = f"{100 * value:.2g}" if value < 0.995 else f"{100 * value:.0f}"
-                    colour = "white" if float(norm(value)) > 0.55 else "black"
-                    where = (column + 0.5, row + 0.5)
-                    axis.text(*where, text, ha="center", va="center", fontsize=7, color=colour)
+            errors = part.pivot(index="high", columns="low", values="error")
+            values = errors.reindex(highs, columns=lows).to_numpy(dtype=float)
+            image = heat_map(
+                axis, values, norm, "viridis_r", [f"{v:g}" for v in lows],
+                [f"{v:g}" for v in highs], text=_percent, dark=lambda part: part > 0.55,
+            )  # fmt: skip
             if (best["hold"], best["factor"]) == (hold, factor):
                 at = (lows.index(best["low"]), highs.index(best["high"]))
                 axis.add_patch(
                     plt.Rectangle(at, 1, 1, fill=False, edgecolor=COLOURS[2], linewidth=2.5)
                 )
-            axis.grid(False)
-            axis.set_xticks(np.arange(len(lows)) + 0.5, [f"{v:g}" for v in lows], rotation=90)
-            axis.set_yticks(np.arange(len(highs)) + 0.5, [f"{v:g}" for v in highs])
             axis.set_title(f"{hold_title(hold)}, every {1e3 * part['dt'].iloc[0]:g} ms")
-        for axis in np.atleast_2d(ax)[-1]:
+        for axis in grid[-1]:
             axis.set_xlabel("low end / Hz")
-        for axis in np.atleast_2d(ax)[:, 0]:
+        for axis in grid[:, 0]:
             axis.set_ylabel("high end / Hz")
         axes[0].figure.colorbar(image, ax=axes, label="expected relative error (cells: per cent)")
     return ax
+
+
+def _percent(value: float) -> str:
+    if not np.isfinite(value):
+        return ""
+    return f"{100 * value:.2g}" if value < 0.995 else f"{100 * value:.0f}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,50 +12,38 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.fitting.estimate import Estimate
 from freqid.plots.bode_nyquist import bode
-from freqid.plots.style import COLOURS, context, line
+from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
+from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# squared radius of a 95 % ellipse of two normal variables
-_CHI2 = 5.991464547107979
 
-
-def plot_response(*responses: Any, labels: Sequence[str] | None = None, unit: str = "Hz") -> Any:
+def plot_response(
+    *responses: Drawable, labels: Sequence[str] | None = None, unit: str = "Hz"
+) -> Panels:
     """Bode with its bands, and under it the coherence and the input's spectrum, where known.
 
     Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them.
     Returns the axes: amplitude, phase, then coherence and spectrum as far as there are any.
     """
-    import matplotlib.pyplot as plt
-
-    measured = [r for r in responses if isinstance(r, FrequencyResponse)]
-    coherent = [r for r in measured if r.coherence is not None]
-    driven = [r for r in measured if r.input_spectrum is not None]
-    rows = 2 + bool(coherent) + bool(driven)
-    scale = 1.0 if unit == "Hz" else 2 * np.pi
-    with context():
-        heights = [2.2, 1.6, *[0.9] * (rows - 2)]
-        _, axes = plt.subplots(
-            rows, 1, sharex=True, figsize=(6.4, 1.2 * sum(heights)), height_ratios=heights
-        )
+    measured = [(i, r) for i, r in enumerate(responses) if isinstance(r, FrequencyResponse)]
+    coherent = [(i, r, r.coherence[0, 0]) for i, r in measured if r.coherence is not None]
+    driven = [(i, r, r.input_spectrum[0]) for i, r in measured if r.input_spectrum is not None]
+    below = []
+    if coherent:
+        below.append((coherent, {"ylabel": "coherence", "ylim": (0, 1.05)}))
+    if driven:
+        below.append((driven, {"ylabel": "input |U|²", "yscale": "log"}))
+    heights = [2.2, 1.6, *[0.9] * len(below)]
+    with stacked(None, len(heights), (6.4, 1.2 * sum(heights)), heights) as axes:
         bode(*responses, labels=labels, ax=axes[:2], unit=unit)
-        place = 2
-        for group, name, limits in ((coherent, "coherence", (0, 1.05)), (driven, "input", None)):
-            if not group:
-                continue
-            axis = axes[place]
-            place += 1
-            for r in group:
-                style = line(list(responses).index(r))
-                values = r.coherence[0, 0] if name == "coherence" else r.input_spectrum[0]  # type: ignore[index]
-                axis.plot(r.frequency * scale, values, **style)
-            axis.set_ylabel(name if limits else "input |U|²")
-            axis.set_yscale("linear" if limits else "log")
-            if limits:
-                axis.set_ylim(*limits)
+        for axis, (group, looks) in zip(axes[2:], below, strict=True):
+            for index, r, values in group:
+                axis.plot(r.frequency * UNITS[unit], values, **line(index))
+            axis.set(**looks)
         axes[1].set_xlabel("")
-        axes[-1].set_xlabel(f"frequency / {'Hz' if unit == 'Hz' else '(rad/s)'}")
+        axes[-1].set_xlabel(frequency_label(unit))
     return axes
 
 
@@ -70,14 +58,11 @@ def plot_poles(
     >>> record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 5, 1e-3), 1e-3).with_noise(0.1)
     >>> ax = plot_poles(fq.fit(fq.two_mass(), record, band=(10, 80)))
     """
-    import matplotlib.pyplot as plt
     from matplotlib.patches import Ellipse
 
     if labels is not None and len(labels) != len(estimates):
         raise InputError(f"labels has {len(labels)} entries for {len(estimates)} estimates")
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         for index, est in enumerate(estimates):
             colour = COLOURS[index % len(COLOURS)]
             poles, scatter = est.pole_scatter()
@@ -87,7 +72,7 @@ def plot_poles(
                 if not np.isfinite(covariance).all():
                     continue
                 sizes, axes = np.linalg.eigh(covariance)
-                width, height = 2 * np.sqrt(_CHI2 * np.maximum(sizes[::-1], 0))
+                width, height = 2 * np.sqrt(CHI2 * np.maximum(sizes[::-1], 0))
                 angle = np.rad2deg(np.arctan2(axes[1, 1], axes[0, 1]))
                 shape = Ellipse((pole.real, pole.imag), width, height, angle=angle)
                 shape.set(facecolor=colour, alpha=0.25, linewidth=0)
@@ -101,16 +86,12 @@ def plot_poles(
 
 def plot_parameters(est: Estimate, ax: Axes | None = None) -> Axes:
     """The parameters as a table in a figure: value, standard error, interval, unit."""
-    import matplotlib.pyplot as plt
-
     table = est.parameters
     rows = [
         [f"{p['value']:.5g}", f"{p['std']:.2g}", f"{p['lower']:.5g} to {p['upper']:.5g}", p["unit"]]
         for _, p in table.iterrows()
     ]
-    with context():
-        if ax is None:
-            _, ax = plt.subplots(figsize=(6.4, 0.5 + 0.32 * (len(rows) + 1)))
+    with drawing(ax, (6.4, 0.5 + 0.32 * (len(rows) + 1))) as ax:
         ax.axis("off")
         drawn = ax.table(
             rows,
@@ -135,7 +116,6 @@ def plot_spectrogram(
     ``segment`` is the length of the pieces in samples, by default a fiftieth of the record. Raises
     ValueError for an unknown channel.
     """
-    import matplotlib.pyplot as plt
     import scipy.signal
 
     name = record.output_names[0] if channel is None else channel
@@ -148,9 +128,7 @@ def plot_spectrogram(
     length = max(len(x) // 50, 16) if segment is None else segment
     f, t, power = scipy.signal.spectrogram(x, 1 / dt, nperseg=length, noverlap=length // 2)
     level = 10 * np.log10(np.maximum(power, power.max() * 1e-12))
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         image = ax.pcolormesh(t, f, level, vmin=level.max() - 80, shading="auto", cmap="viridis")
         ax.figure.colorbar(image, ax=ax, label=f"power of {name} / dB")
         ax.set(xlabel="time / s", ylabel="frequency / Hz")

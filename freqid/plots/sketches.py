@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 INK = "#000000"
 
 
-def two_mass_sketch() -> Any:
+def two_mass_sketch() -> Figure:
     """Two inertias joined by a gear, a spring and a damper; returns a matplotlib Figure."""
     import matplotlib.pyplot as plt
     from matplotlib.patches import Rectangle
@@ -41,23 +45,23 @@ def two_mass_sketch() -> Any:
     return fig
 
 
-def _shaft(axis: Any, start: float, stop: float) -> None:
+def _shaft(axis: Axes, start: float, stop: float) -> None:
     axis.plot([start, stop], [0, 0], color=INK, lw=2.2)
 
 
-def _gear(axis: Any, x: float) -> None:
+def _gear(axis: Axes, x: float) -> None:
     axis.plot([x - 0.25, x - 0.25], [-0.45, 0.45], color=INK, lw=2.2)
     axis.plot([x + 0.25, x + 0.25], [-0.9, 0.9], color=INK, lw=2.2)
 
 
-def _spring(axis: Any, start: float, stop: float, y: float) -> None:
+def _spring(axis: Axes, start: float, stop: float, y: float) -> None:
     turns = 6
     inside = np.linspace(start + 0.5, stop - 0.5, 2 * turns + 1)
     height = y + 0.3 * np.array([0, *([1, -1] * turns)[: 2 * turns - 1], 0])
     axis.plot([start, *inside, stop], [y, *height, y], color=INK, lw=1.4)
 
 
-def _damper(axis: Any, start: float, stop: float, y: float) -> None:
+def _damper(axis: Axes, start: float, stop: float, y: float) -> None:
     middle = (start + stop) / 2
     axis.plot([start, middle + 0.2], [y, y], color=INK, lw=1.4)
     axis.plot([middle + 0.2, middle + 0.2], [y - 0.28, y + 0.28], color=INK, lw=1.8)
@@ -66,7 +70,7 @@ def _damper(axis: Any, start: float, stop: float, y: float) -> None:
     axis.plot([middle + 0.55, stop], [y, y], color=INK, lw=1.4)
 
 
-def _turn(axis: Any, x: float, y: float, name: str) -> None:
+def _turn(axis: Axes, x: float, y: float, name: str) -> None:
     axis.annotate(
         "",
         (x + 0.45, y - 0.35),
@@ -81,7 +85,7 @@ def _turn(axis: Any, x: float, y: float, name: str) -> None:
     axis.text(x, y + 0.15, name, ha="center", fontsize=13)
 
 
-def _friction(axis: Any, x: float, top: float) -> None:
+def _friction(axis: Axes, x: float, top: float) -> None:
     """Viscous friction: the inertia rubs against the ground."""
     ground = top - 0.35
     axis.plot([x - 0.9, x + 0.9], [ground, ground], color=INK, lw=1.4)

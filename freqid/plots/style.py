@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
-from typing import Any
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from typing import TYPE_CHECKING, TypeAlias, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# several axes of one figure
+Panels: TypeAlias = "Sequence[Axes] | npt.NDArray[np.object_]"
+Dash: TypeAlias = str | tuple[int, tuple[int, ...]]
+
+
+class Style(TypedDict, total=False):
+    """The look of a line, in matplotlib's words; any other of them may stand there too."""
+
+    color: str
+    linestyle: Dash
+    linewidth: float
+    alpha: float
+
 
 # colours of Okabe and Ito (2008), told apart by colour-blind readers; lines differ in dash too
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
-DASHES: list[Any] = [
+DASHES: list[Dash] = [
     "-",
     "--",
     "-.",
@@ -17,7 +38,7 @@ DASHES: list[Any] = [
     (0, (3, 1)),
 ]
 
-SETTINGS: dict[str, Any] = {
+SETTINGS: dict[str, object] = {
     "figure.figsize": (6.4, 4.8),
     "figure.dpi": 100,
     "savefig.dpi": 200,
@@ -43,6 +64,34 @@ def context() -> AbstractContextManager[None]:
     return matplotlib.rc_context(SETTINGS)
 
 
-def line(index: int) -> dict[str, Any]:
+@contextmanager
+def drawing(ax: Axes | None, size: tuple[float, float] | None = None) -> Iterator[Axes]:
+    """The settings, and axes to draw on: new ones of a ``size`` (inches) where not given."""
+    import matplotlib.pyplot as plt
+
+    with context():
+        yield plt.subplots(figsize=size)[1] if ax is None else ax
+
+
+@contextmanager
+def stacked(
+    ax: Panels | None,
+    rows: int,
+    size: tuple[float, float] | None = None,
+    heights: Sequence[float] | None = None,
+    sharex: bool = True,
+) -> Iterator[Panels]:
+    """The settings, and axes above each other: new ones, of such heights, where not given."""
+    import matplotlib.pyplot as plt
+
+    with context():
+        if ax is None:
+            ax = plt.subplots(
+                rows, 1, sharex=sharex, figsize=size, height_ratios=heights, squeeze=False
+            )[1][:, 0]
+        yield ax
+
+
+def line(index: int) -> Style:
     """Colour and dash of the index-th curve of a figure."""
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.plots.style import COLOURS, context, line
+from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -15,22 +15,14 @@ if TYPE_CHECKING:
     from freqid.validation.comparison import Comparison
 
 
-def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
+def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
     """Measured and simulated above their difference, two axes for each output. Returns the axes."""
-    import matplotlib.pyplot as plt
-
     record = comparison.record
     count = record.n_outputs
     simulated = comparison.simulated.reshape(len(comparison.simulated), -1)
     residuals = comparison.residuals.reshape(simulated.shape)
     time = record.time[: len(simulated)]
-    with context():
-        if ax is None:
-            _, ax = plt.subplots(
-                2 * count, 1, sharex=True, figsize=(7.2, 4.2 * count), squeeze=False,
-                height_ratios=[2.5, 1] * count,
-            )  # fmt: skip
-            ax = ax[:, 0]
+    with stacked(ax, 2 * count, (7.2, 4.2 * count), [2.5, 1] * count) as ax:
         for o, name in enumerate(record.output_names):
             unit = (record.units or {}).get(name, "")
             label = f"{name} / {unit}" if unit else name
@@ -46,16 +38,10 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> Any:
     return ax
 
 
-def plot_residuals(table: pd.DataFrame, ax: Any = None) -> Any:
+def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     """Correlations of ``residual_test`` with their 99 % limits; returns one axes a test."""
-    import matplotlib.pyplot as plt
-
     curves = table.attrs["correlations"]
-    with context():
-        if ax is None:
-            size = (7.2, 1.2 + 1.7 * len(curves))
-            _, ax = plt.subplots(len(curves), 1, figsize=size, squeeze=False)
-            ax = ax[:, 0]
+    with stacked(ax, len(curves), (7.2, 1.2 + 1.7 * len(curves)), sharex=False) as ax:
         for axis, curve in zip(ax, curves, strict=True):
             values = np.asarray(curve["values"])
             white = curve["test"] == "whiteness"
@@ -77,13 +63,9 @@ def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
 
     Takes the table of ``select_order`` and returns the axes.
     """
-    import matplotlib.pyplot as plt
-
-    with context():
-        if ax is None:
-            _, ax = plt.subplots()
+    with drawing(ax) as ax:
         n = np.exp((table["mdl"] - table["aic"]) / table["parameters"] + 2).iloc[0]
-        curves: dict[str, Any] = {
+        curves = {
             "AIC": table["aic"],
             "MDL": table["mdl"],
             "cross-validation": n * np.log(table["cross_validation"]),

@@ -2,61 +2,50 @@
 
 from __future__ import annotations
 
-from html import escape
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
+from freqid.checks import FloatArray
+from freqid.fitting.estimate import Z95
 from freqid.models.simulation import simulate
 from freqid.pages.explorer.state import Scene, label_of
-from freqid.plots.style import COLOURS
+from freqid.plots.curves import Shown, bode_curve
+from freqid.plots.plotly_backend import Part, bode_axes, bode_traces, trace
+from freqid.plots.style import COLOURS, line
 
 
-def _curves(shown: Scene) -> Any:
-    styles = [(COLOURS[0], "solid"), (COLOURS[1], "dash"), (COLOURS[2], "dashdot")]
-    responses = shown.responses()
-    if len(responses) == 2 and "estimate" in responses:
-        styles = [styles[0], styles[2]]
-    return zip(responses.items(), styles, strict=False)
+def _curves(scene: Scene) -> Iterator[Shown]:
+    for index, (name, frf) in enumerate(scene.responses().items()):
+        yield Shown(frf, name, line(2 if name == "estimate" else index))
 
 
-def bode_figure(shown: Scene) -> dict[str, Any]:
+def _band(scene: Scene) -> tuple[float, float]:
+    """The chirp's, in Hz, as far as the slow record holds it."""
+    return scene.state.low, min(scene.state.high, scene.slow.nyquist)
+
+
+def bode_figure(shown: Scene) -> Part:
     """Amplitude above phase, the chirp's band shaded."""
-    data = []
-    for (name, frf), (colour, dash) in _curves(shown):
-        line = {"color": colour, "dash": dash, "width": 2}
-        x = frf.frequency.tolist()
-        phase = frf.phase[0, 0]
-        phase = phase - 360 * np.round(np.median(phase) / 360)
-        shared = {"x": x, "name": escape(name), "line": line, "mode": "lines"}
-        data.append({**shared, "y": frf.magnitude[0, 0].tolist()})
-        data.append({**shared, "y": phase.tolist(), "yaxis": "y2", "showlegend": False})
-    low, high = shown.state.low, min(shown.state.high, shown.slow.nyquist)
+    data = [part for one in _curves(shown) for part in bode_traces(bode_curve(one))]
+    low, high = _band(shown)
     ticks = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
-    layout = _base("Frequency response") | {
-        "xaxis": {"type": "log", "title": {"text": "frequency / Hz"}, "anchor": "y2",
-                  "tickvals": ticks},
-        "yaxis": {"type": "log", "domain": [0.48, 1], "title": {"text": "amplitude"},
-                  "exponentformat": "power"},
-        "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}},
-        "shapes": [] if shown.state.sine else [
-            {"type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1,
-             "fillcolor": COLOURS[5], "opacity": 0.12, "line": {"width": 0}, "layer": "below"}
-        ],
+    band = {
+        "type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1,
+        "fillcolor": COLOURS[5], "opacity": 0.12, "line": {"width": 0}, "layer": "below",
     }  # fmt: skip
-    return {"data": data, "layout": layout}
+    layout = _base("Frequency response") | bode_axes(0.48, {"tickvals": ticks})
+    return {"data": data, "layout": layout | {"shapes": [] if shown.state.sine else [band]}}
 
 
-def nyquist_figure(shown: Scene) -> dict[str, Any]:
+def nyquist_figure(shown: Scene) -> Part:
     """The complex plane, inside the chirp's band."""
     data = []
-    low, high = shown.state.low, min(shown.state.high, shown.slow.nyquist)
-    for (name, frf), (colour, dash) in _curves(shown):
+    low, high = _band(shown)
+    for frf, name, style in _curves(shown):
         keep = (frf.frequency >= low) & (frf.frequency <= high)
         G = frf.response[0, 0][keep if keep.sum() > 1 else slice(None)]
-        line = {"color": colour, "dash": dash, "width": 2}
-        data.append({"x": G.real.tolist(), "y": G.imag.tolist(), "name": escape(name),
-                     "mode": "lines", "line": line, "showlegend": False})  # fmt: skip
+        data.append(trace(G.real, G.imag, name or "", style) | {"showlegend": False})
     layout = _base("Nyquist curve, inside the chirp's band") | {
         "xaxis": {"title": {"text": "real part"}},
         "yaxis": {"title": {"text": "imaginary part"}, "scaleanchor": "x"},
@@ -64,27 +53,22 @@ def nyquist_figure(shown: Scene) -> dict[str, Any]:
     return {"data": data, "layout": layout}
 
 
-def time_figure(shown: Scene) -> dict[str, Any]:
+def time_figure(shown: Scene) -> Part:
     """Input and output for a few slow samples: what decimation makes of the steps."""
     fast, slow = shown.fast, shown.slow
     begin = int(0.62 / slow.dt)
     count = int(np.clip(0.15 / slow.dt, 12, 60)) if shown.state.sine else 24
     t0, t1 = begin * slow.dt, (begin + count) * slow.dt
-    quick = (fast.time >= t0 - 1e-12) & (fast.time <= t1)
-    rough = (slow.time >= t0 - 1e-12) & (slow.time <= t1)
-    wrong = simulate_slow(shown)
-    solid = {"color": COLOURS[0], "width": 2}
-    dashed = {"color": COLOURS[1], "width": 2, "dash": "dash"}
-    data = [
-        {"x": fast.time[quick].tolist(), "y": fast.inputs[:: fast.factor, 0][quick].tolist(),
-         "name": "as the converter held it", "line": {**solid, "shape": "hv"}, "mode": "lines"},
-        {"x": slow.time[rough].tolist(), "y": slow.inputs[:: slow.factor, 0][rough].tolist(),
-         "name": "as the slow hold has it", "line": {**dashed, "shape": "hv"}, "mode": "lines"},
-        {"x": fast.time[quick].tolist(), "y": fast.outputs[quick, 0].tolist(), "yaxis": "y2",
-         "line": solid, "mode": "lines", "showlegend": False, "name": "measured"},
-        {"x": slow.time[rough].tolist(), "y": wrong[rough].tolist(), "yaxis": "y2",
-         "line": dashed, "mode": "lines+markers", "showlegend": False, "name": "slow steps"},
-    ]  # fmt: skip
+    data = []
+    for record, style, held, seen, y, mode in (
+        (fast, line(0), "as the converter held it", "measured", fast.outputs[:, 0], "lines"),
+        (slow, line(1), "as the slow hold has it", "slow steps", simulate_slow(shown),
+         "lines+markers"),
+    ):  # fmt: skip
+        inside = (record.time >= t0 - 1e-12) & (record.time <= t1)
+        t, u = record.time[inside], record.inputs[:: record.factor, 0][inside]
+        data.append(trace(t, u, held, style, shape="hv"))
+        data.append(trace(t, y[inside], seen, style, axis=2, mode=mode))
     layout = _base("Input and output, a few samples") | {
         "xaxis": {"title": {"text": "time / s"}, "anchor": "y2", "range": [t0, t1]},
         "yaxis": {"domain": [0.55, 1], "title": {"text": "input"}},
@@ -93,13 +77,13 @@ def time_figure(shown: Scene) -> dict[str, Any]:
     return {"data": data, "layout": layout}
 
 
-def simulate_slow(shown: Scene) -> Any:
+def simulate_slow(shown: Scene) -> FloatArray:
     """What the true plant would have answered, had the input been held for the slow period."""
     u = shown.slow.inputs[:: shown.slow.factor, 0]
     return simulate(shown.state.model(), u, shown.slow.dt).y[: shown.slow.n_samples]
 
 
-def bias_figure(shown: Scene) -> dict[str, Any]:
+def bias_figure(shown: Scene) -> Part:
     """Each parameter's estimate over its true value, with error bars."""
     est, truth = shown.estimate, shown.state.model()
     if est is None or label_of(shown.state) == "black box, ZOH":
@@ -107,7 +91,7 @@ def bias_figure(shown: Scene) -> dict[str, Any]:
         return {"data": [], "layout": _base(f"Parameters: {note}")}
     ratio = [est[n] / truth[n] for n in est.names]
     std = np.sqrt(np.diag(est.covariance_matrix)) / np.abs([truth[n] for n in est.names])
-    bars = {"type": "data", "array": (1.96 * std).tolist(), "color": "#7f7f7f"}
+    bars = {"type": "data", "array": (Z95 * std).tolist(), "color": "#7f7f7f"}
     colours = [COLOURS[3] if abs(r - 1) < 0.02 else COLOURS[2] for r in ratio]
     text = [f"{est[n]:.4g}" for n in est.names]
     data = [{"type": "bar", "x": list(est.names), "y": (np.array(ratio) - 1).tolist(),
@@ -121,7 +105,7 @@ def bias_figure(shown: Scene) -> dict[str, Any]:
     return {"data": data, "layout": layout}
 
 
-def _base(title: str) -> dict[str, Any]:
+def _base(title: str) -> Part:
     return {
         "title": {"text": title, "font": {"size": 14}, "x": 0.02},
         "margin": {"l": 62, "r": 12, "t": 58, "b": 46},

@@ -6,7 +6,8 @@ Built on Dash, an extra. The page listens on the loopback address only, unless t
 from __future__ import annotations
 
 import socket
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,11 @@ from freqid.checks import InputError
 from freqid.data.record import Record
 from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 from freqid.pages.explorer.state import HOLDS, PLANTS, Scene, State, label_of, presets, scene
+from freqid.plots.plotly_backend import Part
+
+if TYPE_CHECKING:
+    from dash import Dash
+    from dash.development.base_component import Component
 
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _PORTS = 50
@@ -58,7 +64,7 @@ def free_port(host: str, port: int) -> int:
     raise InputError(f"--port {port} and the {_PORTS} behind it are busy; give another")
 
 
-def application(record: Record | None = None) -> Any:
+def application(record: Record | None = None) -> Dash:
     """The Dash application, for servers of one's own and for tests."""
     try:
         import dash
@@ -73,17 +79,17 @@ def application(record: Record | None = None) -> Any:
     return app
 
 
-def _layout(dash: Any, record: Record | None) -> Any:
+def _layout(dash: ModuleType, record: Record | None) -> Component:
     html, dcc = dash.html, dash.dcc
     start = State()
 
-    def control(label: str, element: Any, hint: str = "") -> Any:
-        parts = [html.Label([html.Span(label, className="label"), element])]
-        if hint:
-            parts.append(html.P(hint, className="hint"))
-        return html.Div(parts, className="control")
+    def control(label: str, element: Component) -> Component:
+        named = html.Label([html.Span(label, className="label"), element])
+        return html.Div([named], className="control")
 
-    def slider(name: str, low: float, high: float, step: Any, value: Any, marks: Any) -> Any:
+    def slider(
+        name: str, low: float, high: float, step: float, value: float, marks: dict[int, str]
+    ) -> Component:
         return dcc.Slider(low, high, step, value=value, marks=marks, id=name, updatemode="drag",
                           tooltip={"placement": "bottom"}, allow_direct_input=False)  # fmt: skip
 
@@ -124,7 +130,7 @@ def _layout(dash: Any, record: Record | None) -> Any:
     ])  # fmt: skip
     config = {"displaylogo": False, "toImageButtonOptions": {"format": "svg", "scale": 1}}
 
-    def graph(name: str) -> Any:
+    def graph(name: str) -> Component:
         return dcc.Graph(id=name, config=config, responsive=True, className="graph")
 
     return html.Main(
@@ -153,11 +159,11 @@ def _layout(dash: Any, record: Record | None) -> Any:
     )
 
 
-def _wire(dash: Any, app: Any, record: Record | None) -> None:
+def _wire(dash: ModuleType, app: Dash, record: Record | None) -> None:
     from dash import ALL, Input, Output, State as Kept
 
     @app.callback(Output("sliders", "children"), Input("plant", "value"), Kept("url", "search"))
-    def sliders(plant: str, search: str | None) -> Any:
+    def sliders(plant: str, search: str | None) -> list[Component]:
         known = State.of(search)
         scale = known.factors if known.plant == plant else {}
         rows = []
@@ -182,7 +188,9 @@ def _wire(dash: Any, app: Any, record: Record | None) -> None:
         Output("band", "value"), Output("noise", "value"), Output("sine", "data"),
         Input("preset", "value"), Kept("url", "search"),
     )  # fmt: skip
-    def chosen(name: str | None, search: str | None) -> Any:
+    def chosen(
+        name: str | None, search: str | None
+    ) -> tuple[str, int, str, list[float], float, float]:
         # without a preset this is the page being opened: its link says what it shows
         state = presets()[name] if name else State.of(search)
         band = _log(state.low, state.high)
@@ -200,7 +208,7 @@ def _wire(dash: Any, app: Any, record: Record | None) -> None:
     def draw(
         plant: str, factor: int, hold: str, band: list[float], noise: float, sine: float,
         values: list[float], ids: list[dict[str, str]],
-    ) -> Any:  # fmt: skip
+    ) -> tuple[Part | str, ...]:  # fmt: skip
         names = {p.name for p in PLANTS[plant]().free_parameters}
         scale = {
             i["name"]: float(f"{10**v:.4g}")

@@ -11,7 +11,7 @@ from urllib.parse import parse_qsl, urlencode
 import numpy as np
 
 from freqid.bias.maps import hold_label
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.excitation.signals import chirp, sine
@@ -22,6 +22,7 @@ from freqid.models.grey_box import GreyBox
 from freqid.models.output_error import OutputError
 from freqid.models.plants import first_order, two_mass
 from freqid.models.simulation import simulate
+from freqid.plots.curves import resonances
 
 T1, DURATION = 0.5e-3, 10.0
 PLANTS: dict[str, Callable[..., GreyBox]] = {"two-mass": two_mass, "first-order": first_order}
@@ -169,19 +170,14 @@ class Scene:
 
     def responses(self) -> dict[str, FrequencyResponse]:
         """True plant at both rates and the estimate, up to the slow Nyquist limit."""
-        dt = self.slow.dt
-        f = _frequencies(self.state.model(), self.state, 0.5 / dt)
-        omega, plant = 2 * np.pi * f, self.state.model()
-        held = self.fast.input_dt
+        plant, dt, held = self.state.model(), self.slow.dt, self.fast.input_dt
+        omega = 2 * np.pi * _frequencies(plant, self.state, 0.5 / dt)
         found = {
-            f"{self.truth}, ZOH at {1e3 * held:g} ms": plant.frequency_response(
-                omega, ZeroOrderHold(held)
-            ),
-        }
-        if self.state.factor > 1:
-            found[f"{self.truth}, ZOH at {1e3 * dt:g} ms"] = plant.frequency_response(
-                omega, ZeroOrderHold(dt)
+            f"{self.truth}, ZOH at {1e3 * period:g} ms": plant.frequency_response(
+                omega, ZeroOrderHold(period)
             )
+            for period in ((held, dt) if self.state.factor > 1 else (held,))
+        }
         if self.estimate is not None:
             model = self.estimate.model
             # a sampled model has its hold inside
@@ -191,8 +187,9 @@ class Scene:
 
 
 @lru_cache(maxsize=8)
-def _experiment(key: tuple[Any, ...]) -> Record:
-    plant, low, high, sine_at, moved = key
+def _experiment(
+    plant: str, low: float, high: float, sine_at: float, moved: tuple[tuple[str, float], ...]
+) -> Record:
     model = PLANTS[plant]().with_values(**dict(moved))
     u = sine(sine_at, DURATION, T1) if sine_at else chirp(low, high, DURATION, T1)
     return simulate(model, u, T1)
@@ -203,34 +200,31 @@ def scene(state: State, record: Record | None = None) -> Scene:
     model = state.model()
     if record is None:
         moved = tuple((p.name, p.value) for p in model.free_parameters)
-        fast = _experiment((state.plant, state.low, state.high, state.sine, moved))
+        fast = _experiment(state.plant, state.low, state.high, state.sine, moved)
         if state.noise:
             fast = fast.with_noise(state.noise * float(fast.y.std()))
     else:
         fast = record
     assumed = state._assumed()
+    hold = as_hold(assumed, fast.dt, fast.hold)
+    found = Scene(state, fast, fast, None, "", hold, record is not None)
     try:
         slow = fast.decimate(state.factor) if state.factor > 1 else fast
-    except ValueError as error:
-        between = as_hold(assumed, fast.dt, fast.hold)
-        return Scene(state, fast, fast, None, str(error), between, record is not None)
-    hold = as_hold(assumed, slow.dt, slow.hold)
-    band = state.band(slow.dt, slow.duration)
-    spec: Any = OutputError(3) if state.hold == "black box" else model
-    try:
+        hold = as_hold(assumed, slow.dt, slow.hold)
+        found = replace(found, slow=slow, hold=hold)
         # the start is near enough that one is enough: it is the true plant
-        est = fit(spec, slow, hold=hold, band=band, n_starts=1,
-                  initial_state="steady" if state.sine else "estimate")  # fmt: skip
-        message = "; ".join(est.warnings)
-        return Scene(state, fast, slow, est, message, hold, record is not None)
-    except ValueError as error:
-        return Scene(state, fast, slow, None, str(error), hold, record is not None)
+        est = fit(
+            OutputError(3) if state.hold == "black box" else model, slow, hold=hold,
+            band=state.band(slow.dt, slow.duration), n_starts=1,
+            initial_state="steady" if state.sine else "estimate",
+        )  # fmt: skip
+    except InputError as error:
+        return replace(found, message=str(error))
+    return replace(found, estimate=est, message="; ".join(est.warnings))
 
 
 def _frequencies(model: GreyBox, state: State, nyquist: float) -> FloatArray:
-    poles = np.linalg.eigvals(model.state_space().A)
-    centres = np.abs(poles[poles.imag > 0]) / (2 * np.pi)
-    dense = [c * (1 + 0.5 * np.linspace(-1, 1, 121) ** 3) for c in centres]
+    dense = [c * (1 + 0.5 * np.linspace(-1, 1, 121) ** 3) for c in resonances(model)]
     f = np.concatenate([np.geomspace(max(state.low / 4, 0.2), nyquist, 160), *dense])
     return np.unique(f[(f > 0) & (f < nyquist * 0.9999)])
 

@@ -1,0 +1,150 @@
+"""Commands that estimate, from data or without: fit and bias."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from cyclopts import Parameter as Option
+
+import freqid as fq
+from freqid.checks import choice, whole
+from freqid.cli.options import Band, Columns, Dt, Hold, hold_of
+from freqid.cli.terminal import progress, show, write_json, write_picture, write_table
+from freqid.excitation.input_spectra import below_nyquist
+from freqid.lti import holds
+from freqid.models.plants import PLANTS
+
+
+def fit(
+    data: Path,
+    *,
+    model: Literal["two-mass", "three-mass", "first-order", "output-error"],
+    order: int = 3,
+    input: Columns = None,
+    output: Columns = None,
+    dt: Dt = None,
+    decimate: int = 1,
+    keep_input: bool = False,
+    hold: Hold = None,
+    band: Band = None,
+    domain: Literal["frequency", "time"] = "frequency",
+    initial_state: Literal["estimate", "zero", "steady"] = "estimate",
+    weights: Literal["noise"] | None = None,
+    out: Path | None = None,
+    plot: Path | None = None,
+    report: Path | None = None,
+) -> int:
+    """Estimate a model's parameters from a record.
+
+    Parameters
+    ----------
+    data
+        CSV file with a column of time and one for each channel.
+    model
+        two-mass (the paper's), three-mass, first-order, or output-error, a black box of --order.
+    decimate
+        keep every so many-th sample before the fit; the hold is remembered.
+    keep_input
+        when decimating, keep the whole input (the lifted model).
+    weights
+        noise: weigh each line by the noise that the fit leaves there.
+    out
+        JSON file for the estimate.
+    plot
+        picture of the record beside the model's simulation.
+    report
+        HTML page about the estimate, which works offline (needs the extra "report").
+    """
+    record = fq.read(data, input, output, dt)
+    if decimate != 1:
+        record = record.decimate(decimate, keep_input=keep_input)
+    plant = fq.OutputError(order) if model == "output-error" else PLANTS[model]()
+    with progress() as bar:
+        bar.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
+        estimate = fq.fit(
+            plant,
+            record,
+            hold=hold_of(hold),
+            band=band,
+            domain=domain,
+            initial_state=initial_state,
+            weights=weights,
+        )
+    if out is not None:
+        write_json(out, estimate.to_dict())
+    if report is not None:
+        estimate.report(report, title=f"{model} from {data.name}")
+    if plot is not None:
+        write_picture(plot, fq.compare(estimate, record, band=band).plot())
+    show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
+    print(
+        f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
+        f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
+    )
+    for warning in estimate.warnings:
+        print(f"warning: {warning}")
+    return 0 if estimate.converged else 1
+
+
+def bias(
+    *,
+    model: Literal["two-mass", "three-mass", "first-order"],
+    chirp: tuple[float, float],
+    factor: Annotated[list[float], Option(consume_multiple=True)],
+    hold: Annotated[list[str] | None, Option(consume_multiple=True)] = None,
+    base_dt: float = 0.5e-3,
+    parameter: str | None = None,
+    out: Path | None = None,
+    plot: Path = Path("bias.png"),
+) -> int:
+    """What a chirp, decimated, makes of a model's parameters: computed, without data.
+
+    Parameters
+    ----------
+    model
+        two-mass (the paper's), three-mass or first-order, at its own values.
+    chirp
+        lowest and highest frequency in Hz.
+    factor
+        decimation factors.
+    hold
+        what the fit assumes: any of zoh, foh, bl and remembered; by default zoh, foh, remembered.
+    base_dt
+        sample time of the converter in s.
+    parameter
+        that the picture shows; by default the one that is most wrong.
+    out
+        CSV file for the table.
+    plot
+        heat map over upper frequency and factor, one panel a hold.
+    """
+    names = ["zoh", "foh", "remembered"] if hold is None else hold
+    for name in names:
+        choice("--hold", name, (*holds.Hold.named, "remembered"))
+    assumed = [None if name == "remembered" else name for name in names]
+    factors = [whole("--factor", f) for f in factor]
+    plant = PLANTS[model]()
+    low, high = chirp
+    below_nyquist(high, base_dt)
+    asked = f"{low:g}-{high:g}"
+    table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, assumed, base_dt)
+    if out is not None:
+        write_table(out, table)
+    shown = table.drop(columns=["spectrum", "message"])
+    shown["relative_bias"] = [f"{100 * b:+.3g} %" for b in shown["relative_bias"]]
+    show(f"{model}, chirp {asked} Hz held for {1e3 * base_dt:g} ms", shown)
+    finite = table[np.isfinite(table["relative_bias"])]
+    if parameter is None and len(finite):
+        parameter = finite.loc[finite["relative_bias"].abs().idxmax(), "parameter"]
+    for message in dict.fromkeys(m for m in table["message"] if m):
+        print(f"warning: {message}")
+    nyquist = 0.5 / base_dt
+    uppers = sorted({float(f"{u:.3g}") for u in np.linspace(low, 2 * high - low, 15)[2:]} | {high})
+    around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}
+    picture = fq.bias_map(plant, around, factors, assumed, base_dt)
+    axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[asked])
+    write_picture(plot, axes)
+    print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")
+    return 0 if table["converged"].all() else 1

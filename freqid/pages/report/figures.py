@@ -1,0 +1,136 @@
+"""The figures of a report, as plotly takes them: response, and simulation beside measurement."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+from freqid.fitting.estimate import Estimate
+from freqid.frf.empirical import etfe
+from freqid.lti.holds import PeriodicHold
+from freqid.plots.curves import Shown, bode_curve
+from freqid.plots.plotly_backend import Part, bode_axes, bode_traces, trace
+from freqid.plots.style import COLOURS, Style
+from freqid.validation.comparison import compare
+
+# points of a curve that a page can carry
+_POINTS = 3000
+_DATA: Style = {"color": "#7f7f7f"}
+_BLACK, _BLUE, _ORANGE = (Style(color=colour) for colour in COLOURS[:3])
+
+
+class Figure(NamedTuple):
+    """A figure with its heading and the sentence under it."""
+
+    title: str
+    note: str
+    data: list[Part]
+    layout: Part
+
+
+def figures(est: Estimate) -> list[Figure]:
+    """Response of data and model, then measured and simulated outputs, as far as there are any."""
+    return [*_responses(est), *_residuals(est)]
+
+
+def _figure(
+    title: str, note: str, data: list[Part], height: int, legend: float, axes: Part
+) -> Figure:
+    layout = {
+        "height": height,
+        "margin": {"l": 60, "r": 15, "t": 15, "b": 50},
+        "legend": {"orientation": "h", "y": legend},
+        **axes,
+    }
+    return Figure(title, note, [part | {"legendgroup": part["name"]} for part in data], layout)
+
+
+def _responses(est: Estimate) -> list[Figure]:
+    """Amplitude and phase of data and model, one figure a channel pair."""
+    measured = _measured(est)
+    if measured is None:
+        return []
+    low, high = measured.frequency[[0, -1]]
+    even = np.linspace(low, high, 600), np.geomspace(max(low, 1e-9), high, 600)
+    f = np.unique(np.concatenate(even))
+    between = est.hold if isinstance(est.hold, PeriodicHold) else None
+    try:
+        model = est.frequency_response(2 * np.pi * f, between)
+    except InputError:
+        return []
+    step = max(len(measured.frequency) // _POINTS, 1)
+    some = FrequencyResponse(measured.frequency[::step], measured.response[..., ::step])
+    data, fitted = Shown(some, "data", _DATA), Shown(model, "model", _ORANGE)
+    return [
+        _figure(
+            f"Frequency response, {measured.input_names[i]} to {measured.output_names[o]}",  # type: ignore[index]
+            "Drag to zoom, double-click to see all again. The data are the ratio of "
+            "the DFTs, whose scatter at weak lines is no fault of the model.",
+            bode_traces(bode_curve(data, model, (o, i), scattered=True), "markers")
+            + bode_traces(bode_curve(fitted, model, (o, i))),
+            520,
+            1.08,
+            bode_axes(0.46, _decades(low, high)) | {"hovermode": "x unified"},
+        )
+        for o, i in np.ndindex(*measured.response.shape[:2])
+    ]
+
+
+def _decades(low: float, high: float) -> Part:
+    """Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten, each with its number."""
+    first, last = int(np.floor(np.log10(max(low, 1e-9)))), int(np.ceil(np.log10(high)))
+    values = [m * 10.0**k for k in range(first, last + 1) for m in (1, 2, 5)]
+    return {"tickvals": values, "ticktext": [f"{v:g}" for v in values]}
+
+
+def _measured(est: Estimate) -> FrequencyResponse | None:
+    """The response that the first data set shows, as far as one can be read off it."""
+    if not est.data:
+        return None
+    first = est.data[0]
+    if isinstance(first, FrequencyResponse):
+        return first if est.band is None else first.select(est.band)
+    same = [r for r in records(est) if r.n_samples == first.n_samples and r.dt == first.dt]
+    try:
+        return etfe(same if first.n_inputs > 1 else first, est.band)
+    except InputError:
+        return None
+
+
+def _residuals(est: Estimate) -> list[Figure]:
+    """Measured and simulated outputs of the first record."""
+    if not records(est):
+        return []
+    record = records(est)[0]
+    try:
+        c = compare(est, record, band=est.band)
+    except InputError:
+        return []
+    simulated = c.simulated.reshape(len(c.simulated), -1)
+    step = max(len(simulated) // _POINTS, 1)
+    t = record.time[: len(simulated) : step]
+    drawn = []
+    for o, name in enumerate(record.output_names):
+        y, s = c.measured[::step, o], simulated[::step, o]
+        note = f"{c.fit_percent[o]:.2f} % (NRMSE), simulated with the record's own hold"
+        note += f", {est.band[0]:g} to {est.band[1]:g} Hz" if est.band else ""
+        note += f"; every {step}th sample is drawn." if step > 1 else "."
+        data = [trace(t, y, "measured", _BLACK), trace(t, s, "simulated", _ORANGE),
+                trace(t, y - s, "difference", _BLUE, axis=2)]  # fmt: skip
+        axes: Part = {
+            "xaxis": {"anchor": "y2", "title": {"text": "time / s"}},
+            "yaxis": {"domain": [0.36, 1], "title": {"text": escape(str(name))}},
+            "yaxis2": {"domain": [0, 0.28], "title": {"text": "difference"}},
+        }
+        drawn.append(_figure(f"Measured and simulated, {name}", note, data, 460, 1.1, axes))
+    return drawn
+
+
+def records(est: Estimate) -> list[Record]:
+    """The records among the data of an estimate."""
+    return [d for d in est.data if isinstance(d, Record)]

@@ -1,0 +1,143 @@
+"""What a report says: whether to trust the estimate, and its tables as rows of words."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import NamedTuple
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.fitting.estimate import Estimate
+from freqid.lti.holds import ZeroOrderHold
+from freqid.models.grey_box import GreyBox
+from freqid.pages.report.figures import records
+from freqid.validation.repeats import hold_bias
+from freqid.validation.residual_tests import residual_test
+
+# rows of the parameter table, and experiments, that a page can carry
+_ROWS, _EXPERIMENTS = 500, 50
+
+
+class Verdict(NamedTuple):
+    """Whether an estimate may be trusted, in plain words."""
+
+    head: str
+    text: str
+    trusted: bool = False
+
+
+class Table(NamedTuple):
+    """A table's cells, and how many rows are left out of it."""
+
+    columns: list[str]
+    rows: list[list[str]]
+    left_out: int
+
+
+def verdict(est: Estimate) -> Verdict:
+    """Whether an estimate may be trusted, in one sentence of plain words."""
+    # a sentence that somebody else has added says neither its weight nor its kind
+    serious = [w for w in est.warnings if getattr(w, "severity", "serious") == "serious"]
+    kinds = dict.fromkeys(getattr(w, "kind", w) for w in serious)
+    std = np.sqrt(np.diag(est.covariance_matrix))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.abs(std / est.values)
+    doubt = "Not to be trusted as it is."
+    if not est.converged:
+        return Verdict("Do not use these numbers.", "The search did not converge.")
+    if serious:
+        says = f"The fit says: {', '.join(kinds)}. The sentences below say what to do."
+        return Verdict(doubt, says)
+    if not np.isfinite(std).all():
+        return Verdict(doubt, "The data do not determine every parameter.")
+    worst = int(np.nanargmax(relative)) if np.isfinite(relative).any() else 0
+    return Verdict(
+        "Nothing speaks against this estimate.",
+        f"It explains {est.fit_percent:.2f} % of what was fitted, the search converged, and "
+        f"the least certain parameter, {est.names[worst]}, is known to "
+        f"{100 * relative[worst]:.2g} %.",
+        trusted=True,
+    )
+
+
+def bias(est: Estimate) -> dict[str, float]:
+    """The bias bar, where a record remembers another hold than the fit assumed."""
+    known = records(est)
+    if not known or len(known) < len(est.data) or not isinstance(est.model, GreyBox):
+        return {}
+    if all(r.hold == est.hold for r in known) or "hold_period" in est.names:
+        return {}
+    try:
+        return dict(hold_bias(est, known, band=est.band, weights=est.weights)["bias"])
+    except InputError:
+        return {}
+
+
+def parameters(est: Estimate, bias: Mapping[str, float]) -> Table:
+    """The parameters with their error bars, and bias bars where there are any."""
+    columns = ["parameter", "value", "±", "95 % from", "to", "began at", "unit"]
+    if bias:
+        columns.insert(3, "bias")
+    rows = []
+    for name, p in est.parameters.head(_ROWS).iterrows():
+        row = [str(name), _number(p["value"], 7), _number(p["std"], 2), _number(p["lower"], 6),
+               _number(p["upper"], 6), _number(p["nominal"], 6), str(p["unit"])]  # fmt: skip
+        if bias:
+            row.insert(3, _number(bias.get(str(name), np.nan), 3))
+        rows.append(row)
+    return Table(columns, rows, max(len(est.names) - _ROWS, 0))
+
+
+def _number(x: float, digits: int) -> str:
+    if np.isnan(x):
+        return ""
+    return "∞" if np.isposinf(x) else "−∞" if np.isneginf(x) else f"{x:.{digits}g}"
+
+
+def tests(est: Estimate) -> list[dict[str, object]]:
+    """The residual tests on the first record, a row each."""
+    if not records(est):
+        return []
+    try:
+        table = residual_test(est, records(est)[0], band=est.band)
+    except InputError:
+        return []
+    return [
+        {
+            "test": row["test"],
+            "channels": f"{row['output']} and {row['input']}" if row["input"] else row["output"],
+            "statistic": f"{row['statistic']:.3g}",
+            "limit": f"{row['limit']:.3g}",
+            "p": f"{row['p_value']:.2g}",
+            "passed": bool(row["passed"]),
+        }
+        for row in table.to_dict("records")
+    ]
+
+
+def data(est: Estimate) -> list[tuple[str, str]]:
+    """What was fitted and how that went, as pairs of a name and its value."""
+    rows = [(f"experiment {i + 1}", repr(d)[1:-1]) for i, d in enumerate(est.data[:_EXPERIMENTS])]
+    if len(est.data) > _EXPERIMENTS:
+        rows.append(("and", f"{len(est.data) - _EXPERIMENTS} more"))
+    assumed = repr(est.hold)
+    if isinstance(est.hold, ZeroOrderHold):
+        assumed = f"zero-order hold of {1e3 * est.hold.period:g} ms"
+    return [
+        *rows,
+        ("hold in the fit", assumed),
+        ("band", f"{est.band[0]:g} to {est.band[1]:g} Hz" if est.band else "all lines"),
+        ("explained of what was fitted", f"{est.fit_percent:.4g} %"),
+        ("cost", f"{est.cost:.6g}"),
+        ("starts", f"{est.n_agreed} of {est.n_starts} agree"),
+        ("converged", f"{'yes' if est.converged else 'no'}: {est.message}"),
+    ]
+
+
+def versions() -> str:
+    """What the numbers were made with."""
+    packages = (f"{p} {version(p)}" for p in ("freqid", "numpy", "scipy"))
+    return ", ".join([*packages, f"Python {platform.python_version()}"])
