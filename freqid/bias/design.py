@@ -59,6 +59,7 @@ def experiment_design(
         method: of the chirps, ``"linear"`` or ``"log"``.
         d_optimal: add for each rate the multisine that determines the parameters best together.
         criterion: ``"worst"`` or ``"rms"`` of the parameters' relative errors makes the ranking.
+        n_jobs: as in ``bias_map``.
 
     Returns a DataFrame, best first: excitation, low, high, factor, dt, hold, error, worst (the
     parameter that is worst), then bias, std and error of each parameter, relative to its value:
@@ -187,8 +188,8 @@ def d_optimal_spectrum(
 ) -> LineSpectrum:
     """The multisine of a given power that makes the information's determinant largest.
 
-    Args: ``plant`` at its values; ``band`` in Hz, lines at multiples of 1/``period`` (s); ``dt`` of the record in s;
-    ``hold`` of the input, a zero-order hold at ``dt`` where not given; ``power`` in u².
+    Args: ``plant`` at its values; ``band`` in Hz, lines at multiples of 1/``period`` (s); ``dt`` of
+    the record in s; ``hold`` of the input, a zero-order hold at ``dt`` where not given; ``power`` in u².
     Multiplicative updates (Fedorov and Hackl, Model-Oriented Design of Experiments, 1997, section
     3.2) raise the determinant at each step. Returns a LineSpectrum of the few lines that carry
     power. Raises ValueError for a band without lines, or lines that do not determine the

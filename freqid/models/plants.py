@@ -71,7 +71,8 @@ def drivetrain(
 ) -> GreyBox:
     """A chain of ``n_masses`` inertias behind a gear, springs and dampers between them.
 
-    The first is the motor, the others parts of the arm. Input: motor torque (N m). ``outputs`` are any of "motor" or "arm" (the last mass) with
+    The first is the motor, the others parts of the arm. Input: motor torque (N m). ``outputs`` are
+    any of "motor" or "arm" (the last mass) with
     "position" (rad), "velocity" (rad/s) or "acceleration" (rad/s²). Parameters: inertias J1 (motor)
     to Jn in kg m², stiffnesses k1 … in N m/rad and dampings d1 … in N m s/rad of the joints, the
     motor's friction fm in N m s/rad, and the gear ratio, which is fixed; ``values`` replaces the

@@ -29,8 +29,9 @@ def hold_bias(
     """The bias bar: what the assumed hold has added to each parameter, to modes of a black box.
 
     The model of ``est`` is fitted to the same ``data`` with the hold that the records remember,
-    ``band`` and ``weights`` being those of the estimate; ``bias`` is the estimate less that, to be drawn beside ``std``, the error
-    bar of the noise. Columns estimate, remembered, bias and std; the ratio of bias to std says
+    ``band`` and ``weights`` being those of the estimate; ``bias`` is the estimate less that, to be
+    drawn beside ``std``, the error bar of the noise. Columns estimate, remembered, bias and std;
+    the ratio of bias to std says
     which of the two rules. Coefficients of a black box mean another thing under another hold, so
     that there the rows are frequency (Hz) and damping of its modes in turn.
     """
