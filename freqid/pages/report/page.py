@@ -146,7 +146,7 @@ def _responses(est: Estimate) -> list[dict[str, Any]]:
     step = max(len(measured.frequency) // _POINTS, 1)
     figures = []
     for o, i in np.ndindex(*measured.response.shape[:2]):
-        names = f"{measured.input_names[i]} to {measured.output_names[o]}"  # type: ignore[index]
+        names = f"{measured.input_names[i]} to {measured.output_names[o]}"
         G, H = measured.response[o, i], model.response[o, i]
         x = measured.frequency[::step]
         turns = np.rad2deg(np.unwrap(np.angle(H)))
