@@ -13,7 +13,7 @@ from freqid.checks import ComplexArray, FloatArray, InputError, whole
 from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
-from freqid.data.record_sets import as_records, references_of
+from freqid.data.record_sets import Reference, as_records, references_of
 from freqid.frf.measured import measured
 
 # segments of a single record where none are asked for
@@ -34,7 +34,7 @@ def h1(
     window: Window = "hann",
     overlap: float | None = None,
     detrend: Detrend = "constant",
-    reference: ArrayLike | None = None,
+    reference: Reference | None = None,
 ) -> FrequencyResponse:
     """S_yu S_uu⁻¹: the least-squares response where the noise is on the output.
 
@@ -163,7 +163,7 @@ class _Spectral:
 
 
 def _spectral(
-    records: Record | Sequence[Record], averaging: _Averaging, reference: ArrayLike | None = None
+    records: Record | Sequence[Record], averaging: _Averaging, reference: Reference | None = None
 ) -> _Spectral:
     sets = as_records(records)
     first, m = sets[0], sets[0].n_inputs

@@ -13,13 +13,12 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, whole
 from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
-from freqid.data.record_sets import as_records, references_of
+from freqid.data.record_sets import Reference, as_records, references_of
 from freqid.frf.local_windows import Form, Lines, Local, inflation, local_models
 from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra
@@ -37,7 +36,7 @@ def local_polynomial(
     *,
     band: tuple[float, float] | None = None,
     width: int | None = None,
-    reference: ArrayLike | None = None,
+    reference: Reference | None = None,
 ) -> FrequencyResponse:
     """Response by local polynomials: no leakage, and the noise's variance from one record.
 
@@ -72,7 +71,7 @@ def local_rational(
     *,
     band: tuple[float, float] | None = None,
     width: int | None = None,
-    reference: ArrayLike | None = None,
+    reference: Reference | None = None,
 ) -> FrequencyResponse:
     """Response by local rational functions: as ``local_polynomial``, and sharp modes as they are.
 
@@ -96,7 +95,7 @@ def _estimate(
     poles: int,
     band: tuple[float, float] | None,
     width: int | None,
-    reference: ArrayLike | None,
+    reference: Reference | None,
 ) -> FrequencyResponse:
     sets = as_records(records)
     signals = references_of(sets, reference)
@@ -105,12 +104,12 @@ def _estimate(
     if width is None:
         lines, form = _widened(sets, signals, band, lines, form)
     local = local_models(lines, form)
+    spectrum = None
     if signals is None:
         spectrum = (np.abs(lines.U[..., lines.wanted]) ** 2).mean(axis=0)
-        return measured(sets[0], lines.frequency[lines.wanted], *local, spectrum)
-    return measured(
-        sets[0], lines.frequency[lines.wanted], *_through(local, sets[0].n_inputs), None
-    )
+    else:
+        local = _through(local, sets[0].n_inputs)
+    return measured(sets[0], lines.frequency[lines.wanted], *local, spectrum)
 
 
 def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> Form:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, positive, whole
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, steps, whole
 from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
@@ -80,10 +80,7 @@ def distortion(
             f"records have {first.n_inputs} inputs and {first.n_outputs} outputs; distortion needs "
             "one of each, at one rate"
         )
-    count = positive("period", period, "s") / first.dt
-    n = round(count)
-    if abs(count - n) > 1e-6 * count:
-        raise InputError(f"period={period:g} s must be a whole number of dt={first.dt:g} s")
+    n = steps("period", period, first.dt)
     skip = whole("skip", skip, least=0)
     periods = min(r.n_samples for r in sets) // n - skip
     if periods < 2:
