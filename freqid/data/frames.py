@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,22 +21,8 @@ def _hold_columns() -> dict[str, type[Hold]]:
     return {kind.at(1.0).column[0]: kind for kind in Hold.named.values()}
 
 
-class RecordFields(TypedDict):
-    """What a frame holds of a Record."""
-
-    u: FloatArray
-    y: FloatArray
-    dt: float
-    input_dt: float
-    hold: Hold | str | None
-    input_names: list[str]
-    output_names: list[str]
-    units: dict[str, str]
-    reference: FloatArray | None
-    notes: tuple[str, ...]
-
-
-def record_fields(
+def record_of(
+    kind: type[Record],
     frame: pd.DataFrame,
     inputs: Sequence[str] | str | None,
     outputs: Sequence[str] | str | None,
@@ -45,8 +31,8 @@ def record_fields(
     reference: str | None,
     units: Mapping[str, str] | None,
     resample: bool,
-) -> RecordFields:
-    """The fields of a Record that a frame holds: columns to channels, time to periods."""
+) -> Record:
+    """The record of that kind that a frame holds: columns to channels, time to periods."""
     notes: list[str] = []
     if resample:
         frame, notes = _regular(frame)
@@ -61,18 +47,18 @@ def record_fields(
     factor = _slow_output(y)
     y = y[::factor]
     named = {*u_names, *y_names, "reference"}
-    return {
-        "u": u[:, 0] if len(u_names) == 1 else u,
-        "y": y[:, 0] if len(y_names) == 1 else y,
-        "dt": step * factor,
-        "input_dt": step,
-        "hold": _remembered(frame) if hold is None else hold,
-        "input_names": u_names,
-        "output_names": y_names,
-        "units": {k: v for k, v in (units or {}).items() if k in named},
-        "reference": None if commanded is None else commanded[::factor],
-        "notes": tuple(notes),
-    }
+    return kind(
+        u[:, 0] if len(u_names) == 1 else u,
+        y[:, 0] if len(y_names) == 1 else y,
+        dt=step * factor,
+        hold=_remembered(frame) if hold is None else hold,
+        input_dt=step,
+        input_names=u_names,
+        output_names=y_names,
+        units={k: v for k, v in (units or {}).items() if k in named},
+        reference=None if commanded is None else commanded[::factor],
+        notes=tuple(notes),
+    )
 
 
 def samples_frame(record: Record) -> pd.DataFrame:

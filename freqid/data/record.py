@@ -21,7 +21,7 @@ from freqid.checks import (
     whole,
 )
 from freqid.data.folding import low_pass
-from freqid.data.frames import record_fields, samples_frame
+from freqid.data.frames import record_of, samples_frame
 from freqid.data.sampling import check_rates, less_trend, sample_at
 from freqid.lti.holds import Hold, ZeroOrderHold, as_hold
 
@@ -272,7 +272,7 @@ class Record:
         >>> Record.from_frame(frame).dt
         0.1
         """
-        return cls(**record_fields(frame, inputs, outputs, dt, hold, reference, units, resample))
+        return record_of(cls, frame, inputs, outputs, dt, hold, reference, units, resample)
 
     def __repr__(self) -> str:
         shown = f"{self.n_samples} samples at {self.dt:g} s"
