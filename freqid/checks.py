@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import ArrayLike
 
 # what an array holds is said by its name here: numpy's own types follow precision too closely, so
 # that only the element kind of public results is checked
@@ -26,7 +27,7 @@ class InputError(ValueError):
     """
 
 
-def positive(name: str, value: Any, unit: str = "") -> float:
+def positive(name: str, value: object, unit: str = "") -> float:
     """Return ``value`` as a float; ValueError unless it is finite and above zero."""
     number = finite(name, value)
     if number <= 0:
@@ -36,14 +37,14 @@ def positive(name: str, value: Any, unit: str = "") -> float:
     return number
 
 
-def finite(name: str, value: Any) -> float:
+def finite(name: str, value: object) -> float:
     """Return ``value`` as a float; ValueError unless it is a finite real number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise InputError(f"{name}={value!r} must be a finite real number")
     return float(value)
 
 
-def whole(name: str, value: Any, least: int = 1) -> int:
+def whole(name: str, value: object, least: int = 1) -> int:
     """Return ``value`` as an int; ValueError unless it is a whole number of at least ``least``."""
     number = finite(name, value)
     if not number.is_integer() or number < least:
@@ -51,7 +52,16 @@ def whole(name: str, value: Any, least: int = 1) -> int:
     return int(number)
 
 
-def samples(name: str, values: Any) -> FloatArray:
+def steps(name: str, value: float, dt: float, least: int = 1) -> int:
+    """How many times ``dt`` (s) a time is; ValueError unless whole and at least ``least``."""
+    count = positive(name, value, "s") / positive("dt", dt, "s")
+    number = round(count)
+    if number < least or abs(count - number) > 1e-6 * count:
+        raise InputError(f"{name}={value:g} s must be a whole number of dt={dt:g} s")
+    return number
+
+
+def samples(name: str, values: ArrayLike) -> FloatArray:
     """A read-only copy of signal samples, (N,) or (N, channels), checked to be finite."""
     try:
         array = np.array(values, dtype=float)
@@ -74,14 +84,14 @@ def samples(name: str, values: Any) -> FloatArray:
     return array
 
 
-def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
+def choice(name: str, value: object, allowed: Sequence[str]) -> str:
     """Return ``value`` if it is one of ``allowed``; ValueError with the nearest name."""
     if isinstance(value, str) and value in allowed:
         return value
     raise InputError(unknown(name, value, allowed))
 
 
-def unknown(name: str, value: Any, allowed: Iterable[str]) -> str:
+def unknown(name: str, value: object, allowed: Iterable[str]) -> str:
     """Sentence for a name that is not among ``allowed``, with the nearest one as a hint."""
     names = [str(a) for a in allowed]
     folded = {n.casefold(): n for n in names}

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,30 +31,39 @@ class Band(NamedTuple):
         )
         return inside
 
+    @classmethod
+    def of(cls, value: Iterable[float], nyquist: float = np.inf, name: str = "band") -> Band:
+        """The band that an argument means.
+
+        Raises ValueError unless 0 <= low < high <= ``nyquist`` (Hz).
+        """
+        try:
+            low, high = (float(v) for v in value)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"{name}={value!r} must be two frequencies in Hz, (low, high)"
+            ) from None
+        if not 0 <= low < high <= nyquist * (1 + _ROUNDING):
+            limit = f" <= {nyquist:g} Hz, the Nyquist limit of this record"
+            raise InputError(
+                f"{name}=({low:g}, {high:g}) Hz must satisfy 0 <= low < high"
+                f"{limit if np.isfinite(nyquist) else ''}"
+            )
+        return cls(low, high)
+
     def __repr__(self) -> str:
         return f"({self.low:g}, {self.high:g})"
 
 
-def as_band(value: Any, nyquist: float = np.inf, name: str = "band") -> Band | None:
-    """The band that an argument means, None for None.
-
-    Raises ValueError unless 0 <= low < high <= ``nyquist`` (Hz).
+def as_band(
+    value: Iterable[float] | None, nyquist: float = np.inf, name: str = "band"
+) -> Band | None:
+    """The band that an argument means, as ``Band.of``; None, which is all frequencies, for None.
 
     >>> as_band((10, 80), 100)
     (10, 80)
     """
-    if value is None:
-        return None
-    try:
-        low, high = (float(v) for v in value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}={value!r} must be two frequencies in Hz, (low, high)") from None
-    if not 0 <= low < high <= nyquist * (1 + _ROUNDING):
-        raise InputError(
-            f"{name}=({low:g}, {high:g}) Hz must satisfy 0 <= low < high <= {nyquist:g} Hz, "
-            "the Nyquist limit of this record"
-        )
-    return Band(low, high)
+    return None if value is None else Band.of(value, nyquist, name)
 
 
 def chosen(

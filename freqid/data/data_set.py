@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 from freqid.checks import InputError
 from freqid.data.frequency_response import FrequencyResponse
@@ -12,7 +11,7 @@ from freqid.data.record import Record
 DataSet = Record | FrequencyResponse
 
 
-def as_data_sets(data: Any) -> tuple[DataSet, ...]:
+def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
     """One data set or several, as a tuple; ValueError where there is none, or something else."""
     sets = (data,) if isinstance(data, DataSet) else tuple(data)
     if not sets:
@@ -27,12 +26,12 @@ def as_data_sets(data: Any) -> tuple[DataSet, ...]:
 
 def channel_counts(data: DataSet) -> tuple[int, int]:
     """Numbers of outputs and inputs."""
-    return len(data.output_names or ()), len(data.input_names or ())
+    return len(data.output_names), len(data.input_names)
 
 
 def common_names(sets: Sequence[DataSet]) -> tuple[Sequence[str], Sequence[str]]:
     """Names of the inputs and of the outputs, as the first of the data sets has them."""
-    return tuple(sets[0].input_names or ()), tuple(sets[0].output_names or ())
+    return sets[0].input_names, sets[0].output_names
 
 
 def input_dt(data: DataSet) -> float:

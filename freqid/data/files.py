@@ -7,17 +7,11 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from freqid.checks import InputError, unknown
-from freqid.data.readers import READERS
+from freqid.data.readers.kinds import READERS, WRITERS
 from freqid.data.record import Record
 from freqid.lti.holds import Hold
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def read(
@@ -72,7 +66,7 @@ def read(
         if start is not None or stop is not None:
             record = record.slice(start or 0.0, stop)
         return record if detrend is None else record.detrend(detrend)
-    except ValueError as error:
+    except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
@@ -83,30 +77,10 @@ def write(record: Record, path: str | Path) -> None:
     """
     path = Path(path)
     kind = path.suffix.lower()
-    if kind not in _WRITERS:
-        raise InputError(f"{path}: {unknown('suffix', path.suffix, _WRITERS)}")
+    if kind not in WRITERS:
+        raise InputError(f"{path}: {unknown('suffix', path.suffix, WRITERS)}")
     with whole_file(path) as beside:
-        _WRITERS[kind](record.to_frame(), beside)
-
-
-def _write_csv(frame: pd.DataFrame, path: Path) -> None:
-    frame.to_csv(path, lineterminator="\n")
-
-
-def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
-    try:
-        frame.reset_index().to_parquet(path, index=False)
-    except ImportError:
-        raise InputError("Parquet needs pyarrow: pip install 'freqid[parquet]'") from None
-
-
-def _write_npz(frame: pd.DataFrame, path: Path) -> None:
-    table = frame.reset_index()
-    arrays: dict[str, Any] = {str(name): table[name].to_numpy() for name in table.columns}
-    np.savez(path, **arrays)
-
-
-_WRITERS = {".csv": _write_csv, ".parquet": _write_parquet, ".npz": _write_npz}
+        WRITERS[kind](record.to_frame(), beside)
 
 
 @contextmanager

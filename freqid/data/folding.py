@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 import scipy.signal
+from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, positive, whole
+from freqid.checks import BoolArray, FloatArray, IntArray, positive, whole
 
 
-def unfold(frequency: Any, dt: float, factor: int) -> FloatArray:
+def unfold(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:
     """The signed frequencies in Hz that fold onto ``frequency`` (Hz), (…, factor).
 
     f + m/(factor·dt) within the Nyquist limits ±1/(2 dt), for f from zero to the slow limit.
@@ -24,7 +22,7 @@ def unfold(frequency: Any, dt: float, factor: int) -> FloatArray:
     return np.asarray(frequency, dtype=float)[..., None] + shift
 
 
-def fold(frequency: Any, dt: float, factor: int) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def fold(frequency: ArrayLike, dt: float, factor: int) -> tuple[FloatArray, BoolArray]:
     """Where frequencies (Hz) land between zero and the slow Nyquist limit, and whether mirrored.
 
     >>> at, mirrored = fold([20.0, 80.0], dt=0.005, factor=2)
@@ -41,7 +39,7 @@ def fold(frequency: Any, dt: float, factor: int) -> tuple[FloatArray, npt.NDArra
 
 def merged_lines(
     frequency: FloatArray, dt: float, factor: int
-) -> tuple[FloatArray, npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
+) -> tuple[FloatArray, BoolArray, IntArray]:
     """Slow lines (Hz) onto which lines fold, whether each was mirrored, and the slow line of each.
 
     Lines that land within 1e-9 of the slow rate of one another are the same.
@@ -61,7 +59,7 @@ def low_pass(x: FloatArray, factor: int) -> FloatArray:
     return scipy.signal.sosfiltfilt(_anti_alias(factor), x, axis=0)
 
 
-def low_pass_gain(frequency: Any, dt: float, factor: int) -> FloatArray:
+def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:
     """What ``low_pass`` multiplies a sinusoid at ``frequency`` (Hz) by, sampled at ``dt`` (s)."""
     f = np.asarray(frequency, dtype=float)
     if factor == 1:

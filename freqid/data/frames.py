@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, positive, unknown
-from freqid.lti.holds import Hold
+from freqid.lti.holds import Hold, ZeroOrderHold
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from freqid.data.record import Record
 
 
 def _hold_columns() -> dict[str, type[Hold]]:
@@ -19,15 +21,21 @@ def _hold_columns() -> dict[str, type[Hold]]:
     return {kind.at(1.0).column[0]: kind for kind in Hold.named.values()}
 
 
-def record_fields(
+def record_of(
+    kind: type[Record],
     frame: pd.DataFrame,
     inputs: Sequence[str] | str | None,
     outputs: Sequence[str] | str | None,
     dt: float | None,
     hold: Hold | str | None,
     reference: str | None,
-) -> dict[str, Any]:
-    """The fields of a Record that a frame holds: columns to channels, time to periods."""
+    units: Mapping[str, str] | None,
+    resample: bool,
+) -> Record:
+    """The record of that kind that a frame holds: columns to channels, time to periods."""
+    notes: list[str] = []
+    if resample:
+        frame, notes = _regular(frame)
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     step = _sample_time(frame, dt)
@@ -38,19 +46,40 @@ def record_fields(
 
     factor = _slow_output(y)
     y = y[::factor]
-    return {
-        "u": u[:, 0] if len(u_names) == 1 else u,
-        "y": y[:, 0] if len(y_names) == 1 else y,
-        "dt": step * factor,
-        "input_dt": step,
-        "hold": _remembered(frame) if hold is None else hold,
-        "input_names": u_names,
-        "output_names": y_names,
-        "reference": None if commanded is None else commanded[::factor],
-    }
+    named = {*u_names, *y_names, "reference"}
+    return kind(
+        u[:, 0] if len(u_names) == 1 else u,
+        y[:, 0] if len(y_names) == 1 else y,
+        dt=step * factor,
+        hold=_remembered(frame) if hold is None else hold,
+        input_dt=step,
+        input_names=u_names,
+        output_names=y_names,
+        units={k: v for k, v in (units or {}).items() if k in named},
+        reference=None if commanded is None else commanded[::factor],
+        notes=tuple(notes),
+    )
 
 
-def regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+def samples_frame(record: Record) -> pd.DataFrame:
+    """The samples of a record, indexed by time in s, blanks between those of a slow output."""
+    import pandas as pd
+
+    columns: dict[str, Any] = dict(zip(record.input_names, record.inputs.T, strict=True))
+    slow = dict(zip(record.output_names, record.outputs.T, strict=True))
+    if record.reference is not None:
+        slow |= {"reference": record.reference}
+    for name, values in slow.items():
+        columns[name] = np.full(len(record.u), np.nan)
+        columns[name][:: record.factor] = values
+    if record.hold != ZeroOrderHold(record.input_dt):
+        name, value = record.hold.column
+        columns[name] = value
+    # twelve digits hide the rounding of k * dt and keep the times exactly regular on paper
+    return pd.DataFrame(columns, index=pd.Index(np.round(record.input_time, 12), name="time"))
+
+
+def _regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     """The frame on a regular time, blanks filled, by straight lines; and what was done, in words.
 
     The step is the median one. Raises ValueError for a frame without a time, or whose times do not
@@ -78,7 +107,7 @@ def regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     for name in frame.columns:
         if name == "time":
             continue
-        x = frame[name].to_numpy(dtype=float)
+        x = _numbers(frame, [name])[:, 0]
         there = np.isfinite(x)
         if not there.any():
             raise InputError(f"column {name!r} has no samples at all; leave it out")
@@ -189,7 +218,7 @@ def _remembered(frame: pd.DataFrame) -> Hold | None:
         if column in frame.columns:
             if frame[column].dtype == bool:
                 return kind.at(1.0)
-            periods = np.unique(frame[column].to_numpy(dtype=float))
+            periods = np.unique(_numbers(frame, [column]))
             if len(periods) != 1:
                 raise InputError(f"column {column!r} must hold one period; it holds {len(periods)}")
             return kind.at(positive(column, float(periods[0]), "s"))

@@ -9,16 +9,19 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, channel_names
-from freqid.data.band import as_band, chosen
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names
+from freqid.data.band import Band, chosen
 from freqid.lti.holds import Hold
 
 if TYPE_CHECKING:
+    import control
     import pandas as pd
+    import xarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class FrequencyResponse:
     """Response (outputs, inputs, frequencies) at ``frequency`` (Hz), immutable.
 
@@ -43,44 +46,51 @@ class FrequencyResponse:
 
     frequency: FloatArray
     response: ComplexArray
-    dt: float = 0.0
-    hold: Hold | None = None
-    variance: FloatArray | None = None
-    coherence: FloatArray | None = None
-    input_spectrum: FloatArray | None = None
-    input_names: Sequence[str] | None = None
-    output_names: Sequence[str] | None = None
+    dt: float
+    hold: Hold | None
+    variance: FloatArray | None
+    coherence: FloatArray | None
+    input_spectrum: FloatArray | None
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
 
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        f = np.array(self.frequency, dtype=float)
+    # written by hand: fields hold what was checked, which is less than what may be given
+    def __init__(
+        self,
+        frequency: ArrayLike,
+        response: ArrayLike,
+        dt: float = 0.0,
+        hold: Hold | None = None,
+        variance: ArrayLike | None = None,
+        coherence: ArrayLike | None = None,
+        input_spectrum: ArrayLike | None = None,
+        input_names: Sequence[str] | None = None,
+        output_names: Sequence[str] | None = None,
+    ) -> None:
+        f = np.array(frequency, dtype=float)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
             raise InputError("frequency must be finite and increasing, (K,), in Hz")
-        put(self, "frequency", _frozen(f))
-        G = np.array(self.response, dtype=complex)
+        G = np.array(response, dtype=complex)
         G = G.reshape(1, 1, -1) if G.ndim == 1 else G
         if G.ndim != 3 or G.shape[2] != len(f):
             raise InputError(
                 f"response has shape {G.shape} for {len(f)} frequencies; "
                 "expected (outputs, inputs, frequencies)"
             )
-        put(self, "response", _frozen(G))
-        if not np.isfinite(self.dt) or self.dt < 0:
-            raise InputError(f"dt={self.dt!r} must be a sample time in s, or 0 for continuous time")
+        if not np.isfinite(dt) or dt < 0:
+            raise InputError(f"dt={dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape
-        for name, shape in (
-            ("variance", G.shape),
-            ("coherence", G.shape),
-            ("input_spectrum", (m, K)),
-        ):
-            value = getattr(self, name)
-            if value is not None:
-                array = np.array(value, dtype=float)
-                if array.size != np.prod(shape):
-                    raise InputError(f"{name} has shape {array.shape}; expected {shape}")
-                put(self, name, _frozen(array.reshape(shape)))
-        for name, letter, count in (("input_names", "u", m), ("output_names", "y", p)):
-            put(self, name, channel_names(name, getattr(self, name), count, letter))
+        self.__dict__.update(
+            frequency=_frozen(f),
+            response=_frozen(G),
+            dt=dt,
+            hold=hold,
+            variance=_shaped("variance", variance, G.shape),
+            coherence=_shaped("coherence", coherence, G.shape),
+            input_spectrum=_shaped("input_spectrum", input_spectrum, (m, K)),
+            input_names=channel_names("input_names", input_names, m, "u"),
+            output_names=channel_names("output_names", output_names, p, "y"),
+        )
 
     @property
     def omega(self) -> FloatArray:
@@ -99,14 +109,14 @@ class FrequencyResponse:
 
     def select(self, limits: tuple[float, float]) -> FrequencyResponse:
         """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        keep = chosen(self.frequency, as_band(limits, name="limits"), "limits")
+        keep = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
         cut: dict[str, Any] = {
             name: None if getattr(self, name) is None else getattr(self, name)[..., keep]
             for name in ("frequency", "response", "variance", "coherence", "input_spectrum")
         }
         return dataclasses.replace(self, **cut)
 
-    def to_control(self) -> Any:
+    def to_control(self) -> control.FrequencyResponseData:
         """The response as ``control.FrequencyResponseData``.
 
         >>> FrequencyResponse([1.0, 2.0], [1.0, 0.5j], dt=0.1).to_control().ninputs
@@ -118,12 +128,14 @@ class FrequencyResponse:
             self.response,
             self.omega,
             dt=self.dt,
-            inputs=list(self.input_names or ()),
-            outputs=list(self.output_names or ()),
+            inputs=list(self.input_names),
+            outputs=list(self.output_names),
         )
 
     @classmethod
-    def from_control(cls, frd: Any, hold: Hold | None = None) -> FrequencyResponse:
+    def from_control(
+        cls, frd: control.FrequencyResponseData, hold: Hold | None = None
+    ) -> FrequencyResponse:
         """A response from ``control.FrequencyResponseData``; ValueError for anything else."""
         if not hasattr(frd, "omega") or not hasattr(frd, "frdata"):
             raise InputError(f"frd={type(frd).__name__} is not a control.FrequencyResponseData")
@@ -149,8 +161,8 @@ class FrequencyResponse:
         p, m, K = self.response.shape
         columns: dict[str, Any] = {
             "frequency": np.tile(self.frequency, p * m),
-            "output": np.repeat(list(self.output_names or ()), m * K),
-            "input": np.tile(np.repeat(list(self.input_names or ()), K), p),
+            "output": np.repeat(list(self.output_names), m * K),
+            "input": np.tile(np.repeat(list(self.input_names), K), p),
             "magnitude": self.magnitude.ravel(),
             "phase": self.phase.ravel(),
             "real": self.response.real.ravel(),
@@ -161,7 +173,7 @@ class FrequencyResponse:
                 columns[name] = getattr(self, name).ravel()
         return pd.DataFrame(columns)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> xarray.DataArray:
         """The response as an xarray.DataArray (output, input, frequency / Hz); needs xarray.
 
         Raises ValueError where xarray is not installed.
@@ -171,8 +183,8 @@ class FrequencyResponse:
         except ImportError:
             raise InputError("to_xarray needs xarray; pip install xarray") from None
         coordinates = {
-            "output": list(self.output_names or ()),
-            "input": list(self.input_names or ()),
+            "output": list(self.output_names),
+            "input": list(self.input_names),
             "frequency": self.frequency,
         }
         return xarray.DataArray(self.response, coordinates, dims=tuple(coordinates))
@@ -187,6 +199,16 @@ class FrequencyResponse:
         return f"<p>{escape(repr(self)[1:-1])}</p>" + self.to_frame().head(8).to_html(index=False)
 
 
-def _frozen(array: Any) -> Any:
+def _shaped(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+    """Values of a shape, read-only; ValueError for another number of them."""
+    if values is None:
+        return None
+    array = np.array(values, dtype=float)
+    if array.size != np.prod(shape):
+        raise InputError(f"{name} has shape {array.shape}; expected {shape}")
+    return _frozen(array.reshape(shape))
+
+
+def _frozen(array: Array) -> Array:
     array.flags.writeable = False
     return array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def check_record(record: Record) -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows: list[dict[str, Any]] = []
+    rows: list[dict[str, str | float]] = []
     channels = [
         *zip(record.input_names, record.inputs.T, strict=True),
         *zip(record.output_names, record.outputs.T, strict=True),
@@ -54,8 +54,8 @@ def check_record(record: Record) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["channel", "finding", "value", "meaning"])
 
 
-def _findings(x: FloatArray) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = []
+def _findings(x: FloatArray) -> list[dict[str, str | float]]:
+    found: list[dict[str, str | float]] = []
 
     def add(finding: str, value: float, meaning: str) -> None:
         found.append({"finding": finding, "value": float(value), "meaning": meaning})
@@ -95,7 +95,7 @@ def _findings(x: FloatArray) -> list[dict[str, Any]]:
     return found
 
 
-def _reference(record: Record) -> list[dict[str, Any]]:
+def _reference(record: Record) -> list[dict[str, str | float]]:
     u, r = record.inputs[:: record.factor][:, 0][: record.n_samples], record.reference
     assert r is not None
     if np.ptp(u) == 0 or np.ptp(r) == 0:

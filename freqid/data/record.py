@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import (
     FloatArray,
@@ -21,14 +21,15 @@ from freqid.checks import (
     whole,
 )
 from freqid.data.folding import low_pass
-from freqid.data.frames import record_fields, regular
+from freqid.data.frames import record_of, samples_frame
+from freqid.data.sampling import check_rates, less_trend, sample_at
 from freqid.lti.holds import Hold, ZeroOrderHold, as_hold
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Record:
     """One experiment: input ``u`` and output ``y``, immutable, with the hold that made it.
 
@@ -56,52 +57,50 @@ class Record:
     u: FloatArray
     y: FloatArray
     dt: float
-    hold: Hold = None  # type: ignore[assignment]
-    input_dt: float = None  # type: ignore[assignment]
-    input_names: Sequence[str] = None  # type: ignore[assignment]
-    output_names: Sequence[str] = None  # type: ignore[assignment]
-    units: Mapping[str, str] | None = None
-    reference: FloatArray | None = None
-    notes: Sequence[str] = ()
+    hold: Hold
+    input_dt: float
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    units: Mapping[str, str]
+    reference: FloatArray | None
+    notes: Sequence[str]
 
-    def __post_init__(self) -> None:
-        put = object.__setattr__
-        put(self, "dt", positive("dt", self.dt, "s"))
-        input_dt = self.dt if self.input_dt is None else positive("input_dt", self.input_dt, "s")
-        put(self, "input_dt", input_dt)
-        put(self, "u", samples("u", self.u))
-        put(self, "y", samples("y", self.y))
-        factor = self.dt / input_dt
-        if abs(factor - round(factor)) > 1e-6 * factor or round(factor) < 1:
-            raise InputError(
-                f"dt={self.dt:g} must be a whole multiple of input_dt={input_dt:g}; "
-                "resample the output first"
-            )
-        n_in, n_out, M = len(self.u), len(self.y), round(factor)
-        if not M * (n_out - 1) < n_in <= M * n_out:
-            raise InputError(
-                f"u has {n_in} samples at {input_dt:g} s and y has {n_out} at {self.dt:g} s; "
-                f"expected {M * n_out if M > 1 else n_out} samples of u: cut the longer one"
-            )
-        put(self, "hold", as_hold(self.hold, input_dt, ZeroOrderHold(input_dt)))
-        for name, letter, array in (("input_names", "u", self.u), ("output_names", "y", self.y)):
-            count = array.reshape(len(array), -1).shape[1]
-            put(self, name, channel_names(name, getattr(self, name), count, letter))
-        both = (*self.input_names, *self.output_names)
+    # written by hand: fields hold what was checked, which is less than what may be given
+    def __init__(
+        self,
+        u: ArrayLike,
+        y: ArrayLike,
+        dt: float,
+        hold: Hold | str | None = None,
+        input_dt: float | None = None,
+        input_names: Sequence[str] | None = None,
+        output_names: Sequence[str] | None = None,
+        units: Mapping[str, str] | None = None,
+        reference: ArrayLike | None = None,
+        notes: Sequence[str] = (),
+    ) -> None:
+        dt = positive("dt", dt, "s")
+        step = dt if input_dt is None else positive("input_dt", input_dt, "s")
+        fast, slow = samples("u", u), samples("y", y)
+        check_rates(dt, step, len(slow), len(fast))
+        between = as_hold(hold, step, ZeroOrderHold(step))
+        u_names = channel_names("input_names", input_names, fast.size // len(fast), "u")
+        y_names = channel_names("output_names", output_names, slow.size // len(slow), "y")
+        both = (*u_names, *y_names)
         if len(set(both)) < len(both):
             raise InputError(f"channel names {list(both)} hold a name twice; names must differ")
-        units = dict(self.units or {})
-        for name in units:
+        for name in units or {}:
             if name not in (*both, "reference"):
                 raise InputError(unknown("units", name, both))
-        put(self, "units", units)
-        if self.reference is not None:
-            put(self, "reference", samples("reference", self.reference))
-            if len(self.reference) != n_out:
-                raise InputError(
-                    f"reference has {len(self.reference)} samples and y has {n_out}; "
-                    "expected as many"
-                )
+        commanded = None if reference is None else samples("reference", reference)
+        if commanded is not None and len(commanded) != len(slow):
+            raise InputError(
+                f"reference has {len(commanded)} samples and y has {len(slow)}; expected as many"
+            )
+        self.__dict__.update(
+            u=fast, y=slow, dt=dt, hold=between, input_dt=step, input_names=u_names,
+            output_names=y_names, units=dict(units or {}), reference=commanded, notes=notes,
+        )  # fmt: skip
 
     @property
     def factor(self) -> int:
@@ -177,7 +176,8 @@ class Record:
             u = low_pass(u, factor * self.factor)
             y = low_pass(y, factor)
             reference = None if reference is None else low_pass(reference, factor)
-        return self._with(
+        return replace(
+            self,
             u=u if keep_input else u[::factor],
             y=y[::factor],
             dt=self.dt * factor,
@@ -193,8 +193,8 @@ class Record:
         >>> Record(np.arange(8.0), np.arange(8.0), dt=0.5).slice(1, 2).y
         array([2., 3.])
         """
-        first = 0 if start is None else _index(finite("start", start) / self.dt)
-        last = self.n_samples if stop is None else _index(finite("stop", stop) / self.dt)
+        first = 0 if start is None else sample_at(finite("start", start) / self.dt)
+        last = self.n_samples if stop is None else sample_at(finite("stop", stop) / self.dt)
         first, last = max(first, 0), min(last, self.n_samples)
         if last - first < 1:
             raise InputError(
@@ -202,7 +202,8 @@ class Record:
                 f"{self.duration:g} s"
             )
         M = self.factor
-        return self._with(
+        return replace(
+            self,
             u=self.u[first * M : last * M],
             y=self.y[first:last],
             reference=None if self.reference is None else self.reference[first:last],
@@ -217,7 +218,7 @@ class Record:
         array([-1.,  1.])
         """
         order = whole("order", order, least=0)
-        return self._with(u=_less_trend(self.u, order), y=_less_trend(self.y, order))
+        return replace(self, u=less_trend(self.u, order), y=less_trend(self.y, order))
 
     def with_noise(self, std: float, seed: int = 0) -> Record:
         """The record with white Gaussian noise of standard deviation ``std`` on every output.
@@ -227,14 +228,11 @@ class Record:
         if finite("std", std) < 0:
             raise InputError(f"std={std!r} must not be negative")
         noise = np.random.default_rng(seed).standard_normal(self.y.shape)
-        return self._with(y=self.y + std * noise)
+        return replace(self, y=self.y + std * noise)
 
     def with_hold(self, hold: Hold | str) -> Record:
         """The same samples with another hold remembered; names mean it at the input's period."""
-        return self._with(hold=as_hold(hold, self.input_dt))
-
-    def _with(self, **changes: Any) -> Record:
-        return dataclasses.replace(self, **changes)
+        return replace(self, hold=as_hold(hold, self.input_dt))
 
     def to_frame(self) -> pd.DataFrame:
         """Samples as a DataFrame indexed by time in s.
@@ -246,21 +244,7 @@ class Record:
         >>> Record([0.0, 1.0], [0.0, 0.5], dt=0.1).to_frame().columns.tolist()
         ['u', 'y']
         """
-        import pandas as pd
-
-        M, n = self.factor, len(self.u)
-        columns: dict[str, Any] = dict(zip(self.input_names, self.inputs.T, strict=True))
-        slow = dict(zip(self.output_names, self.outputs.T, strict=True))
-        if self.reference is not None:
-            slow |= {"reference": self.reference}
-        for name, values in slow.items():
-            columns[name] = np.full(n, np.nan)
-            columns[name][::M] = values
-        if self.hold != ZeroOrderHold(self.input_dt):
-            name, value = self.hold.column
-            columns[name] = value
-        # twelve digits hide the rounding of k * dt and keep the times exactly regular on paper
-        return pd.DataFrame(columns, index=pd.Index(np.round(self.input_time, 12), name="time"))
+        return samples_frame(self)
 
     @classmethod
     def from_frame(
@@ -288,13 +272,7 @@ class Record:
         >>> Record.from_frame(frame).dt
         0.1
         """
-        notes: list[str] = []
-        if resample:
-            frame, notes = regular(frame)
-        fields = record_fields(frame, inputs, outputs, dt, hold, reference)
-        named = {*fields["input_names"], *fields["output_names"], "reference"}
-        known = {k: v for k, v in (units or {}).items() if k in named}
-        return cls(**fields, units=known, notes=tuple(notes))
+        return record_of(cls, frame, inputs, outputs, dt, hold, reference, units, resample)
 
     def __repr__(self) -> str:
         shown = f"{self.n_samples} samples at {self.dt:g} s"
@@ -317,15 +295,3 @@ class Record:
             rows["notes"] = "; ".join(self.notes)
         body = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table><caption>Record</caption>{body}</table>"
-
-
-def _index(position: float) -> int:
-    """The first sample at or after a position; a sample time off by rounding is that sample."""
-    return int(np.ceil(position - 1e-6))
-
-
-def _less_trend(x: FloatArray, order: int) -> FloatArray:
-    t = np.linspace(-1, 1, len(x))
-    basis = np.polynomial.legendre.legvander(t, order)
-    flat = x.reshape(len(x), -1)
-    return (flat - basis @ np.linalg.lstsq(basis, flat)[0]).reshape(x.shape)

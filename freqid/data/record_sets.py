@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError
 from freqid.data.record import Record
+
+# of a closed loop: True for the records' own, samples for one record, or those of each of several
+Reference = bool | FloatArray | Sequence[FloatArray] | Sequence[float]
 
 
 def as_records(records: Record | Sequence[Record]) -> list[Record]:
@@ -35,13 +38,13 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
     return sets
 
 
-def references_of(sets: Sequence[Record], reference: Any) -> list[FloatArray] | None:
+def references_of(sets: Sequence[Record], reference: Reference | None) -> list[FloatArray] | None:
     """One reference signal a record; ValueError where it is missing or of another length."""
     if reference is None or reference is False:
         return None
     if reference is True:
-        given: list[Any] = [r.reference for r in sets]
-        if any(x is None for x in given):
+        given: list[ArrayLike] = [r.reference for r in sets if r.reference is not None]
+        if len(given) < len(sets):
             raise InputError(
                 "reference=True, but a record has none; give it to Record(..., reference=...) or "
                 "read(..., reference='column')"
@@ -52,7 +55,8 @@ def references_of(sets: Sequence[Record], reference: Any) -> list[FloatArray] | 
         given = list(reference)
     if len(given) != len(sets):
         raise InputError(f"reference has {len(given)} signals for {len(sets)} records")
-    signals = [np.asarray(x, dtype=float).reshape(len(x), -1) for x in given]
+    arrays = [np.asarray(x, dtype=float) for x in given]
+    signals = [x.reshape(len(x), -1) for x in arrays]
     for x, r in zip(signals, sets, strict=True):
         if len(x) != r.n_samples or x.shape[1] != r.n_inputs:
             raise InputError(

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from freqid.checks import Array, FloatArray, InputError, choice, positive
+from freqid.checks import FloatArray, InputError, choice, positive
+from freqid.data.band import Band
 from freqid.data.folding import merged_lines, unfold
+from freqid.excitation.filters import Filter, power_gain
 from freqid.lti.quadrature import panel_nodes, resolved
 
 if TYPE_CHECKING:
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
 class InputSpectrum:
     """Base of the spectra; they can be added to one another and multiplied by a number."""
 
-    def density(self, frequency: Any, dt: float) -> FloatArray:
+    def density(self, frequency: ArrayLike, dt: float) -> FloatArray:
         """One-sided density in u²/Hz at ``frequency`` (Hz) of the sequence at ``dt`` (s)."""
         return np.zeros(np.shape(frequency))
 
@@ -36,7 +39,7 @@ class InputSpectrum:
         """Frequencies in Hz between which the density is smooth; empty where there is none."""
         return np.zeros(0)
 
-    def aliased_density(self, frequency: Any, dt: float, factor: int = 1) -> FloatArray:
+    def aliased_density(self, frequency: ArrayLike, dt: float, factor: int = 1) -> FloatArray:
         """Density in u²/Hz after every ``factor``-th sample has been kept: the sum of its folds.
 
         >>> round(float(WhiteSpectrum().aliased_density([10.0], dt=0.5e-3, factor=10)[0]), 9)
@@ -82,7 +85,7 @@ class InputSpectrum:
             frames.insert(0, pd.DataFrame({"frequency": f, "density": density}))
         return pd.concat(frames, ignore_index=True)
 
-    def __add__(self, other: Any) -> InputSpectrum:
+    def __add__(self, other: object) -> InputSpectrum:
         if not isinstance(other, InputSpectrum):
             return NotImplemented
         return SumSpectrum((self, other))
@@ -115,11 +118,12 @@ class ChirpSpectrum(InputSpectrum):
         choice("method", self.method, ("linear", "log"))
         positive("amplitude", self.amplitude)
 
-    def density(self, frequency: Any, dt: float) -> FloatArray:
+    def density(self, frequency: ArrayLike, dt: float) -> FloatArray:
         """One-sided density in u²/Hz at ``frequency`` (Hz)."""
         below_nyquist(self.high, dt)
         f = np.asarray(frequency, dtype=float)
-        inside = (f >= self.low) & (f <= self.high)
+        # one-sided: a band masks frequencies of either sign
+        inside = Band(self.low, self.high).inside(f) & (f > 0)
         power = self.amplitude**2 / 2
         if self.method == "linear":
             return np.where(inside, power / (self.high - self.low), 0.0)
@@ -140,7 +144,7 @@ class WhiteSpectrum(InputSpectrum):
     def __post_init__(self) -> None:
         positive("variance", self.variance)
 
-    def density(self, frequency: Any, dt: float) -> FloatArray:
+    def density(self, frequency: ArrayLike, dt: float) -> FloatArray:
         """One-sided density in u²/Hz at ``frequency`` (Hz)."""
         return np.full(np.shape(frequency), 2 * dt * self.variance)
 
@@ -200,13 +204,13 @@ class FilteredSpectrum(InputSpectrum):
     0.052632
     """
 
-    system: Any
+    system: Filter
     source: InputSpectrum | None = None
 
     def _source(self) -> InputSpectrum:
         return WhiteSpectrum() if self.source is None else self.source
 
-    def density(self, frequency: Any, dt: float) -> FloatArray:
+    def density(self, frequency: ArrayLike, dt: float) -> FloatArray:
         """One-sided density in u²/Hz at ``frequency`` (Hz)."""
         return power_gain(self.system, frequency, dt) * self._source().density(frequency, dt)
 
@@ -226,7 +230,7 @@ class SumSpectrum(InputSpectrum):
 
     parts: tuple[InputSpectrum, ...]
 
-    def density(self, frequency: Any, dt: float) -> FloatArray:
+    def density(self, frequency: ArrayLike, dt: float) -> FloatArray:
         """One-sided density in u²/Hz at ``frequency`` (Hz)."""
         return np.sum([p.density(frequency, dt) for p in self.parts], axis=0)
 
@@ -252,7 +256,7 @@ class ScaledSpectrum(InputSpectrum):
     def __post_init__(self) -> None:
         positive("factor", self.factor)
 
-    def density(self, frequency: Any, dt: float) -> FloatArray:
+    def density(self, frequency: ArrayLike, dt: float) -> FloatArray:
         """One-sided density in u²/Hz at ``frequency`` (Hz)."""
         return self.factor * self.inner.density(frequency, dt)
 
@@ -264,36 +268,6 @@ class ScaledSpectrum(InputSpectrum):
     def edges(self, dt: float) -> FloatArray:
         """Those of the spectrum itself."""
         return self.inner.edges(dt)
-
-
-def power_gain(system: Any, frequency: Any, dt: float) -> FloatArray:
-    """|H|² of a control system, a tuple (b, a) in z, or a function of ω (rad/s).
-
-    Raises ValueError for a discrete system of another sample time, or several channels.
-    """
-    f = np.asarray(frequency, dtype=float)
-    omega = 2 * np.pi * f
-    if isinstance(system, tuple) and len(system) == 2:
-        z = np.exp(1j * omega * dt)
-        H: Array = np.polyval(system[0], z) / np.polyval(system[1], z)
-    elif hasattr(system, "ninputs"):
-        if (system.ninputs, system.noutputs) != (1, 1):
-            raise InputError(f"system has {system.ninputs} inputs and {system.noutputs} outputs")
-        if system.dt is not None and system.dt is not True and system.dt > 0:
-            if not np.isclose(system.dt, dt, rtol=1e-9):
-                raise InputError(f"system has dt={system.dt:g} s; the sequence has {dt:g} s")
-            s = np.exp(1j * omega.ravel() * dt)
-        else:
-            s = np.exp(1j * omega.ravel() * dt) if system.dt is True else 1j * omega.ravel()
-        H = np.asarray(system(s, squeeze=True)).reshape(f.shape)
-    elif callable(system):
-        H = np.asarray(system(omega))
-    else:
-        raise InputError(
-            f"system={type(system).__name__} is no filter; expected a control system, a tuple "
-            "(b, a) of polynomials in z, or a function of omega (rad/s)"
-        )
-    return np.abs(H) ** 2
 
 
 def below_nyquist(highest: float, dt: float) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.fft
 import scipy.optimize
+from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, choice, positive, whole
+from freqid.checks import FloatArray, InputError, IntArray, choice, positive, steps, whole
 from freqid.excitation.signal_spectra import multisine_lines
 
 # rounds of clipping; the norms then taken in turn; entries of a Jacobian that still is quick
@@ -27,7 +26,7 @@ def multisine(
     crest: str = "minimise",
     seed: int = 0,
     rms: float = 1.0,
-    powers: Any = None,
+    powers: ArrayLike | None = None,
 ) -> FloatArray:
     """A periodic sum of cosines at the multiples of 1/period in ``band``, (N,).
 
@@ -49,10 +48,7 @@ def multisine(
     True
     """
     positive("rms", rms)
-    count = positive("period", period, "s") / positive("dt", dt, "s")
-    N = round(count)
-    if N < 2 or abs(count - N) > 1e-6 * max(count, 1):
-        raise InputError(f"period={period:g} s must be a whole number of dt={dt:g} s")
+    N = steps("period", period, dt, least=2)
     repeats = whole("periods", periods)
     choice("crest", crest, ("minimise", "schroeder", "random"))
     rng = np.random.default_rng(whole("seed", seed, least=0))
@@ -71,7 +67,7 @@ def multisine(
     return np.tile(rms * lines.signal(phases, N), repeats)
 
 
-def _amplitudes(powers: Any, count: int) -> FloatArray:
+def _amplitudes(powers: ArrayLike | None, count: int) -> FloatArray:
     """Amplitudes whose sum of squares is 2, which makes an rms of 1."""
     share = np.ones(count) if powers is None else np.asarray(powers, dtype=float)
     if share.shape != (count,) or not np.isfinite(share).all() or (share < 0).any():
@@ -87,7 +83,7 @@ def _amplitudes(powers: Any, count: int) -> FloatArray:
 class _Lines:
     """Harmonics k of a period and their amplitudes."""
 
-    k: npt.NDArray[Any]
+    k: IntArray
     amplitudes: FloatArray
 
     def signal(self, phases: FloatArray, N: int) -> FloatArray:

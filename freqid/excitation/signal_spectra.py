@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, positive, whole
+from freqid.checks import FloatArray, InputError, IntArray, positive, whole
+from freqid.data.band import Band
 from freqid.data.record import Record
 from freqid.excitation.input_spectra import InputSpectrum, LineSpectrum
 
@@ -23,12 +24,10 @@ def MultisineSpectrum(band: tuple[float, float], period: float, power: float = 1
     return LineSpectrum(f.tolist(), [positive("power", power) / len(f)] * len(f))
 
 
-def multisine_lines(band: tuple[float, float], period: float) -> FloatArray:
+def multisine_lines(band: tuple[float, float], period: float) -> IntArray:
     """Whole numbers k with k/period inside the band; ValueError for none."""
-    low, high = float(band[0]), float(band[1])
+    low, high = Band.of(band)
     positive("period", period, "s")
-    if not 0 <= low < high:
-        raise InputError(f"band=({low:g}, {high:g}) Hz must satisfy 0 <= low < high")
     first = max(int(np.ceil(low * period - 1e-9)), 1)
     k = np.arange(first, int(np.floor(high * period + 1e-9)) + 1)
     if len(k) == 0:

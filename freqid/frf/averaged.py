@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.signal
+from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, whole
 from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
-from freqid.data.record_sets import as_records, references_of
+from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.frf.measured import measured
 
 # segments of a single record where none are asked for
 _SEGMENTS = 8
+# windows that suit whole periods, which nothing need overlap
+_WHOLE = ("boxcar", "rectangular")
+
+# what scipy.signal.csd takes under these names
+Window = str | tuple[str | float, ...] | ArrayLike
+Detrend = str | bool | Callable[[FloatArray], FloatArray]
 
 
 def h1(
@@ -24,10 +31,10 @@ def h1(
     segment: int | None = None,
     *,
     band: tuple[float, float] | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     overlap: float | None = None,
-    detrend: Any = "constant",
-    reference: Any = None,
+    detrend: Detrend = "constant",
+    reference: Reference | None = None,
 ) -> FrequencyResponse:
     """S_yu S_uu⁻¹: the least-squares response where the noise is on the output.
 
@@ -54,7 +61,7 @@ def h1(
     >>> bool(np.median(h1(record, 500).coherence) > 0.99)
     True
     """
-    s = _spectral(records, segment, band, window, overlap, detrend, reference)
+    s = _spectral(records, _Averaging(segment, band, window, overlap, detrend), reference)
     if s.reference is not None:
         return _joint(s)
     return _response(s, s.yu @ np.linalg.inv(s.uu))
@@ -65,15 +72,15 @@ def h2(
     segment: int | None = None,
     *,
     band: tuple[float, float] | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     overlap: float | None = None,
-    detrend: Any = "constant",
+    detrend: Detrend = "constant",
 ) -> FrequencyResponse:
     """S_yy S_uy⁻¹: for noise on the input. Arguments, result and errors as in ``h1``.
 
     It needs as many outputs as inputs.
     """
-    s = _spectral(records, segment, band, window, overlap, detrend, None)
+    s = _spectral(records, _Averaging(segment, band, window, overlap, detrend))
     if s.yu.shape[-1] != s.yu.shape[-2]:
         raise InputError(
             f"records have {s.yu.shape[-1]} inputs and {s.yu.shape[-2]} outputs; h2 needs as many "
@@ -88,9 +95,9 @@ def hv(
     segment: int | None = None,
     *,
     band: tuple[float, float] | None = None,
-    window: Any = "hann",
+    window: Window = "hann",
     overlap: float | None = None,
-    detrend: Any = "constant",
+    detrend: Detrend = "constant",
 ) -> FrequencyResponse:
     """Total least squares, for noise on both ends in proportion to the signals.
 
@@ -98,7 +105,7 @@ def hv(
 
     Source: Rocklin, Crowley and Vold, Proc. 3rd International Modal Analysis Conference, 1985.
     """
-    s = _spectral(records, segment, band, window, overlap, detrend, None)
+    s = _spectral(records, _Averaging(segment, band, window, overlap, detrend))
     m, p = s.uu.shape[-1], s.yy.shape[-1]
     G = np.empty((len(s.frequency), p, m), complex)
     for o in range(p):
@@ -106,12 +113,40 @@ def hv(
         joint[:, :m, :m], joint[:, m, m] = s.uu, s.yy[:, o, o]
         joint[:, m, :m] = s.yu[:, o]
         joint[:, :m, m] = s.yu[:, o].conj()
-        size = np.sqrt(np.einsum("kii->ki", joint).real)
+        size = np.sqrt(_powers(joint))
         size = np.where(size > 0, size, 1)
         # the direction with the least power holds nothing but noise
         least = np.linalg.eigh(joint / (size[:, :, None] * size[:, None, :]))[1][:, :, 0] / size
         G[:, o] = (-least[:, :m] / least[:, m:]).conj()
     return _response(s, G)
+
+
+@dataclass(frozen=True)
+class _Averaging:
+    """How records are cut, weighted and averaged: the arguments that all estimates share."""
+
+    segment: int | None
+    band: tuple[float, float] | None
+    window: Window
+    overlap: float | None
+    detrend: Detrend
+
+    def cut(self, sets: Sequence[Record]) -> tuple[int, int]:
+        """Samples of a segment, and to the next; ValueError where they do not fit."""
+        shortest = min(r.n_samples for r in sets)
+        default = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
+        length = whole("segment", default if self.segment is None else self.segment, least=2)
+        if length > shortest:
+            raise InputError(
+                f"segment={length} is longer than the shortest record, {shortest} samples"
+            )
+        half = 0.0 if isinstance(self.window, str) and self.window in _WHOLE else 0.5
+        overlap = half if self.overlap is None else self.overlap
+        if not 0 <= overlap < 1:
+            raise InputError(
+                f"overlap={overlap!r} must be a part of the segment, from 0 to below 1"
+            )
+        return length, length - int(length * overlap)
 
 
 @dataclass(frozen=True)
@@ -128,79 +163,64 @@ class _Spectral:
 
 
 def _spectral(
-    records: Any,
-    segment: int | None,
-    band: tuple[float, float] | None,
-    window: Any,
-    overlap: float | None,
-    detrend: Any,
-    reference: Any,
+    records: Record | Sequence[Record], averaging: _Averaging, reference: Reference | None = None
 ) -> _Spectral:
     sets = as_records(records)
-    first = sets[0]
-    shortest = min(r.n_samples for r in sets)
-    if segment is None:
-        segment = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
-    length = whole("segment", segment, least=2)
-    if length > shortest:
-        raise InputError(f"segment={length} is longer than the shortest record, {shortest} samples")
-    if overlap is None:
-        named = isinstance(window, str) and window in ("boxcar", "rectangular")
-        overlap = 0.0 if named else 0.5
-    if not 0 <= overlap < 1:
-        raise InputError(f"overlap={overlap!r} must be a part of the segment, from 0 to below 1")
-    step = length - int(length * overlap)
-    options = {
-        "fs": 1 / first.dt, "window": window, "nperseg": length, "noverlap": length - step,
-        "detrend": detrend,
-    }  # fmt: skip
+    first, m = sets[0], sets[0].n_inputs
+    length, step = averaging.cut(sets)
     signals = references_of(sets, reference)
-    total: dict[str, Any] = {}
+    pairs = ["uu", "yu", "yy"] + (["yr", "ur", "rr"] if signals is not None else [])
+    total: dict[str, ComplexArray] = {}
     count = 0
     for i, r in enumerate(sets):
         n = (r.n_samples - length) // step + 1
-        u, y = r.inputs[:: r.factor].T[:, : r.n_samples], r.outputs.T
-        channels = {"u": u, "y": y}
+        channels = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}
         if signals is not None:
             channels["r"] = signals[i].T
-        pairs = ["uu", "yu", "yy"] + (["yr", "ur", "rr"] if signals is not None else [])
         for pair in pairs:
             a, b = channels[pair[0]], channels[pair[1]]
             # scipy's csd(x, y) is E[x* y]: the pair (b, a) gives E[a b*]
-            f, S = scipy.signal.csd(b[None, :], a[:, None], **options)
+            f, S = scipy.signal.csd(
+                b[None, :], a[:, None], 1 / first.dt, averaging.window, length, length - step,
+                detrend=averaging.detrend,
+            )  # fmt: skip
             total[pair] = total.get(pair, 0) + n * np.moveaxis(S, -1, 0)
         count += n
-    keep = chosen(f, as_band(band, first.nyquist), positive=True)
-    averaged = {pair: S[keep] / count for pair, S in total.items()}
-    averages = _independent(window, length, step, count)
-    m = first.n_inputs
+    keep = chosen(f, as_band(averaging.band, first.nyquist), positive=True)
+    mean = {pair: S[keep] / count for pair, S in total.items()}
+    averages = _independent(averaging.window, length, step, count)
     if count < m:
         raise InputError(
             f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
             "segments or more experiments"
         )
-    _excited(averaged["uu"], first)
+    _excited(mean["uu"], first)
     joint = None
     if signals is not None:
-        ur, rr = averaged["ur"], averaged["rr"]
-        level = np.abs(ur) ** 2 / (
-            np.einsum("kii->ki", averaged["uu"]).real[:, :, None]
-            * np.einsum("kii->ki", rr).real[:, None, :]
+        joint = mean["yr"], mean["ur"], mean["rr"]
+        _related(mean["uu"], mean["ur"], mean["rr"], averages)
+    return _Spectral(f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, joint)
+
+
+def _related(uu: ComplexArray, ur: ComplexArray, rr: ComplexArray, averages: float) -> None:
+    """ValueError for a reference that has no more to do with the input than chance."""
+    level = np.abs(ur) ** 2 / (_powers(uu)[:, :, None] * _powers(rr)[:, None, :])
+    related = np.median(level.max(axis=-1))
+    if related < 2 / max(averages, 1) and averages > 2:
+        raise InputError(
+            f"reference has a coherence of {related:.2g} with the input, no more than chance; "
+            "it did not drive this experiment"
         )
-        related = np.median(level.max(axis=-1))
-        if related < 2 / max(averages, 1) and averages > 2:
-            raise InputError(
-                f"reference has a coherence of {related:.2g} with the input, no more than chance; "
-                "it did not drive this experiment"
-            )
-        joint = (averaged["yr"], ur, rr)
-    return _Spectral(
-        f[keep], averaged["uu"], averaged["yu"], averaged["yy"], averages, first, joint
-    )
+
+
+def _powers(S: ComplexArray) -> FloatArray:
+    """The powers on the diagonals of spectral matrices, (K, channels)."""
+    return np.einsum("kii->ki", S).real
 
 
 def _excited(uu: ComplexArray, first: Record) -> None:
-    power = np.einsum("kii->ki", uu).real
+    """ValueError for inputs that stand still, or move together."""
+    power = _powers(uu)
     if not (power.max(axis=0) > 0).all():
         silent = first.input_names[int(np.argmin(power.max(axis=0)))]
         raise InputError(f"input {silent!r} is constant in the band; it excites nothing")
@@ -213,7 +233,7 @@ def _excited(uu: ComplexArray, first: Record) -> None:
         )
 
 
-def _independent(window: Any, length: int, step: int, count: int) -> float:
+def _independent(window: Window, length: int, step: int, count: int) -> float:
     """How many independent averages overlapping segments are worth (Welch, 1967)."""
     given = isinstance(window, (list, np.ndarray))
     w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
@@ -227,21 +247,15 @@ def _independent(window: Any, length: int, step: int, count: int) -> float:
 
 def _response(s: _Spectral, G: ComplexArray) -> FrequencyResponse:
     """The response with the variance and the coherence that the spectra tell."""
-    m = G.shape[-1]
     inverse = np.linalg.inv(s.uu)
-    explained = np.einsum("kpm,kmn,kpn->kp", s.yu, inverse, s.yu.conj()).real
-    output = np.einsum("kpp->kp", s.yy).real
-    safe = np.where(output > 0, output, 1)
-    coherence = np.clip(explained / safe, 0, 1)
-    noise = np.maximum(output - explained, 0)
-    freedom = s.averages - m
-    spread = np.einsum("kmm->km", inverse).real
+    explained = _explained(s.yu, inverse)
+    freedom = s.averages - G.shape[-1]
     variance = None
     if freedom > 0.5:
         # what is left is too small by the parameters that were fitted to it
-        noise = noise * s.averages / freedom
-        variance = noise[:, :, None] * spread[:, None, :] / s.averages
-    return _packed(s, G, variance, np.broadcast_to(coherence[:, :, None], G.shape))
+        noise = np.maximum(_powers(s.yy) - explained, 0) * s.averages / freedom
+        variance = noise[:, :, None] * _powers(inverse)[:, None, :] / s.averages
+    return _packed(s, G, variance, explained)
 
 
 def _joint(s: _Spectral) -> FrequencyResponse:
@@ -252,30 +266,22 @@ def _joint(s: _Spectral) -> FrequencyResponse:
     G = yr @ back
     uy = s.yu.conj().swapaxes(-1, -2)
     Gh = G.conj().swapaxes(-1, -2)
-    error = s.yy - G @ uy - s.yu @ Gh + G @ s.uu @ Gh
-    noise = np.maximum(np.einsum("kpp->kp", error).real, 0)
+    noise = np.maximum(_powers(s.yy - G @ uy - s.yu @ Gh + G @ s.uu @ Gh), 0)
     spread = np.einsum("kmn,knl,kml->km", back.conj().swapaxes(-1, -2), rr, back.swapaxes(-1, -2))
     freedom = max(s.averages - G.shape[-1], 0.5)
     variance = noise[:, :, None] * np.abs(spread)[:, None, :] / freedom
-    inverse = np.linalg.inv(rr)
-    explained = np.einsum("kpm,kmn,kpn->kp", yr, inverse, yr.conj()).real
-    output = np.einsum("kpp->kp", s.yy).real
-    coherence = np.clip(explained / np.where(output > 0, output, 1), 0, 1)
-    return _packed(s, G, variance, np.broadcast_to(coherence[:, :, None], G.shape))
+    return _packed(s, G, variance, _explained(yr, np.linalg.inv(rr)))
+
+
+def _explained(yx: ComplexArray, inverse: ComplexArray) -> FloatArray:
+    """The outputs' power that signals x explain, (K, outputs), from S_yx and S_xx⁻¹."""
+    return np.einsum("kpm,kmn,kpn->kp", yx, inverse, yx.conj()).real
 
 
 def _packed(
-    s: _Spectral, G: ComplexArray, variance: FloatArray | None, coherence: Array
+    s: _Spectral, G: ComplexArray, variance: FloatArray | None, explained: FloatArray
 ) -> FrequencyResponse:
-    first = s.first
-    return FrequencyResponse(
-        s.frequency,
-        np.moveaxis(G, 0, -1),
-        dt=first.dt,
-        hold=first.hold,
-        variance=None if variance is None else np.moveaxis(variance, 0, -1),
-        coherence=np.moveaxis(coherence, 0, -1),
-        input_spectrum=np.einsum("kmm->mk", s.uu).real,
-        input_names=first.input_names,
-        output_names=first.output_names,
-    )
+    output = _powers(s.yy)
+    coherence = np.clip(explained / np.where(output > 0, output, 1), 0, 1)
+    shown = np.broadcast_to(coherence[:, :, None], G.shape)
+    return measured(s.first, s.frequency, G, variance, shown, _powers(s.uu).T)

@@ -9,6 +9,7 @@ import numpy as np
 from freqid.checks import InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
+from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra
 
 
@@ -69,14 +70,5 @@ def etfe(
         if count > first.n_inputs:
             noise = (np.abs(Y - G @ U) ** 2).sum(axis=-1) / (count - first.n_inputs)
             spread = np.einsum("kmm->km", inverse).real
-            variance = np.moveaxis(noise[:, :, None] * spread[:, None, :], 0, -1)
-    return FrequencyResponse(
-        s.frequency[keep],
-        np.moveaxis(G, 0, -1),
-        dt=first.dt,
-        hold=first.hold,
-        variance=variance,
-        input_spectrum=power[keep].T,
-        input_names=first.input_names,
-        output_names=first.output_names,
-    )
+            variance = noise[:, :, None] * spread[:, None, :]
+    return measured(first, s.frequency[keep], G, variance, None, power[keep].T)

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray, InputError, positive, whole
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, steps, whole
 from freqid.data.band import as_band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.data.record_sets import as_records
+from freqid.frf.measured import measured
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,10 +80,7 @@ def distortion(
             f"records have {first.n_inputs} inputs and {first.n_outputs} outputs; distortion needs "
             "one of each, at one rate"
         )
-    count = positive("period", period, "s") / first.dt
-    n = round(count)
-    if abs(count - n) > 1e-6 * count:
-        raise InputError(f"period={period:g} s must be a whole number of dt={first.dt:g} s")
+    n = steps("period", period, first.dt)
     skip = whole("skip", skip, least=0)
     periods = min(r.n_samples for r in sets) // n - skip
     if periods < 2:
@@ -126,7 +124,7 @@ def _mean_variance(X: ComplexArray, axis: int) -> FloatArray:
 
 
 def _robust(
-    first: Record, f: FloatArray, U: ComplexArray, Y: ComplexArray, excited: FloatArray
+    first: Record, f: FloatArray, U: ComplexArray, Y: ComplexArray, excited: BoolArray
 ) -> Distortion:
     U, Y = U[..., excited], Y[..., excited]
     each = Y.mean(axis=1) / U.mean(axis=1)
@@ -150,8 +148,8 @@ def _fast(
     f: FloatArray,
     U: ComplexArray,
     Y: ComplexArray,
-    excited: FloatArray,
-    quiet: FloatArray,
+    excited: BoolArray,
+    quiet: BoolArray,
 ) -> Distortion:
     mean_u, mean_y = U.mean(axis=0), Y.mean(axis=0)
     G = mean_y[excited] / mean_u[excited]
@@ -177,16 +175,7 @@ def _fast(
 def _response(
     first: Record, f: FloatArray, G: ComplexArray, variance: FloatArray, level: FloatArray
 ) -> FrequencyResponse:
-    return FrequencyResponse(
-        f,
-        G,
-        dt=first.dt,
-        hold=first.hold,
-        variance=variance,
-        input_spectrum=level**2,
-        input_names=first.input_names,
-        output_names=first.output_names,
-    )
+    return measured(first, f, G[:, None, None], variance[:, None, None], None, level[None] ** 2)
 
 
 def _table(

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -74,7 +73,7 @@ def spectra(
     """
     inside = as_band(limits, 0.5 / record.input_dt)
     key = inside, lifted and record.factor > 1
-    known: dict[Any, Spectra] = record.__dict__.setdefault("_spectra", {})
+    known: dict[tuple[Band | None, bool], Spectra] = record.__dict__.setdefault("_spectra", {})
     if key not in known:
         computed = _compute(record, inside, key[1])
         while len(known) >= _REMEMBERED:
@@ -132,10 +131,7 @@ def dft_at(x: Sequence[FloatArray], lines: IntArray) -> ComplexArray:
     N = len(x[0])
     parts = 8 if N >= _LONG else 4
     first, last = int(lines[0]), int(lines[-1])
-    if last - first + 1 == len(lines):
-        wanted: Any = slice(first, last + 1)
-    else:
-        wanted = lines
+    wanted = slice(first, last + 1) if last - first + 1 == len(lines) else lines
     if N < 2**16 or N % parts or lines[-1] > N // (2 * parts) or len(lines) > N // 8:
         return np.array([scipy.fft.rfft(signal)[wanted] for signal in x])
     twiddle = _twiddle(lines, N)

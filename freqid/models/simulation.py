@@ -146,6 +146,6 @@ def simulate(
         y[:, 0] if y.shape[1] == 1 and u.ndim == 1 else y,
         dt,
         hold=between,
-        input_names=input_names,  # type: ignore[arg-type]
-        output_names=output_names,  # type: ignore[arg-type]
+        input_names=input_names,
+        output_names=output_names,
     )

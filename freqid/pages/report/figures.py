@@ -68,7 +68,7 @@ def _responses(est: Estimate) -> list[Figure]:
     data, fitted = Shown(some, "data", _DATA), Shown(model, "model", _ORANGE)
     return [
         _figure(
-            f"Frequency response, {measured.input_names[i]} to {measured.output_names[o]}",  # type: ignore[index]
+            f"Frequency response, {measured.input_names[i]} to {measured.output_names[o]}",
             "Drag to zoom, double-click to see all again. The data are the ratio of "
             "the DFTs, whose scatter at weak lines is no fault of the model.",
             bode_traces(bode_curve(data, model, (o, i), scattered=True), "markers")

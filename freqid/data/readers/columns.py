@@ -1,0 +1,55 @@
+"""Named arrays of any file as columns of one length."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import Array, InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
+    """Named arrays as columns: matrices become name1, name2, …, scalars are left out.
+
+    The longest arrays are the samples; shorter ones whose length divides it are slow outputs, with
+    blanks between. A scalar ``dt`` and no time makes one. Raises ValueError where nothing fits.
+    """
+    import pandas as pd
+
+    columns: dict[str, Array] = {}
+    scalars: dict[str, float] = {}
+    for name, value in arrays.items():
+        try:
+            x = np.squeeze(np.asarray(value, dtype=float))
+        except (TypeError, ValueError):
+            continue
+        if x.ndim == 0:
+            scalars[name] = float(x)
+        elif x.ndim == 1:
+            columns[name] = x
+        elif x.ndim == 2:
+            x = x if x.shape[0] >= x.shape[1] else x.T
+            columns |= {f"{name}{i + 1}": x[:, i] for i in range(x.shape[1])}
+    if not columns:
+        raise InputError("holds no arrays of samples")
+    N = max(len(x) for x in columns.values())
+    full: dict[str, Array] = {}
+    for name, x in columns.items():
+        if len(x) == N:
+            full[name] = x
+        elif len(x) > 1 and N % len(x) == 0 and name != "time":
+            full[name] = np.full(N, np.nan)
+            full[name][:: N // len(x)] = x
+        else:
+            raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
+    if "time" not in full and "t" in full:
+        full["time"] = full.pop("t")
+    step = scalars.get("dt", scalars.get("Ts"))
+    if "time" not in full and step is not None:
+        full["time"] = step * np.arange(N)
+    return pd.DataFrame(full)

@@ -1,0 +1,55 @@
+"""Which function reads and writes files of which suffix, and the errors that all kinds share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from freqid.checks import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    Reader = Callable[[Path], pd.DataFrame]
+    Writer = Callable[[pd.DataFrame, Path], None]
+
+Function = TypeVar("Function")
+
+READERS: dict[str, Reader] = {}
+WRITERS: dict[str, Writer] = {}
+
+
+def reads(*suffixes: str) -> Callable[[Reader], Reader]:
+    """Decorator of a function that makes a frame of a file, for the suffixes of its kind."""
+    return _registered(READERS, suffixes)
+
+
+def writes(*suffixes: str) -> Callable[[Writer], Writer]:
+    """Decorator of a function that writes a frame, indexed by time, to a file."""
+    return _registered(WRITERS, suffixes)
+
+
+def _registered(
+    known: dict[str, Function], suffixes: Iterable[str]
+) -> Callable[[Function], Function]:
+    def register(function: Function) -> Function:
+        known.update(dict.fromkeys(suffixes, function))
+        return function
+
+    return register
+
+
+def missing(kind: str, package: str, extra: str) -> InputError:
+    """The error of a file that needs a package that is not installed."""
+    return InputError(f"is {kind}, which needs {package}: pip install 'freqid[{extra}]'")
+
+
+def damaged(kind: str, error: Exception) -> InputError:
+    """The error of a file that is not what its suffix says."""
+    return InputError(f"is not {kind} or is damaged ({first_line(error)})")
+
+
+def first_line(error: Exception) -> str:
+    """What an error says, in one line."""
+    return (str(error).splitlines() or [type(error).__name__])[0]

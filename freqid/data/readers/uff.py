@@ -1,0 +1,42 @@
+"""Universal files: time responses of data sets 58, by pyuff (extra ``uff``)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import Array, InputError
+from freqid.data.readers.columns import columns_of
+from freqid.data.readers.kinds import damaged, missing, reads
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@reads(".uff", ".unv")
+def read_uff(path: Path) -> pd.DataFrame:
+    """The time responses of a UFF as columns; ValueError for none of them, or without pyuff."""
+    try:
+        import pyuff
+    except ImportError:
+        raise missing("UFF58", "pyuff", "uff") from None
+    try:
+        sets = pyuff.UFF(str(path)).read_sets()
+    except Exception as error:
+        # pyuff has errors of many kinds for a file that is not what it says
+        raise damaged("UFF58", error) from None
+    sets = [sets] if isinstance(sets, dict) else list(sets)
+    arrays: dict[str, Array] = {}
+    for number, s in enumerate(sets):
+        if s.get("type") != 58 or s.get("func_type") != 1:
+            continue
+        name = str(s.get("id1") or s.get("rsp_ent_name") or "").strip()
+        if not name or name.upper() == "NONE":
+            name = f"channel{number + 1}"
+        arrays[name] = np.real(s["data"])
+        arrays.setdefault("time", np.asarray(s["x"]))
+    if not arrays:
+        raise InputError("holds no time responses (data sets 58 of function type 1)")
+    return columns_of(arrays)

@@ -1,0 +1,35 @@
+"""Arithmetic of samples: rates that divide one another, positions in time, trends."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError
+
+
+def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
+    """ValueError unless there is a whole number of input samples for each output sample."""
+    factor = dt / input_dt
+    M = round(factor)
+    if abs(factor - M) > 1e-6 * factor or M < 1:
+        raise InputError(
+            f"dt={dt:g} must be a whole multiple of input_dt={input_dt:g}; "
+            "resample the output first"
+        )
+    if not M * (n_out - 1) < n_in <= M * n_out:
+        raise InputError(
+            f"u has {n_in} samples at {input_dt:g} s and y has {n_out} at {dt:g} s; "
+            f"expected {M * n_out} samples of u: cut the longer one"
+        )
+
+
+def sample_at(position: float) -> int:
+    """The first sample at or after a position; a sample time off by rounding is that sample."""
+    return int(np.ceil(position - 1e-6))
+
+
+def less_trend(x: FloatArray, order: int) -> FloatArray:
+    """Samples (N,) or (N, channels) less their least-squares polynomial in time."""
+    basis = np.polynomial.legendre.legvander(np.linspace(-1, 1, len(x)), order)
+    flat = x.reshape(len(x), -1)
+    return (flat - basis @ np.linalg.lstsq(basis, flat)[0]).reshape(x.shape)

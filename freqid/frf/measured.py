@@ -1,0 +1,34 @@
+"""What every estimator ends with: its numbers as the FrequencyResponse of a record."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.record import Record
+
+
+def measured(
+    record: Record,
+    frequency: FloatArray,
+    response: ComplexArray,
+    variance: FloatArray | None,
+    coherence: FloatArray | None,
+    input_spectrum: FloatArray | None,
+) -> FrequencyResponse:
+    """A response of ``record``'s plant; it and what is known of it are (K, outputs, inputs).
+
+    ``frequency`` is in Hz, (K,); ``input_spectrum`` is (inputs, K).
+    """
+    return FrequencyResponse(
+        frequency,
+        np.moveaxis(response, 0, -1),
+        dt=record.dt,
+        hold=record.hold,
+        variance=None if variance is None else np.moveaxis(variance, 0, -1),
+        coherence=None if coherence is None else np.moveaxis(coherence, 0, -1),
+        input_spectrum=input_spectrum,
+        input_names=record.input_names,
+        output_names=record.output_names,
+    )
