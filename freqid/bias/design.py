@@ -189,8 +189,8 @@ def d_optimal_spectrum(
     """The multisine of a given power that makes the information's determinant largest.
 
     Args: ``plant`` at its values; ``band`` in Hz, lines at multiples of 1/``period`` (s); ``dt`` of
-    the record in s; ``hold`` of the input, a zero-order hold at ``dt`` where not given; ``power`` in
-    u².
+    the record in s; ``hold`` of the input, a zero-order hold at ``dt`` where not given; ``power``
+    in u².
     Multiplicative updates (Fedorov and Hackl, Model-Oriented Design of Experiments, 1997, section
     3.2) raise the determinant at each step. Returns a LineSpectrum of the few lines that carry
     power. Raises ValueError for a band without lines, or lines that do not determine the
