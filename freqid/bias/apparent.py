@@ -18,15 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
-from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.excitation.input_spectra import InputSpectrum, power_gain
-from freqid.lti.bases import basis_of
-from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold
-from freqid.lti.responses import points, transfer
-from freqid.lti.state_space import StateSpace
-from freqid.models.conversion import ModelLike, as_model
-from freqid.models.model import Model
+from freqid.data import FrequencyResponse, fold, low_pass_gain, merged_lines, unfold
+from freqid.excitation import InputSpectrum, power_gain
+from freqid.lti import Hold, PeriodicHold, StateSpace, ZeroOrderHold, basis_of, points, transfer
+from freqid.models import Model, ModelLike, as_model
 
 
 @dataclass(frozen=True)

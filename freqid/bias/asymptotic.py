@@ -16,25 +16,30 @@ import numpy as np
 from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.conditions import Conditions, Expected, Responses
 from freqid.checks import Array, FloatArray, InputError, positive, whole
-from freqid.excitation.input_spectra import InputSpectrum
-from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Evidence, findings
-from freqid.fitting.fitters import SearchOptions, fitter_of
-from freqid.fitting.grey_box import fit_grey_box
-from freqid.fitting.search.descent import settled
-from freqid.fitting.uncertainty.covariance import determined
-from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.lti.holds import Hold, as_hold
-from freqid.lti.projection import triangle
-from freqid.lti.realisation import sampled_response
-from freqid.lti.responses import points, response_and_derivatives
-from freqid.lti.state_space import StateSpace
-from freqid.models.conversion import ModelLike
-from freqid.models.grey_box import GreyBox
-from freqid.models.model import Model
-from freqid.models.output_error import OutputError
-from freqid.models.transfer_function import TransferFunction
+from freqid.excitation import InputSpectrum
+from freqid.fitting import (
+    Estimate,
+    Evidence,
+    GreyStructure,
+    Minimum,
+    SearchOptions,
+    Spread,
+    determined,
+    findings,
+    fit_grey_box,
+    fitter_of,
+    settled,
+)
+from freqid.lti import (
+    Hold,
+    StateSpace,
+    as_hold,
+    points,
+    response_and_derivatives,
+    sampled_response,
+    triangle,
+)
+from freqid.models import GreyBox, Model, ModelLike, OutputError, TransferFunction
 
 # times that the nodes are chosen anew for the estimate that they led to
 _ROUNDS = 6

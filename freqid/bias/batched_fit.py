@@ -13,12 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import Array, FloatArray
-from freqid.lti.bases import eigenbasis_of_many
-from freqid.lti.holds import BandLimited, Hold, PeriodicHold
-from freqid.lti.quadrature import NODES, unresolved
-from freqid.lti.responses import response_and_derivatives
-from freqid.lti.state_space import StateSpace
-from freqid.models.grey_box import GreyBox
+from freqid.lti import (
+    NODES,
+    BandLimited,
+    Hold,
+    PeriodicHold,
+    StateSpace,
+    eigenbasis_of_many,
+    response_and_derivatives,
+    unresolved,
+)
+from freqid.models import GreyBox
 
 # a step of this size, relative to the parameters, is the last
 _LAST_STEP = 1e-12

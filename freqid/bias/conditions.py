@@ -22,15 +22,11 @@ from freqid.bias.apparent import (
     weight_of,
 )
 from freqid.checks import Array, ComplexArray, FloatArray, InputError
-from freqid.data.band import as_band
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.excitation.input_spectra import InputSpectrum
-from freqid.fitting.noise_models import GivenWeights
-from freqid.fitting.reading import Reading
-from freqid.lti.holds import Hold
-from freqid.lti.quadrature import panel_nodes, resolved
-from freqid.lti.state_space import StateSpace
-from freqid.models.conversion import ModelLike
+from freqid.data import FrequencyResponse, as_band
+from freqid.excitation import InputSpectrum
+from freqid.fitting import GivenWeights, Reading
+from freqid.lti import Hold, StateSpace, panel_nodes, resolved
+from freqid.models import ModelLike
 
 Responses = Callable[[FloatArray], Array]
 

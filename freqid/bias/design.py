@@ -13,12 +13,10 @@ from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
 from freqid.checks import FloatArray, InputError, choice, positive, whole
-from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum, LineSpectrum
-from freqid.excitation.signal_spectra import multisine_lines
-from freqid.fitting.cost.structures import GreyStructure
-from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
-from freqid.lti.realisation import sampled_response
-from freqid.models.grey_box import GreyBox
+from freqid.excitation import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
+from freqid.fitting import GreyStructure
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, sampled_response
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd

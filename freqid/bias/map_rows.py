@@ -13,13 +13,10 @@ from freqid.bias.asymptotic import grey_asymptote, model_responses
 from freqid.bias.batched_fit import Answers, Batch, Problem, descend, solve
 from freqid.bias.conditions import Conditions
 from freqid.checks import BoolArray, FloatArray, InputError
-from freqid.excitation.input_spectra import InputSpectrum
-from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.findings import Evidence, findings
-from freqid.fitting.fitters import SearchOptions
-from freqid.lti.holds import Hold, as_hold
-from freqid.lti.quadrature import TOLERANCE
-from freqid.models.grey_box import GreyBox
+from freqid.excitation import InputSpectrum
+from freqid.fitting import Evidence, GreyStructure, SearchOptions, findings
+from freqid.lti import TOLERANCE, Hold, as_hold
+from freqid.models import GreyBox
 
 # times that nodes are added to a row for the answer that it led to
 _ROUNDS = 3

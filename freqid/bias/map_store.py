@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freqid.checks import InputError
-from freqid.data.files import whole_file
+from freqid.data import whole_file
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,9 +16,9 @@ from freqid.bias.map_rows import Answer, Row, answer_chunk
 from freqid.bias.map_store import MapStore
 from freqid.bias.progress import Bar
 from freqid.checks import Array, InputError, whole
-from freqid.excitation.input_spectra import ChirpSpectrum, InputSpectrum
-from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold, as_hold
-from freqid.models.grey_box import GreyBox
+from freqid.excitation import ChirpSpectrum, InputSpectrum
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd

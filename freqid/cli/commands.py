@@ -17,7 +17,7 @@ from freqid.cli.terminal import folder, progress, show, write_picture, write_tab
 
 def reproduce(out: Path = Path("out")) -> None:
     """Every figure, table and equation of the paper, into a folder and on the screen."""
-    from freqid.paper.drawings import draw, save
+    from freqid.paper import draw, save
 
     folder(out)
     with progress() as bar:
@@ -125,7 +125,7 @@ def explore(
     port
         the next free one is taken where it is busy.
     """
-    from freqid.pages.explorer.page import explore as serve
+    from freqid.pages import explore as serve
 
     record = None if data is None else fq.read(data, input, output, dt)
     serve(record, host, port, allow_remote)

@@ -12,9 +12,9 @@ import freqid as fq
 from freqid.checks import choice, whole
 from freqid.cli.options import Band, Columns, Dt, Hold, hold_of
 from freqid.cli.terminal import progress, show, write_json, write_picture, write_table
-from freqid.excitation.input_spectra import below_nyquist
+from freqid.excitation import below_nyquist
 from freqid.lti import holds
-from freqid.models.plants import PLANTS
+from freqid.models import PLANTS
 
 
 def fit(

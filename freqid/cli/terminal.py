@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from freqid.checks import InputError
-from freqid.data.files import whole_file
-from freqid.plots.style import Panels
+from freqid.data import whole_file
+from freqid.plots import Panels
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,3 +2,19 @@
 
 It may import what stands below it: checks and lti.
 """
+
+from freqid.data.band import Band, as_band, chosen
+from freqid.data.data_set import (
+    DataSet,
+    as_data_sets,
+    channel_counts,
+    common_names,
+    input_dt,
+    rate_factor,
+)
+from freqid.data.files import read, whole_file, write
+from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.quality import check_record
+from freqid.data.record import Record
+from freqid.data.record_sets import Reference, as_records, references_of

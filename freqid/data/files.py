@@ -11,7 +11,7 @@ from pathlib import Path
 from freqid.checks import InputError, unknown
 from freqid.data.readers.kinds import READERS, WRITERS
 from freqid.data.record import Record
-from freqid.lti.holds import Hold
+from freqid.lti import Hold
 
 
 def read(
@@ -71,7 +71,7 @@ def read(
 
 
 def write(record: Record, path: str | Path) -> None:
-    """Write a record to a file that ``read`` reads: .csv, .parquet or .npz.
+    """Write a record to the file ``path`` that ``read`` reads: .csv, .parquet or .npz.
 
     Raises ValueError for another suffix.
     """

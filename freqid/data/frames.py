@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, positive, unknown
-from freqid.lti.holds import Hold, ZeroOrderHold
+from freqid.lti import Hold, ZeroOrderHold
 
 if TYPE_CHECKING:
     import pandas as pd

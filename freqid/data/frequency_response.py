@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names
 from freqid.data.band import Band, chosen
-from freqid.lti.holds import Hold
+from freqid.lti import Hold
 
 if TYPE_CHECKING:
     import control

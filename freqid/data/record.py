@@ -23,7 +23,7 @@ from freqid.checks import (
 from freqid.data.folding import low_pass
 from freqid.data.frames import record_of, samples_frame
 from freqid.data.sampling import check_rates, less_trend, sample_at
-from freqid.lti.holds import Hold, ZeroOrderHold, as_hold
+from freqid.lti import Hold, ZeroOrderHold, as_hold
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,3 +2,21 @@
 
 It may import what stands below it: checks, lti and data.
 """
+
+from freqid.excitation.filters import power_gain
+from freqid.excitation.input_spectra import (
+    ChirpSpectrum,
+    FilteredSpectrum,
+    InputSpectrum,
+    LineSpectrum,
+    WhiteSpectrum,
+    below_nyquist,
+)
+from freqid.excitation.multisines import multisine
+from freqid.excitation.signal_spectra import (
+    MeasuredSpectrum,
+    MultisineSpectrum,
+    PRBSSpectrum,
+    multisine_lines,
+)
+from freqid.excitation.signals import chirp, prbs, sine, white_noise

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, choice, positive
-from freqid.data.band import Band
-from freqid.data.folding import merged_lines, unfold
+from freqid.data import Band, merged_lines, unfold
 from freqid.excitation.filters import Filter, power_gain
-from freqid.lti.quadrature import panel_nodes, resolved
+from freqid.lti import panel_nodes, resolved
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,7 +99,7 @@ class InputSpectrum:
 class ChirpSpectrum(InputSpectrum):
     """A chirp from ``low`` to ``high`` (Hz): flat between them, or as 1/f for ``method="log"``.
 
-    The ripple of a finite sweep is left out. Power: amplitude²/2. Raises ValueError unless
+    The ripple of a finite sweep is left out. Power: ``amplitude``²/2. Raises ValueError unless
     0 < low < high.
 
     >>> round(float(ChirpSpectrum(10, 80).power(0.5e-3)), 12)
@@ -193,7 +192,7 @@ class LineSpectrum(InputSpectrum):
 
 @dataclass(frozen=True)
 class FilteredSpectrum(InputSpectrum):
-    """A spectrum behind a filter: |H|² times it; white noise of variance 1 where none is given.
+    """A spectrum behind a filter: |H|² times ``source``, white noise of variance 1 by default.
 
     ``system`` is a control system or a tuple (b, a) of polynomials in z at the sequence's own rate,
     highest power first. A discrete system must have the sample time of the sequence; of a

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, IntArray, positive, whole
-from freqid.data.band import Band
-from freqid.data.record import Record
+from freqid.data import Band, Record
 from freqid.excitation.input_spectra import InputSpectrum, LineSpectrum
 
 
 def MultisineSpectrum(band: tuple[float, float], period: float, power: float = 1.0) -> LineSpectrum:
     """Equal lines at the multiples of 1/``period`` (s) inside ``band`` (Hz), as ``multisine`` has.
 
-    Raises ValueError for a band that holds none.
+    ``power`` (u²) is that of all of them. Raises ValueError for a band that holds none.
 
     >>> len(MultisineSpectrum((10, 80), period=1.0).frequencies)
     71
@@ -40,7 +39,7 @@ def multisine_lines(band: tuple[float, float], period: float) -> IntArray:
 
 @dataclass(frozen=True)
 class PRBSSpectrum(InputSpectrum):
-    """A periodic binary sequence of 2ⁿ − 1 bits, each ``clock`` samples long, of ±``amplitude``.
+    """A binary sequence of 2ⁿ − 1 bits (n = ``n_bits``) of ±``amplitude``, ``clock`` samples each.
 
     Lines at the multiples of the period's frequency, under the envelope of the clock (Ljung,
     System Identification, 1999, section 13.3).

@@ -24,7 +24,7 @@ def chirp(
     phase: float = 0,
     amplitude: float = 1,
 ) -> FloatArray:
-    """A cosine whose frequency runs from ``f0`` to ``f1`` (Hz) in ``duration`` (s), (N,).
+    """A cosine of ``amplitude`` that runs from ``f0`` to ``f1`` (Hz) in ``duration`` (s), (N,).
 
     ``method`` is ``"linear"`` or ``"log"``; ``phase`` in degrees (−90 makes it a sine chirp); the
     sweep reaches f1 at t = duration, one sample after the last. Raises ValueError for a frequency
@@ -60,7 +60,7 @@ def sine(
 
 
 def prbs(n_bits: int, dt: float, clock: int = 1, periods: int = 1) -> FloatArray:
-    """A maximum-length binary sequence of ±1: (2ⁿ − 1)·clock samples a period, (N,).
+    """A maximum-length binary sequence of ±1, ``periods`` of (2ⁿ − 1)·clock samples, (N,).
 
     Each bit lasts ``clock`` samples of ``dt`` (s); the spectrum is PRBSSpectrum's. Raises
     ValueError for ``n_bits`` outside 2 to 24.

@@ -1,0 +1,19 @@
+"""Fits: ``fit`` and ``Estimate``, and everything from a data set to a minimum with its covariance.
+
+It may import checks, lti, data, excitation, models and frf; inside, ``cost`` stands below
+``search``, ``uncertainty``, readings, estimates, ``black_box`` and ``entry``, in that order.
+"""
+
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.entry import fit
+from freqid.fitting.estimate import Z95, Estimate
+from freqid.fitting.findings import Evidence, findings
+from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.grey_box import fit_grey_box
+from freqid.fitting.noise_models import GivenWeights, Weights
+from freqid.fitting.order_selection import select_order
+from freqid.fitting.reading import Reading
+from freqid.fitting.residuals import line_errors
+from freqid.fitting.search.descent import settled
+from freqid.fitting.uncertainty.covariance import determined
+from freqid.fitting.uncertainty.minimum import Minimum, Spread

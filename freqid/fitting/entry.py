@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from freqid.checks import InputError, choice, whole
-from freqid.data.data_set import DataSet, as_data_sets
+from freqid.data import DataSet, as_data_sets
 from freqid.fitting import grey_box
 from freqid.fitting.black_box import output_error, transfer_function
 from freqid.fitting.estimate import Estimate
@@ -18,9 +18,8 @@ from freqid.fitting.hold_tests import rejected_hold
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.residuals import errors_of
-from freqid.lti.holds import Hold
-from freqid.lti.threads import in_one_blas_thread
-from freqid.models.grey_box import GreyBox
+from freqid.lti import Hold, in_one_blas_thread
+from freqid.models import GreyBox
 
 # the kinds of model that fit takes are known by the files that fit them
 _KNOWN = (grey_box, output_error, transfer_function)

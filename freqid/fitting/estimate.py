@@ -14,16 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, unknown
-from freqid.data.data_set import DataSet
-from freqid.data.frequency_response import FrequencyResponse
+from freqid.data import DataSet, FrequencyResponse
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.profiles import profile_intervals
-from freqid.lti.holds import Hold
-from freqid.models.grey_box import GreyBox
+from freqid.lti import Hold
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import control
@@ -247,13 +246,13 @@ class Estimate:
 
     def bode(self, ax: Any = None, **options: Any) -> Any:
         """Draw amplitude and phase of the estimate; see ``freqid.bode``."""
-        from freqid.plots.bode_nyquist import bode
+        from freqid.plots import bode
 
         return bode(self, ax=ax, **options)
 
     def nyquist(self, ax: Axes | None = None, **options: Any) -> Axes:
         """Draw the Nyquist curve of the estimate; see ``freqid.nyquist``."""
-        from freqid.plots.bode_nyquist import nyquist
+        from freqid.plots import nyquist
 
         return nyquist(self, ax=ax, **options)
 
@@ -264,7 +263,7 @@ class Estimate:
         and simulation to zoom into, residual tests, warnings, and the call that made it. Raises
         ValueError for another suffix than .html, or without the extra ``report``.
         """
-        from freqid.pages.report.page import write_report
+        from freqid.pages import write_report
 
         write_report(self, path, title)
 

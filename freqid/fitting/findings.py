@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.models.parameter import Parameter
+from freqid.models import Parameter
 
 Severity = Literal["serious", "minor"]
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from freqid.checks import InputError, unknown
-from freqid.data.data_set import input_dt, rate_factor
+from freqid.data import input_dt, rate_factor
 from freqid.fitting.black_box.output_error import reference_cost
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.nuisance import HoldPeriod
@@ -24,8 +24,8 @@ from freqid.fitting.search.log_stage import log_targets
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Found, Search
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.lti.holds import ZeroOrderHold
-from freqid.models.grey_box import GreyBox
+from freqid.lti import ZeroOrderHold
+from freqid.models import GreyBox
 
 # lines on which the minimum is looked for
 _LINES = 600

@@ -12,7 +12,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti.holds import Hold, PeriodicHold
+from freqid.lti import Hold, PeriodicHold
 
 # 0.1 % point of chi-square with one degree of freedom
 _REFUTED = 10.83

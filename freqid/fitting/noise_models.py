@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice
-from freqid.data.data_set import DataSet
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
+from freqid.data import DataSet, FrequencyResponse, Record
 from freqid.fitting.uncertainty.noise_spectrum import noise_weights
 
 

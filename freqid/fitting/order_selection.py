@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import InputError, choice, whole
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
+from freqid.data import FrequencyResponse, Record
 from freqid.fitting.black_box.output_error import cost_of, fit_output_error
 from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading
-from freqid.lti.holds import Hold
-from freqid.lti.responses import Plane
-from freqid.lti.threads import in_one_blas_thread
-from freqid.models.output_error import OutputError
+from freqid.lti import Hold, Plane, in_one_blas_thread
+from freqid.models import OutputError
 
 if TYPE_CHECKING:
     import pandas as pd

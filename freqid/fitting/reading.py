@@ -10,16 +10,12 @@ from typing import Literal
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.band import Band, as_band
-from freqid.data.data_set import DataSet, channel_counts, input_dt
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
+from freqid.data import Band, DataSet, FrequencyResponse, Record, as_band, channel_counts, input_dt
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.noise_models import BiasIntegral, NoiseModel
-from freqid.frf.spectra import spectra
-from freqid.lti.holds import BandLimited, Hold, PeriodicHold, ZeroOrderHold, as_hold
-from freqid.lti.responses import Plane
+from freqid.frf import spectra
+from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold, as_hold
 
 InitialState = Literal["estimate", "zero", "steady"]
 Domain = Literal["frequency", "time"]

@@ -8,14 +8,10 @@ import numpy as np
 import scipy.fft
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data.band import Band
-from freqid.data.data_set import channel_counts
-from freqid.data.record import Record
+from freqid.data import Band, Record, channel_counts
 from freqid.fitting.reading import Reading, read_for
-from freqid.lti.holds import Hold
-from freqid.lti.projection import eliminate
-from freqid.lti.responses import Plane
-from freqid.models.model import Model
+from freqid.lti import Hold, Plane, eliminate
+from freqid.models import Model
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,15 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, whole
-from freqid.data.band import as_band, chosen
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.data import (
+    FrequencyResponse,
+    Record,
+    Reference,
+    as_band,
+    as_records,
+    chosen,
+    references_of,
+)
 from freqid.frf.measured import measured
 
 # segments of a single record where none are asked for

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
+from freqid.data import FrequencyResponse, Record
 from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra
 

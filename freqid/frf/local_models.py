@@ -15,10 +15,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, whole
-from freqid.data.band import as_band, chosen
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.data import (
+    FrequencyResponse,
+    Record,
+    Reference,
+    as_band,
+    as_records,
+    chosen,
+    references_of,
+)
 from freqid.frf.local_windows import Form, Lines, Local, inflation, local_models
 from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
+from freqid.data import FrequencyResponse, Record
 
 
 def measured(

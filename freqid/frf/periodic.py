@@ -16,10 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, steps, whole
-from freqid.data.band import as_band, chosen
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.data.record_sets import as_records
+from freqid.data import FrequencyResponse, Record, as_band, as_records, chosen
 from freqid.frf.measured import measured
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ import numpy as np
 import scipy.fft
 
 from freqid.checks import ComplexArray, FloatArray, InputError, IntArray
-from freqid.data.band import Band, as_band
-from freqid.data.record import Record
+from freqid.data import Band, Record, as_band
 
 
 @dataclass(frozen=True, eq=False)

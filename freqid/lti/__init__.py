@@ -1,0 +1,31 @@
+"""The kernel: holds, state spaces, plants as a hold samples them, resolvents and exact derivatives.
+
+It may import ``freqid.checks`` only.
+"""
+
+from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many, eigenvalues_and_derivatives
+from freqid.lti.holds import (
+    BandLimited,
+    FirstOrderHold,
+    Hold,
+    PeriodicHold,
+    Sampled,
+    ZeroOrderHold,
+    as_hold,
+)
+from freqid.lti.polynomials import PolynomialBasis
+from freqid.lti.projection import eliminate, triangle, triangle_of
+from freqid.lti.quadrature import NODES, TOLERANCE, panel_nodes, resolved, unresolved
+from freqid.lti.realisation import Realisation, Timing, sampled_response
+from freqid.lti.responses import (
+    Plane,
+    many_responses,
+    on_circle,
+    points,
+    response_and_derivatives,
+    transfer,
+    transition,
+)
+from freqid.lti.sampled import sum_runs
+from freqid.lti.state_space import Linearisation, StateSpace
+from freqid.lti.threads import in_one_blas_thread

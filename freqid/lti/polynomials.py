@@ -10,14 +10,14 @@ from freqid.checks import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)
-class Basis:
+class PolynomialBasis:
     """Polynomials (n + 1, K) orthonormal on the lines, and w q_k = Σ H[j, k] q_j."""
 
     Q: ComplexArray
     H: FloatArray
 
     @classmethod
-    def on(cls, w: ComplexArray, weight: FloatArray, degree: int) -> Basis:
+    def on(cls, w: ComplexArray, weight: FloatArray, degree: int) -> PolynomialBasis:
         """Arnoldi's process on multiplication by w, coefficients real."""
         Q = np.empty((degree + 1, len(w)), complex)
         H = np.zeros((degree + 1, degree))

@@ -1,1 +1,19 @@
+"""Models: what answers as one, grey boxes and plants, black boxes, and their simulation.
+
+It may import checks, lti and data.
+"""
+
+from freqid.models.conversion import ModelLike, as_model
 from freqid.models.grey_box import GreyBox
+from freqid.models.model import Model
+from freqid.models.output_error import DiscreteModel, OutputError, coefficients_of
+from freqid.models.parameter import Parameter
+from freqid.models.plants import PLANTS, drivetrain, first_order, two_mass
+from freqid.models.simulation import FreeMotion, forcing, propagate, simulate
+from freqid.models.transfer_function import (
+    ContinuousModel,
+    TransferFunction,
+    chained,
+    coefficients,
+    rational_model,
+)

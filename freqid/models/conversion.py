@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.lti.holds import ZeroOrderHold
-from freqid.lti.state_space import StateSpace
+from freqid.lti import StateSpace, ZeroOrderHold
 from freqid.models.model import MatrixModel, Model
 from freqid.models.output_error import DiscreteModel
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, channel_names, unknown
-from freqid.lti.state_space import Linearisation, StateSpace
+from freqid.lti import Linearisation, StateSpace
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction
 from freqid.models.model import Model
 from freqid.models.parameter import Parameter

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from freqid.checks import Array, FloatArray, InputError
-from freqid.lti.state_space import Linearisation, StateSpace
+from freqid.lti import Linearisation, StateSpace
 from freqid.models.ties import Ties
 
 Matrices = Callable[..., Sequence[object]]

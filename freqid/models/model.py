@@ -10,12 +10,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, InputError
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.lti.bases import basis_of
-from freqid.lti.holds import BandLimited, Hold, PeriodicHold, Sampled
-from freqid.lti.realisation import Realisation, Timing
-from freqid.lti.responses import on_circle, points, transfer
-from freqid.lti.state_space import Linearisation, StateSpace
+from freqid.data import FrequencyResponse
+from freqid.lti import (
+    BandLimited,
+    Hold,
+    Linearisation,
+    PeriodicHold,
+    Realisation,
+    Sampled,
+    StateSpace,
+    Timing,
+    basis_of,
+    on_circle,
+    points,
+    transfer,
+)
 
 if TYPE_CHECKING:
     import control

@@ -10,12 +10,7 @@ import numpy as np
 import scipy.linalg
 
 from freqid.checks import ComplexArray, FloatArray, InputError, whole
-from freqid.lti.holds import (
-    Hold,
-    PeriodicHold,
-    as_hold,
-)
-from freqid.lti.state_space import StateSpace
+from freqid.lti import Hold, PeriodicHold, StateSpace, as_hold
 from freqid.models.model import MatrixModel
 
 if TYPE_CHECKING:

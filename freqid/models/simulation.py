@@ -10,8 +10,8 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive, samples
-from freqid.data.record import Record
-from freqid.lti.holds import Hold, PeriodicHold, Sampled, as_hold
+from freqid.data import Record
+from freqid.lti import Hold, PeriodicHold, Sampled, as_hold
 from freqid.models.conversion import ModelLike, as_model
 
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, finite, whole
-from freqid.lti.state_space import StateSpace
+from freqid.lti import StateSpace
 from freqid.models.grey_box import GreyBox
 from freqid.models.model import MatrixModel
 from freqid.models.parameter import Parameter

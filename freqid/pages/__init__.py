@@ -2,3 +2,6 @@
 
 They may import all packages but ``paper`` and ``cli``.
 """
+
+from freqid.pages.explorer.page import explore
+from freqid.pages.report.page import write_report

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freqid.paper.drawings import draw, save_all
+from freqid.paper.drawings import draw, save, save_all
 from freqid.paper.study import (
     NOTES,
     equations,

@@ -8,18 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, whole
-from freqid.data.files import whole_file
-from freqid.data.record import Record
-from freqid.excitation.signals import sine
-from freqid.lti.holds import Hold, ZeroOrderHold
-from freqid.models.model import Model
-from freqid.models.plants import first_order, two_mass
-from freqid.models.simulation import simulate
+from freqid.data import Record, whole_file
+from freqid.excitation import sine
+from freqid.lti import Hold, ZeroOrderHold
+from freqid.models import Model, first_order, simulate, two_mass
 from freqid.paper.study import BAND, FACTOR, OMEGA, T1, T2, first_order_estimates, study
-from freqid.plots.bode_nyquist import bode, nyquist
-from freqid.plots.curves import Shown
-from freqid.plots.sketches import two_mass_sketch
-from freqid.plots.style import Style, context
+from freqid.plots import Shown, Style, bode, context, nyquist, two_mass_sketch
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

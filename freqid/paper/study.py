@@ -14,14 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.data.record import Record
-from freqid.excitation.signals import chirp, sine
-from freqid.fitting.entry import fit
-from freqid.fitting.estimate import Estimate
-from freqid.lti.holds import FirstOrderHold, ZeroOrderHold
-from freqid.models.output_error import OutputError
-from freqid.models.plants import first_order, two_mass
-from freqid.models.simulation import simulate
+from freqid.data import Record
+from freqid.excitation import chirp, sine
+from freqid.fitting import Estimate, fit
+from freqid.lti import FirstOrderHold, ZeroOrderHold
+from freqid.models import OutputError, first_order, simulate, two_mass
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.bias.apparent import apparent_response
-from freqid.bias.asymptotic import asymptotic_fit
+from freqid.bias import apparent_response, asymptotic_fit
 from freqid.checks import InputError, unknown
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.excitation.input_spectra import InputSpectrum
-from freqid.fitting.estimate import Estimate
-from freqid.lti.holds import Hold, PeriodicHold, as_hold
-from freqid.models.model import Model
+from freqid.data import FrequencyResponse
+from freqid.excitation import InputSpectrum
+from freqid.fitting import Estimate
+from freqid.lti import Hold, PeriodicHold, as_hold
+from freqid.models import Model
 from freqid.plots.bode_nyquist import bode, nyquist
 from freqid.plots.curves import resonances
 from freqid.plots.heat_maps import heat_map

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, choice
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
+from freqid.data import FrequencyResponse, Record
 from freqid.plots.curves import CHI2, UNITS, BodeCurve, Drawable, bode_curve, frequency_label, shown
 from freqid.plots.style import Panels, Style, drawing, line, stacked
 
@@ -37,6 +36,7 @@ def bode(
         omega: frequencies in rad/s for models; by default those of the measured responses, or
             0.1 to 1000 rad/s.
         unit: ``"rad/s"`` or ``"Hz"`` of the frequency axis. ``decibel`` draws amplitude in dB.
+        styles: matplotlib's line properties, one dict for each response.
 
     Several channels are drawn as several curves. Phases are unwrapped and moved by whole turns
     next to the first curve. Returns the two axes. Raises ValueError for an unknown unit, or labels
@@ -132,7 +132,7 @@ def nyquist(
 
 
 def plot_record(record: Record, ax: Panels | None = None) -> Panels:
-    """Input above output against time; a zero-order hold is drawn as steps. Returns the two axes.
+    """Input above output of a ``record`` in time, a zero-order hold as steps; returns the two axes.
 
     >>> import freqid as fq
     >>> axes = fq.plot_record(fq.Record([0.0, 1.0], [0.0, 0.5], dt=0.1))
@@ -155,7 +155,10 @@ def plot_record(record: Record, ax: Panels | None = None) -> Panels:
 
 
 def plot_coherence(frf: FrequencyResponse, ax: Axes | None = None, unit: str = "Hz") -> Axes:
-    """Coherence of a measured response against frequency; ValueError where it has none."""
+    """Coherence of the response ``frf`` against frequency, in the ``unit`` "Hz" or "rad/s".
+
+    Raises ValueError where it has none.
+    """
     choice("unit", unit, list(UNITS))
     if frf.coherence is None:
         raise InputError("frf has no coherence; an average over segments or repeats has one")

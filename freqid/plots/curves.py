@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.fitting.estimate import Z95, Estimate
-from freqid.models.conversion import as_model
-from freqid.models.model import Model
+from freqid.data import FrequencyResponse
+from freqid.fitting import Z95, Estimate
+from freqid.models import Model, as_model
 from freqid.plots.style import Style, line
 
 if TYPE_CHECKING:

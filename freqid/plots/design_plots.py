@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def plot_design(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
-    """Error to expect of every chirp of ``experiment_design``, low end across, high end up.
+    """Error to expect of every chirp in the ``table`` of ``experiment_design``, by its two ends.
 
     One panel for each rate and hold; the best chirp is marked. Returns the axes.
     """

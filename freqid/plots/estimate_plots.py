@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, choice
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.fitting.estimate import Estimate
+from freqid.data import FrequencyResponse, Record
+from freqid.fitting import Estimate
 from freqid.plots.bode_nyquist import bode
 from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
 from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
@@ -85,7 +84,7 @@ def plot_poles(
 
 
 def plot_parameters(est: Estimate, ax: Axes | None = None) -> Axes:
-    """The parameters as a table in a figure: value, standard error, interval, unit."""
+    """The parameters of ``est`` as a table: value, standard error, interval, unit."""
     table = est.parameters
     rows = [
         [f"{p['value']:.5g}", f"{p['std']:.2g}", f"{p['lower']:.5g} to {p['upper']:.5g}", p["unit"]]

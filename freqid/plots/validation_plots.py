@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from freqid.validation.comparison import Comparison
+    from freqid.validation import Comparison
 
 
 def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
@@ -39,7 +39,7 @@ def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
 
 
 def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
-    """Correlations of ``residual_test`` with their 99 % limits; returns one axes a test."""
+    """Correlations in the ``table`` of ``residual_test`` with 99 % limits; one axes for each."""
     curves = table.attrs["correlations"]
     with stacked(ax, len(curves), (7.2, 1.2 + 1.7 * len(curves)), sharex=False) as ax:
         for axis, curve in zip(ax, curves, strict=True):

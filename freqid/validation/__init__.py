@@ -1,1 +1,8 @@
-from freqid.validation.comparison import Comparison
+"""Validation: a model beside a record, what it leaves tested, and the same fit once more.
+
+It may import checks, lti, data, models and fitting.
+"""
+
+from freqid.validation.comparison import Comparison, compare
+from freqid.validation.repeats import bootstrap, cross_validate, hold_bias
+from freqid.validation.residual_tests import cost_test, residual_test

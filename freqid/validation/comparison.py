@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data.band import Band, as_band, chosen
-from freqid.data.record import Record
-from freqid.fitting.residuals import line_errors
-from freqid.lti.holds import Hold
-from freqid.models.conversion import ModelLike, as_model
+from freqid.data import Band, Record, as_band, chosen
+from freqid.fitting import line_errors
+from freqid.lti import Hold
+from freqid.models import ModelLike, as_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,7 +36,7 @@ class Comparison:
 
     def plot(self, ax: Sequence[Axes] | None = None) -> Any:
         """Measured and simulated outputs above their difference; returns the axes."""
-        from freqid.plots.validation_plots import plot_comparison
+        from freqid.plots import plot_comparison
 
         return plot_comparison(self, ax)
 

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import InputError, whole
-from freqid.data.record import Record
-from freqid.fitting.entry import fit
-from freqid.fitting.estimate import Estimate
-from freqid.fitting.noise_models import Weights
-from freqid.models.grey_box import GreyBox
+from freqid.data import Record
+from freqid.fitting import Estimate, Weights, fit
+from freqid.models import GreyBox
 from freqid.validation.comparison import compare
 
 if TYPE_CHECKING:

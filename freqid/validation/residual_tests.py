@@ -8,12 +8,10 @@ import numpy as np
 import scipy.stats
 
 from freqid.checks import FloatArray, InputError, whole
-from freqid.data.band import Band, as_band
-from freqid.data.record import Record
-from freqid.fitting.estimate import Estimate
-from freqid.fitting.residuals import line_errors
-from freqid.lti.holds import Hold
-from freqid.models.conversion import ModelLike, as_model
+from freqid.data import Band, Record, as_band
+from freqid.fitting import Estimate, line_errors
+from freqid.lti import Hold
+from freqid.models import ModelLike, as_model
 from freqid.validation.comparison import own_hold, part_inside
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import freqid as fq
 from freqid.fitting.black_box.output_error import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.reading import Reading
-from freqid.lti.polynomials import Basis
+from freqid.lti.polynomials import PolynomialBasis as Basis
 
 
 def on_an_arc():

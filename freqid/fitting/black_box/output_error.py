@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data.data_set import channel_counts, common_names, rate_factor
+from freqid.data import channel_counts, common_names, rate_factor
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.subspace import plane_for
 from freqid.fitting.cost.charts import Chart
@@ -19,10 +19,8 @@ from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.reading import Reading, enough_rows, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.lti.holds import Hold
-from freqid.lti.responses import Plane
-from freqid.models.model import Model
-from freqid.models.output_error import DiscreteModel, OutputError, coefficients_of
+from freqid.lti import Hold, Plane
+from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 
 # an order too many leaves a flat valley of cancelling poles and zeros: a relative gain in cost this
 # small moves no coefficient by a visible part of its standard error

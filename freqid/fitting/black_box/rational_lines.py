@@ -20,9 +20,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.lti.polynomials import Basis
-from freqid.lti.projection import triangle_of
-from freqid.lti.state_space import StateSpace
+from freqid.lti import PolynomialBasis, StateSpace, triangle_of
 
 # steps of Sanathanan and Koerner at the most; a denominator that has changed by less than this,
 # relative, on the lines is the last one
@@ -39,7 +37,7 @@ _GAIN = 1e-9
 class Fitted:
     """x = (b, t, a) in a basis, its cost, and whether every step on the way there succeeded."""
 
-    basis: Basis
+    basis: PolynomialBasis
     x: FloatArray
     cost: float
     straight: bool
@@ -82,19 +80,19 @@ class RationalLines:
         denominator = np.prod(self.w - poles[:, None], axis=0)
         try:
             with np.errstate(all="ignore"):
-                basis = Basis.on(self.w, np.abs(self.U / denominator), len(poles))
+                basis = PolynomialBasis.on(self.w, np.abs(self.U / denominator), len(poles))
                 return float(_triangle(self._columns(basis, 1 / denominator), self.Y)[-1, -1] ** 2)
         except np.linalg.LinAlgError:
             return np.inf
 
-    def _approach(self, poles: ComplexArray) -> tuple[Basis, FloatArray]:
+    def _approach(self, poles: ComplexArray) -> tuple[PolynomialBasis, FloatArray]:
         """Steps of Sanathanan and Koerner: a basis and x = (b, t, a) in it."""
         n = len(poles)
         denominator = np.prod(self.w - poles[:, None], axis=0)
-        basis: Basis | None = None
+        basis: PolynomialBasis | None = None
         for _ in range(_STEPS):
             if basis is None or n > FEW:
-                basis = Basis.on(self.w, np.abs(self.U / denominator), n)
+                basis = PolynomialBasis.on(self.w, np.abs(self.U / denominator), n)
             inverse = 1 / denominator
             right = self.Y * inverse
             R = _triangle(
@@ -108,13 +106,13 @@ class RationalLines:
         assert basis is not None
         return basis, x
 
-    def _columns(self, basis: Basis, inverse: ComplexArray) -> list[ComplexArray]:
+    def _columns(self, basis: PolynomialBasis, inverse: ComplexArray) -> list[ComplexArray]:
         """Those of b and of each t, over the denominator."""
         n = len(basis.Q) - 1
         parts = [basis.Q[: n + self.feedthrough] * (self.driven * inverse)]
         return parts + [basis.Q[:n] * (own * inverse) for own in self.free]
 
-    def _descend(self, basis: Basis, x: FloatArray) -> Fitted:
+    def _descend(self, basis: PolynomialBasis, x: FloatArray) -> Fitted:
         """Gauss-Newton steps from x, damped (Levenberg and Marquardt) where they fail."""
         n = len(basis.Q) - 1
         best, damping, straight = Fitted(basis, x, np.inf, True), 0.0, True

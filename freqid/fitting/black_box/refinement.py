@@ -17,7 +17,7 @@ from freqid.fitting.black_box.rational_lines import FEW, Fitted, RationalLines
 from freqid.fitting.black_box.subspace import identify, observed
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.search.noise_floor import noise_floor
-from freqid.lti.state_space import StateSpace
+from freqid.lti import StateSpace
 
 # a minimum that was found without a detour and leaves less than this part of the data's energy, or
 # little more than their noise, is believed

@@ -12,12 +12,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.lti.bases import basis_of
-from freqid.lti.holds import BandLimited
-from freqid.lti.projection import triangle
-from freqid.lti.responses import Plane
-from freqid.lti.sampled import sum_runs
-from freqid.lti.state_space import StateSpace
+from freqid.lti import BandLimited, Plane, StateSpace, basis_of, sum_runs, triangle
 
 
 def plane_for(z: ComplexArray) -> Plane:

@@ -8,8 +8,7 @@ from typing import cast
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data.data_set import channel_counts, common_names, input_dt
-from freqid.data.frequency_response import FrequencyResponse
+from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
 from freqid.fitting.black_box.output_error import (
     coefficient_estimate,
     fit_output_error,
@@ -26,11 +25,11 @@ from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.reading import Reading, enough_rows, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti.holds import Hold, PeriodicHold
-from freqid.models.grey_box import GreyBox
-from freqid.models.output_error import OutputError
-from freqid.models.transfer_function import (
+from freqid.lti import Hold, PeriodicHold
+from freqid.models import (
     ContinuousModel,
+    GreyBox,
+    OutputError,
     TransferFunction,
     chained,
     coefficients,

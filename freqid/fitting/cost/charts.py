@@ -12,11 +12,17 @@ import numpy as np
 import scipy.linalg
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.lti.bases import eigenvalues_and_derivatives
-from freqid.lti.holds import BandLimited, Hold
-from freqid.lti.realisation import Realisation
-from freqid.lti.responses import Plane, on_circle, response_and_derivatives
-from freqid.lti.state_space import Linearisation, StateSpace
+from freqid.lti import (
+    BandLimited,
+    Hold,
+    Linearisation,
+    Plane,
+    Realisation,
+    StateSpace,
+    eigenvalues_and_derivatives,
+    on_circle,
+    response_and_derivatives,
+)
 
 
 class Chart:

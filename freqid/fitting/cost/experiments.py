@@ -20,13 +20,20 @@ from typing import Protocol
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data.frequency_response import FrequencyResponse
+from freqid.data import FrequencyResponse
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
-from freqid.frf.spectra import Spectra
-from freqid.lti.holds import BandLimited, Hold, PeriodicHold
-from freqid.lti.realisation import Realisation
-from freqid.lti.responses import Plane, on_circle, points, transition
-from freqid.lti.sampled import sum_runs
+from freqid.frf import Spectra
+from freqid.lti import (
+    BandLimited,
+    Hold,
+    PeriodicHold,
+    Plane,
+    Realisation,
+    on_circle,
+    points,
+    sum_runs,
+    transition,
+)
 
 
 class Evaluation(Protocol):

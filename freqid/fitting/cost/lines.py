@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
-from freqid.lti.holds import Hold, PeriodicHold
-from freqid.lti.responses import Plane, on_circle
+from freqid.lti import Hold, PeriodicHold, Plane, on_circle
 
 
 @dataclass(frozen=True)

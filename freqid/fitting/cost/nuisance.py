@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from freqid.lti.realisation import Realisation, Timing
+from freqid.lti import Realisation, Timing
 
 
 @dataclass(frozen=True)

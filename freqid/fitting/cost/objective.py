@@ -18,9 +18,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.priors import Prior
-from freqid.lti.holds import Hold
-from freqid.lti.projection import eliminate, triangle_of
-from freqid.lti.realisation import Realisation
+from freqid.lti import Hold, Realisation, eliminate, triangle_of
 
 
 class Structure(Protocol):

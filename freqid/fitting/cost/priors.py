@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.models.parameter import Parameter
+from freqid.models import Parameter
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,17 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.nuisance import Nuisance
-from freqid.lti.bases import eigenvalues_and_derivatives
-from freqid.lti.holds import BandLimited, Hold
-from freqid.lti.realisation import Realisation, sampled_response
-from freqid.lti.responses import many_responses
-from freqid.lti.state_space import Linearisation, StateSpace
-from freqid.models.grey_box import GreyBox
-from freqid.models.parameter import Parameter
+from freqid.lti import (
+    BandLimited,
+    Hold,
+    Linearisation,
+    Realisation,
+    StateSpace,
+    eigenvalues_and_derivatives,
+    many_responses,
+    sampled_response,
+)
+from freqid.models import GreyBox, Parameter
 
 # scattered starts lie within this factor of the start, where there are no bounds
 SPREAD = 10.0

@@ -6,13 +6,11 @@ import numpy as np
 import scipy.fft
 
 from freqid.checks import Array, FloatArray
-from freqid.data.record import Record
+from freqid.data import Record
 from freqid.fitting.cost.experiments import Evaluation
-from freqid.frf.spectra import Spectra
-from freqid.lti.holds import PeriodicHold, Sampled
-from freqid.lti.realisation import Realisation
-from freqid.lti.state_space import Linearisation
-from freqid.models.simulation import FreeMotion, forcing, propagate
+from freqid.frf import Spectra
+from freqid.lti import Linearisation, PeriodicHold, Realisation, Sampled
+from freqid.models import FreeMotion, forcing, propagate
 
 
 class TimeExperiment:

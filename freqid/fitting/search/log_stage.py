@@ -14,8 +14,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Structure
-from freqid.lti.holds import Hold, PeriodicHold
-from freqid.lti.realisation import Realisation, sampled_response
+from freqid.lti import Hold, PeriodicHold, Realisation, sampled_response
 
 # lines of the first stage: enough to show every mode, few enough to cost next to nothing
 _LINES = 160

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.uncertainty.minimum import Spread
-from freqid.lti.holds import Hold
-from freqid.models.grey_box import GreyBox
+from freqid.lti import Hold
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ import scipy.ndimage
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
-from freqid.lti.projection import eliminate
+from freqid.lti import eliminate
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000

@@ -12,7 +12,7 @@ from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Structure
 from freqid.fitting.search.descent import minimise
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti.realisation import Realisation
+from freqid.lti import Realisation
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,12 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.fitting.estimate import Z95
-from freqid.models.simulation import simulate
+from freqid.fitting import Z95
+from freqid.models import simulate
 from freqid.pages.explorer.state import Scene, label_of
-from freqid.plots.curves import Shown, bode_curve
-from freqid.plots.plotly_backend import Part, bode_axes, bode_traces, trace
-from freqid.plots.style import COLOURS, line
+from freqid.plots import COLOURS, Part, Shown, bode_axes, bode_curve, bode_traces, line, trace
 
 
 def _curves(scene: Scene) -> Iterator[Shown]:

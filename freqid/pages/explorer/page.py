@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.record import Record
+from freqid.data import Record
 from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 from freqid.pages.explorer.state import HOLDS, PLANTS, Scene, State, label_of, presets, scene
-from freqid.plots.plotly_backend import Part
+from freqid.plots import Part
 
 if TYPE_CHECKING:
     from dash import Dash

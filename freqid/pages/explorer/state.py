@@ -10,19 +10,14 @@ from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
 
-from freqid.bias.maps import hold_label
+from freqid.bias import hold_label
 from freqid.checks import FloatArray, InputError
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.excitation.signals import chirp, sine
-from freqid.fitting.entry import fit
-from freqid.fitting.estimate import Estimate
-from freqid.lti.holds import Hold, ZeroOrderHold, as_hold
-from freqid.models.grey_box import GreyBox
-from freqid.models.output_error import OutputError
-from freqid.models.plants import first_order, two_mass
-from freqid.models.simulation import simulate
-from freqid.plots.curves import resonances
+from freqid.data import FrequencyResponse, Record
+from freqid.excitation import chirp, sine
+from freqid.fitting import Estimate, fit
+from freqid.lti import Hold, ZeroOrderHold, as_hold
+from freqid.models import GreyBox, OutputError, first_order, simulate, two_mass
+from freqid.plots import resonances
 
 T1, DURATION = 0.5e-3, 10.0
 PLANTS: dict[str, Callable[..., GreyBox]] = {"two-mass": two_mass, "first-order": first_order}

@@ -8,15 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.record import Record
-from freqid.fitting.estimate import Estimate
-from freqid.frf.empirical import etfe
-from freqid.lti.holds import PeriodicHold
-from freqid.plots.curves import Shown, bode_curve
-from freqid.plots.plotly_backend import Part, bode_axes, bode_traces, trace
-from freqid.plots.style import COLOURS, Style
-from freqid.validation.comparison import compare
+from freqid.data import FrequencyResponse, Record
+from freqid.fitting import Estimate
+from freqid.frf import etfe
+from freqid.lti import PeriodicHold
+from freqid.plots import COLOURS, Part, Shown, Style, bode_axes, bode_curve, bode_traces, trace
+from freqid.validation import compare
 
 # points of a curve that a page can carry
 _POINTS = 3000

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from freqid.checks import InputError
-from freqid.data.files import whole_file
-from freqid.fitting.estimate import Estimate
+from freqid.data import whole_file
+from freqid.fitting import Estimate
 from freqid.pages.report.figures import figures
 from freqid.pages.report.sentences import bias, data, parameters, tests, verdict, versions
 

@@ -10,12 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.fitting.estimate import Estimate
-from freqid.lti.holds import ZeroOrderHold
-from freqid.models.grey_box import GreyBox
+from freqid.fitting import Estimate
+from freqid.lti import ZeroOrderHold
+from freqid.models import GreyBox
 from freqid.pages.report.figures import records
-from freqid.validation.repeats import hold_bias
-from freqid.validation.residual_tests import residual_test
+from freqid.validation import hold_bias, residual_test
 
 # rows of the parameter table, and experiments, that a page can carry
 _ROWS, _EXPERIMENTS = 500, 50
