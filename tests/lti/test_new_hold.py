@@ -11,7 +11,7 @@ import pytest
 import scipy.integrate
 
 import freqid as fq
-from freqid.cli.terminal import hold_of
+from freqid.cli.options import hold_of
 from freqid.lti.holds.hold import Hold, PeriodicHold
 from freqid.lti.holds.pulse import Pulse, Term
 

@@ -61,11 +61,13 @@ class Pulse:
 
         Args: x (…, n). The term s^p e^{μs} contributes e^μ φ_{p+1}(x − μ), for p = 0 and 1.
         """
-        known = {rate: phi_functions(x - rate) for rate in self._powers}
+        known = {rate: phi_functions(x - rate if rate else x) for rate in self._powers}
         plain = known.get(0.0) or phi_functions(x)
 
         def weights(kind: int) -> Weights:
-            return self._sum(lambda t: _times(np.exp(t.rate), known[t.rate][kind][t.power + 1]))
+            return self._sum(
+                lambda t: _times(np.exp(t.rate) if t.rate else 1, known[t.rate][kind][t.power + 1])
+            )
 
         return plain[0][0], weights(0), plain[1][0], weights(1)
 
