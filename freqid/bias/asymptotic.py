@@ -18,6 +18,7 @@ from freqid.bias.conditions import Conditions, Expected, Responses
 from freqid.checks import Array, FloatArray, InputError, positive, whole
 from freqid.excitation import InputSpectrum
 from freqid.fitting import (
+    FITTERS,
     Estimate,
     Evidence,
     GreyStructure,
@@ -39,7 +40,7 @@ from freqid.lti import (
     sampled_response,
     triangle,
 )
-from freqid.models import GreyBox, Model, ModelLike, OutputError, TransferFunction
+from freqid.models import GreyBox, Model, ModelLike
 
 # times that the nodes are chosen anew for the estimate that they led to
 _ROUNDS = 6
@@ -52,7 +53,7 @@ def asymptotic_fit(
     hold: Hold | str | None = None,
     true_hold: Hold | None = None,
     *,
-    model: GreyBox | OutputError | TransferFunction | None = None,
+    model: object = None,
     base_dt: float | None = None,
     band: tuple[float, float] | None = None,
     antialias: bool = False,
@@ -113,13 +114,13 @@ def asymptotic_fit(
         N = None if duration is None else duration / sampling.dt
         structure = cast(GreyStructure, est.minimum.structure)
         covariance = error_covariance(est.minimum.x, structure, expected, est.hold, noise_std, N)
-    elif isinstance(fitted, OutputError | TransferFunction):
+    elif type(fitted) in FITTERS:
         est = _black(fitted, plant, at, conditions, as_hold(hold, sampling.dt, sampling.hold))
         covariance = np.zeros((len(est.minimum.x),) * 2)
     else:
         raise InputError(
-            f"model={type(fitted).__name__} is not a model; expected a GreyBox, OutputError or "
-            "TransferFunction"
+            f"model={type(fitted).__name__} is not a model; expected one of "
+            + ", ".join(kind.__name__ for kind in FITTERS)
         )
     return dataclasses.replace(est, uncertainty=dataclasses.replace(est.spread, given=covariance))
 
@@ -160,7 +161,7 @@ def grey_asymptote(
         reading, own = expected.as_reading(sampling, model, assumed), options
         if est is not None:
             near = {n: est[n] for n in plain.physical_names}
-            own = dataclasses.replace(options, n_starts=1, start=near)
+            own = dataclasses.replace(options, n_starts=1, start=near, refit=True)
         return fit_grey_box(model, [reading], own)
 
     first, est, expected = _refined(conditions, at, seen, solve)
@@ -187,7 +188,7 @@ def grey_asymptote(
 
 
 def _black(
-    spec: OutputError | TransferFunction,
+    spec: object,
     plant: ModelLike,
     at: StateSpace,
     conditions: Conditions,

@@ -13,6 +13,7 @@ from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
 from freqid.checks import FloatArray, InputError, choice, positive, whole
+from freqid.data import Band
 from freqid.excitation import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
 from freqid.fitting import GreyStructure
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, sampled_response
@@ -78,7 +79,11 @@ def experiment_design(
     choice("criterion", criterion, ("worst", "rms"))
     counts = [whole("factors", f) for f in factors]
     hold = ZeroOrderHold(base_dt) if true_hold is None else true_hold
-    grid = _bands(plant, base_dt) if bands is None else [(float(a), float(b)) for a, b in bands]
+    grid = (
+        _bands(plant, base_dt)
+        if bands is None
+        else [Band.of(each, 0.5 / base_dt, "bands") for each in bands]
+    )
     spectra: dict[str, InputSpectrum] = {
         f"chirp {low:g}-{high:g} Hz": ChirpSpectrum(low, high, method, amplitude)
         for low, high in grid

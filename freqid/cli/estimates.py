@@ -31,7 +31,7 @@ def fit(
     band: Band = None,
     domain: Literal["frequency", "time"] = "frequency",
     initial_state: Literal["estimate", "zero", "steady"] = "estimate",
-    weights: Literal["noise"] | None = None,
+    weights: str | None = None,
     out: Path | None = None,
     plot: Path | None = None,
     report: Path | None = None,
@@ -83,6 +83,7 @@ def fit(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
     )
+    print(f"witness {estimate.witness.verdict}: {estimate.witness.sentence}")
     for warning in estimate.warnings:
         print(f"warning: {warning}")
     return 0 if estimate.converged else 1

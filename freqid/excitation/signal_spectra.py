@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, IntArray, positive, whole
+from freqid.checks import FloatArray, InputError, IntArray, finite, positive, whole
 from freqid.data import Band, Record
 from freqid.excitation.input_spectra import InputSpectrum, LineSpectrum
 
@@ -26,6 +26,7 @@ def MultisineSpectrum(band: tuple[float, float], period: float, power: float = 1
 def multisine_lines(band: tuple[float, float], period: float) -> IntArray:
     """Whole numbers k with k/period inside the band; ValueError for none."""
     low, high = Band.of(band)
+    finite("band", high)
     positive("period", period, "s")
     first = max(int(np.ceil(low * period - 1e-9)), 1)
     k = np.arange(first, int(np.floor(high * period + 1e-9)) + 1)

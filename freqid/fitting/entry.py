@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from freqid.checks import InputError, choice, whole
 from freqid.data import DataSet, as_data_sets
-from freqid.fitting import grey_box
-from freqid.fitting.black_box import output_error, transfer_function
+from freqid.fitting import black_box, grey_box
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.hold_tests import rejected_hold
@@ -22,7 +21,7 @@ from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
 
 # the kinds of model that fit takes are known by the files that fit them
-_KNOWN = (grey_box, output_error, transfer_function)
+_KNOWN = (grey_box, black_box)
 # fits with the noise of the one before, and the part of a standard error that ends them
 _NOISE_ROUNDS = 4
 _STANDS = 0.01
@@ -85,8 +84,8 @@ def fit(
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
     whole("seed", seed, least=0)
-    sets = as_data_sets(data)
     work = partial(fitter_of(model), model)
+    sets = as_data_sets(data)
     estimated = isinstance(hold, str) and hold == "estimate"
     skip_zero = isinstance(model, GreyBox) and model.integrates
     readings = [
@@ -95,7 +94,7 @@ def fit(
     ]
     options = SearchOptions(count, seed, start, estimated)
     if any(r.noise.to_be_learnt for r in readings):
-        est = _noise_weighted(work, readings, options)
+        est = _noise_weighted(model, readings, options)
     else:
         est = work(readings, options)
     if hold is not None and not estimated and isinstance(model, GreyBox):
@@ -133,25 +132,35 @@ def _call(model: object, count: int, given: Mapping[str, object]) -> str:
     return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"
 
 
-def _noise_weighted(
-    work: Callable[[Sequence[Reading], SearchOptions], Estimate],
-    readings: Sequence[Reading],
-    options: SearchOptions,
-) -> Estimate:
-    """Fits in turn with the noise that the one before left; to the maximum of the likelihood."""
+def _noise_weighted(model: object, readings: Sequence[Reading], options: SearchOptions) -> Estimate:
+    """Fits in turn with the noise that the one before left; to the maximum of the likelihood.
+
+    The noise is learnt by the data alone: what a prior makes them leave is none.
+    """
     if any(r.in_time for r in readings):
         raise InputError("weights='noise' needs domain='frequency' and no initial state at rest")
+    known = isinstance(model, GreyBox) and any(p.prior for p in model.parameters)
+    alone = model.with_prior(**dict.fromkeys(model.values)) if known else model  # type: ignore[attr-defined]
+    work = partial(fitter_of(alone), alone)
     first = est = work(readings, options)
     for _ in range(_NOISE_ROUNDS):
         readings = [_learnt(est, r, options.estimated_hold) for r in readings]
-        before, near = est, {n: est[n] for n in getattr(est.model, "values", {})}
-        est = work(readings, dataclasses.replace(options, n_starts=1, start=near or None))
+        before, again = est, _again(est, options)
+        est = work(readings, again)
         std = np.sqrt(np.diag(est.covariance_matrix))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
+    if known:
+        est = fitter_of(model)(model, readings, _again(est, options))
     return dataclasses.replace(
         est, nominal=first.nominal, n_starts=first.n_starts, n_agreed=first.n_agreed
     )
+
+
+def _again(est: Estimate, options: SearchOptions) -> SearchOptions:
+    """A fit that begins from an estimate; a black box begins by itself."""
+    near = {n: est[n] for n in getattr(est.model, "values", {})}
+    return dataclasses.replace(options, n_starts=1, start=near or None, refit=True)
 
 
 def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +14,11 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, unknown
 from freqid.data import DataSet, FrequencyResponse
+from freqid.fitting import printed
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
+from freqid.fitting.search.verdict import Witness
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.profiles import profile_intervals
@@ -58,6 +59,7 @@ class Estimate:
         problem: the Minimum (structure, experiments, prior), for what asks for more.
         data: the data sets that were fitted; ``band`` (Hz) and ``weights`` as they were given.
         call: the call of ``fit``, to be made again.
+        testimony: what the ``witness`` is heard on.
     """
 
     model: Any
@@ -82,6 +84,7 @@ class Estimate:
     band: tuple[float, float] | None = None
     weights: Any = None
     call: str = ""
+    testimony: Callable[[], Witness] | None = field(default=None, repr=False)
 
     @property
     def minimum(self) -> Minimum:
@@ -89,6 +92,17 @@ class Estimate:
         if self.problem is None:
             raise InputError("this estimate does not hold its cost any more; fit again")
         return self.problem
+
+    @cached_property
+    def witness(self) -> Witness:
+        """What a black box of the plant's order says: is a better minimum left, does a part lack.
+
+        Its ``verdict`` is "complete", "lacking" or "absent", with ``cost``, ``f``, ``p_value`` and
+        a ``sentence``.
+        """
+        if self.testimony is None:
+            return Witness("absent", "a black box of its own order is no witness")
+        return self.testimony()
 
     @property
     def spread(self) -> Spread:
@@ -186,6 +200,8 @@ class Estimate:
         if omega is None:
             omega = np.geomspace(1e-3, 1, 200) * np.pi / self.dt
         frf: FrequencyResponse = self.model.frequency_response(omega, hold)
+        if self.problem is None and not isinstance(self.model, GreyBox):
+            return frf
         variance = response_variance(*self._unknowns, frf.omega, hold)
         return dataclasses.replace(frf, variance=variance)
 
@@ -269,31 +285,10 @@ class Estimate:
 
     def to_dict(self) -> dict[str, object]:
         """Everything that a file needs, in plain numbers and strings."""
-        table = self.parameters.astype(object).where(self.parameters.notna(), None)
-        return {
-            "parameters": table.to_dict(orient="index"),
-            "cost": self.cost,
-            "fit_percent": self.fit_percent,
-            "converged": bool(self.converged),
-            "message": self.message,
-            "warnings": list(self.warnings),
-            "hold": self.hold.name,
-            "hold_period": self.hold_period,
-            "dt": self.dt,
-            "covariance": self.covariance_matrix.tolist(),
-        }
+        return printed.as_dict(self)
 
     def __repr__(self) -> str:
-        lines = [f"<Estimate: {self.fit_percent:.2f} % fit, cost {self.cost:.4g}, {self.hold!r}"]
-        rows = self.parameters
-        for name, value, std, unit in zip(
-            rows.index, rows["value"], rows["std"], rows["unit"], strict=True
-        ):
-            lines.append(f"  {name} = {value:.6g} ± {std:.2g} {unit}".rstrip())
-        lines += [f"  warning: {w}" for w in self.warnings]
-        return "\n".join(lines) + ">"
+        return printed.as_text(self)
 
     def _repr_html_(self) -> str:
-        notes = "".join(f"<li>{escape(w)}</li>" for w in self.warnings)
-        head = f"fit {self.fit_percent:.2f} %, {escape(repr(self.hold))}"
-        return f"<p>{head}</p>{self.parameters.to_html(escape=True)}<ul>{notes}</ul>"
+        return printed.as_html(self)

@@ -53,7 +53,8 @@ class Evidence:
     """What the warnings are read from.
 
     ``values`` and ``std`` (P,) of ``parameters``; ``loose`` are sentences on what the data leave
-    open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s).
+    open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
+    ``n_rows`` real values of the data were there for ``n_unknowns``.
     """
 
     parameters: Sequence[Parameter]
@@ -63,6 +64,8 @@ class Evidence:
     loose: Sequence[str] = ()
     hold_period: tuple[float, float] | None = None
     dt: float = 0.0
+    n_rows: int = 0
+    n_unknowns: int = 0
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]

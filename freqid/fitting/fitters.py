@@ -15,13 +15,15 @@ from freqid.fitting.reading import Reading
 class SearchOptions:
     """Where a search begins and how long it goes on, as in ``fit``: None starts for "auto".
 
-    ``estimated_hold`` makes the period of a zero-order hold one more unknown.
+    ``estimated_hold`` makes the period of a zero-order hold one more unknown. A ``refit`` begins
+    next to its minimum: it walks there on the cost itself.
     """
 
     n_starts: int | None = None
     seed: int = 0
     start: Mapping[str, float] | None = None
     estimated_hold: bool = False
+    refit: bool = False
 
 
 Fitter = Callable[[Any, Sequence[Reading], SearchOptions], Estimate]

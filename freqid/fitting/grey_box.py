@@ -9,7 +9,7 @@ import numpy as np
 
 from freqid.checks import InputError, unknown
 from freqid.data import input_dt, rate_factor
-from freqid.fitting.black_box.output_error import reference_cost
+from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
@@ -22,8 +22,9 @@ from freqid.fitting.reading import Reading, enough_rows, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.log_stage import log_targets
 from freqid.fitting.search.noise_floor import noise_floor
-from freqid.fitting.search.stages import Found, Search
+from freqid.fitting.search.stages import Bound, Found, Search
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.witness import Testimony
 from freqid.lti import ZeroOrderHold
 from freqid.models import GreyBox
 
@@ -46,9 +47,11 @@ def fit_grey_box(
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     found = _search(structure, objective, readings, options)
+    alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
-    minimum = Minimum(objective, found.solution)
-    return _estimate(structure, minimum, found, readings[0])
+    minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
+    est = _estimate(structure, minimum, found, readings[0])
+    return dataclasses.replace(est, testimony=Testimony(minimum, tuple(readings), found.n_agreed))
 
 
 def _search(
@@ -59,31 +62,58 @@ def _search(
 ) -> Found:
     """The best minimum; a fit in time looks for it at the lines of the same data, then polishes."""
     at_lines = [r.at_lines() for r in readings]
-
-    def reference() -> float | None:
-        at = structure.model.state_space()
-        return reference_cost(len(at.A), bool(at.D.any()), at_lines)
-
-    def searched(scout: Objective, lines: Sequence[SpectralExperiment]) -> Found:
-        targets = log_targets(lines)
-        search = Search(scout, targets, lambda: noise_floor(lines), reference)
-        return search.run(structure.start, options.n_starts, options.seed)
-
     spectral = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
-    if len(spectral) < len(objective.experiments):
-        lines = [r.lines() for r in at_lines]
-        twin = Objective(structure, lines)
-        found = searched(twin, lines)
-        objective.n_evaluations = twin.n_evaluations
-        return dataclasses.replace(found, solution=_in_time(objective, structure, found))
+    in_time = len(spectral) < len(objective.experiments)
+    if options.refit and not in_time:
+        return Found(polish(objective, structure.start))
+    if in_time:
+        spectral = [r.lines() for r in at_lines]
     # a long record has more lines than it takes to find the minimum: refine on all of them last
     few = thinned_to(spectral, _LINES)
-    if few is spectral:
-        return searched(objective, spectral)
-    scout = Objective(structure, few)
-    found = searched(scout, few)
+    scout = objective if few is objective.experiments else Objective(structure, few)
+    beside = _reference(structure, at_lines)
+    targets = log_targets(few, None if beside is None else beside.response)
+    # a hold whose period is unknown is not one that the black box has
+    bound = None if beside is None or structure.unknown else _bound(beside, structure)
+    search = Search(scout, targets, lambda: noise_floor(few), bound)
+    found = search.run(structure.start, options.n_starts, options.seed)
     objective.n_evaluations = scout.n_evaluations
-    return dataclasses.replace(found, solution=polish(objective, found.solution.x))
+    if in_time:
+        return dataclasses.replace(found, solution=_in_time(objective, structure, found))
+    if scout is objective:
+        return found
+    return dataclasses.replace(found, solution=_on_all(objective, structure, found))
+
+
+def _reference(structure: GreyStructure, readings: Sequence[Reading]) -> Reference | None:
+    """A black box of the plant's order on the lines of the search; None where there is none.
+
+    Of an output slower than its input a sampled one finds no minimum to rely on.
+    """
+    if any(rate_factor(r.data) > 1 for r in readings):
+        return None
+    try:
+        return Reference.of(structure.model, readings, _LINES)
+    except InputError:
+        return None
+
+
+def _bound(beside: Reference, structure: GreyStructure) -> Bound | None:
+    """What no plant of the order goes below; None where the black box itself has no minimum."""
+    if not beside.solution.converged:
+        return None
+    rows = beside.objective.n_rows - beside.unknowns - beside.solution.point.n_initial
+    return Bound.of(beside.cost, beside.unknowns - len(structure.names), rows)
+
+
+def _on_all(objective: Objective, structure: GreyStructure, found: Found) -> Solution:
+    """From the minimum on a part of the lines to that on all, no worse than the start."""
+    best = polish(objective, found.solution.x)
+    own = objective.point(structure.start)
+    if own is None or best.cost <= own.cost:
+        return best
+    other = polish(objective, structure.start)
+    return other if other.cost < best.cost else best
 
 
 def _in_time(objective: Objective, structure: GreyStructure, found: Found) -> Solution:
@@ -104,7 +134,8 @@ def _with_prior(
     structure: GreyStructure, objective: Objective, found: Found, readings: Sequence[Reading]
 ) -> tuple[Found, Objective]:
     """The minimum with the priors in the cost, once the data alone have told their noise."""
-    variance = readings[0].noise.variance
+    known = [r.noise.variance for r in readings]
+    variance = known[0] if None not in known else None
     if variance is None:
         noise = Minimum(objective, found.solution).noise_variance
         variance = max(noise, 1e-15 * objective.energy / objective.n_rows)
@@ -164,6 +195,8 @@ def _estimate(
         minimum.determined.sentences,
         held,
         reading.data.dt,
+        minimum.objective.n_rows,
+        len(values),
     )
     return Estimate(
         model=structure.at(minimum.x),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.fft
 
-from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, channel_counts
 from freqid.fitting.reading import Reading, read_for
 from freqid.lti import Hold, Plane, eliminate
@@ -63,6 +63,7 @@ def errors_of(model: Model, reading: Reading) -> LineErrors:
     record = reading.data
     assert isinstance(record, Record)
     plane = Plane() if model.dt else None
+    steps("dt of the record", record.dt, model.dt or record.dt, least=1)
     shape = model.n_outputs, model.n_inputs
     (experiment,) = read_for(shape, [reading.at_lines()], plane)
     lines = experiment.lines  # type: ignore[attr-defined]

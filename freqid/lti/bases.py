@@ -39,7 +39,7 @@ def eigenvectors(at: StateSpace) -> tuple[ComplexArray, ComplexArray, ComplexArr
     except np.linalg.LinAlgError:
         return None
     # the columns of V have unit length; a multiple eigenvalue shows in the rows of its inverse
-    if not np.abs(inverse).max() * n < WORST_CONDITION:
+    if not np.abs(inverse).max(initial=0) * n < WORST_CONDITION:
         return None
     return eigenvalues.astype(complex, copy=False), V * scale[:, None], inverse / scale
 

@@ -206,7 +206,7 @@ def _times(M: Array, x: ComplexArray) -> ComplexArray:
     """M (…, a, b) times x (…, b, channels, lines)."""
     if M.shape[-1] == 1:
         return M[..., None] * x
-    product = M @ x.reshape(*x.shape[:-2], -1)
+    product = M @ x.reshape(*x.shape[:-2], x.shape[-2] * x.shape[-1])
     return product.reshape(*product.shape[:-1], *x.shape[-2:])
 
 

@@ -61,10 +61,29 @@ def as_model(thing: ModelLike) -> Model:
             f"model={type(inner).__name__} is not a model, an estimate or a control system; "
             "a FrequencyResponse is fitted or drawn as it is"
         )
-    system = control.ss(inner)
+    try:
+        system = (
+            _joined(inner) if isinstance(inner, control.TransferFunction) else control.ss(inner)
+        )
+    except Exception as error:  # control raises what its parts raise
+        raise InputError(f"model={type(inner).__name__} has no state space: {error}") from error
     at = StateSpace(*(np.asarray(M, dtype=float) for M in (system.A, system.B, system.C, system.D)))
     names = system.input_labels, system.output_labels
     if not system.dt:
         return SystemModel(at, *names)
     dt = 1.0 if system.dt is True else float(system.dt)
     return DiscreteModel(at, dt, ZeroOrderHold(dt), *names)
+
+
+def _joined(quotients: control.TransferFunction) -> control.StateSpace:
+    """Quotients of all pairs of channels side by side; control joins them only with slycot."""
+    import control
+
+    p, m = quotients.noutputs, quotients.ninputs
+    if p == m == 1:
+        return control.ss(quotients)
+    apart = control.append(*(control.ss(quotients[o, i]) for o in range(p) for i in range(m)))
+    spread, sums = np.kron(np.ones((p, 1)), np.eye(m)), np.kron(np.eye(p), np.ones((1, m)))
+    at = apart.A, apart.B @ spread, sums @ apart.C, sums @ apart.D @ spread
+    names = {"inputs": quotients.input_labels, "outputs": quotients.output_labels}
+    return control.ss(*at, quotients.dt, **names)

@@ -68,9 +68,9 @@ class Model(ABC):
 
     @property
     def integrates(self) -> bool:
-        """Whether a plant in continuous time has a pole at zero, up to rounding."""
-        size = np.abs(self.poles)
-        return not self.dt and bool((size <= 1e-9 * max(size.max(initial=0), 1.0)).any())
+        """Whether there is a pole at zero frequency, up to rounding."""
+        size = np.abs(self.poles - 1 if self.dt else self.poles)
+        return bool((size <= 1e-9 * max(size.max(initial=0), 1.0)).any())
 
     def linearisation(self) -> Linearisation:
         """The matrices, and their derivatives by the parameters that a fit moves."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, choice
 from freqid.data import Band, Record, as_band, chosen
 from freqid.fitting import line_errors
 from freqid.lti import Hold
@@ -76,6 +76,7 @@ def compare(
     if not isinstance(record, Record):
         raise InputError(f"record={type(record).__name__} is not a Record; compare them one by one")
     limits = as_band(band, record.nyquist)
+    choice("initial_state", initial_state, ("estimate", "steady"))
     given, hold = as_model(model), own_hold(model, hold)
     residual = -line_errors(given, record, hold, None, initial_state).in_time()
     y = record.outputs[: len(residual)]

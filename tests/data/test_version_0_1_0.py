@@ -53,6 +53,16 @@ def test_black_boxes_keep_what_had_been_computed(values):
     assert read("transfer_function").model.poles.real.max() < 0
 
 
+@pytest.mark.parametrize("name", ["with_prior", "in_time"])
+def test_estimates_of_every_kind_of_fit(name, values):
+    assert read(name).values.tolist() == pytest.approx(values["values"], rel=0.01)
+    assert (read(name).parameters["std"] > 0).all()
+
+
+def test_a_black_box_still_draws_without_its_cost():
+    assert read("black_box").frequency_response([50.0]).variance is None
+
+
 def test_comparisons_and_asymptotic_estimates():
     assert read("comparison").fit_percent[0] > 90
     assert read("asymptotic")["d"] == pytest.approx(-231.4, abs=0.1)

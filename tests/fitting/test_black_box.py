@@ -82,6 +82,14 @@ def test_subspace_start_finds_the_poles_by_itself(plant, fast):
     assert np.abs(found / true - 1).max() < 1e-5
 
 
+def test_data_of_several_holds_have_no_one_sampled_model(plant, fast):
+    other = fq.simulate(plant, fq.chirp(10, 80, 4, 1e-3), 1e-3, hold="foh")
+    with pytest.raises(ValueError, match="several ways"):
+        fq.fit(fq.OutputError(3), [fast, other], band=BAND)
+    est = fq.fit(fq.TransferFunction(2, 3), [fast, other], band=BAND)
+    assert np.allclose(np.sort_complex(est.model.poles), np.sort_complex(plant.poles), rtol=1e-4)
+
+
 def test_bad_black_boxes_are_named(slow):
     with pytest.raises(ValueError, match="order=0"):
         fq.OutputError(0)

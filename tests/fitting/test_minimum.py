@@ -118,3 +118,33 @@ def test_the_variance_of_a_black_boxes_response_goes_through_the_hold():
     seen = np.array([e.model.frequency_response(omega, hold).response[0, 0, 0] for e in fits])
     claimed = fits[0].frequency_response(omega, hold).variance[0, 0, 0]
     assert np.mean(np.abs(seen - seen.mean()) ** 2) / claimed == pytest.approx(1, abs=0.4)
+
+
+@pytest.mark.parametrize("weights", [None, "noise"])
+def test_a_prior_that_contradicts_the_data_is_no_noise(weights):
+    """The posterior is no wider than the prior or the data alone, and learns no noise from it."""
+    record = fq.simulate(fq.first_order(), fq.white_noise(2000), 1e-3).with_noise(0.05, seed=1)
+    mean, std = gain_posterior(record, 0.05, 300.0, 1.0)
+    model = fq.first_order().fix("a").with_prior(b=(300.0, 1.0))
+    est = fq.fit(model, record, weights=weights)
+    assert est["b"] == pytest.approx(mean, rel=0.03)
+    assert est.parameters["std"]["b"] == pytest.approx(std, rel=0.06)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_poles_that_cancel_leave_the_others_their_errors(seed):
+    record = fq.simulate(fq.first_order(b=80, a=60), fq.white_noise(800, seed=seed), 1e-3)
+    record = record.with_noise(0.05, seed=50 + seed)
+    for spec in (fq.TransferFunction(1, 1, delay="estimate"), fq.TransferFunction(1, 2)):
+        est = fq.fit(spec, record)
+        assert np.isfinite(est.parameters["std"]).all()
+        assert (est.frequency_response([50.0]).variance > 0).all()
+        assert 0.05 < est.modes()["frequency_std"].min() < 1
+
+
+def test_the_bias_bar_takes_band_and_weights_from_the_estimate(plant, fast):
+    noisy = fast.with_noise(0.1, seed=1)
+    for model in (plant, fq.OutputError(3)):
+        est = fq.fit(model, noisy, band=(10, 80), weights="noise")
+        bars = fq.hold_bias(est, noisy)
+        assert (bars["bias"].abs() < 1e-3 * bars["std"]).all()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
-from freqid.fitting.black_box.output_error import lines_in_plane
+from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.reading import Reading
 from freqid.lti.polynomials import PolynomialBasis as Basis

@@ -173,3 +173,12 @@ def test_control_systems_too(rounded):
     system = control.tf([100], [1, 100])
     record = fq.simulate(system, fq.white_noise(300), 1e-3, hold="rc")
     assert fq.compare(fq.first_order(), record).fit_percent[0] > 99.999
+
+
+def test_a_pulse_of_another_height_is_no_zero_order_hold():
+    half, late = Pulse(Term(0.5, 0)), Pulse(Term(0, 1))
+    assert not half.constant
+    assert Pulse(Term(0.4, 0), Term(0.6, 0)).constant
+    weights = late.functions(np.array([-0.3 + 0j]))[1]
+    assert weights.now == 0
+    assert weights.following == pytest.approx((1 - np.exp(-0.3)) / 0.3)

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
-from freqid.data import channel_counts, common_names, rate_factor
+from freqid.checks import FloatArray
+from freqid.data import channel_counts, common_names
+from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
-from freqid.fitting.black_box.subspace import plane_for
 from freqid.fitting.cost.charts import Chart
-from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Evidence, findings
@@ -61,37 +61,12 @@ def fit_output_error(
     )
 
 
-def reference_cost(order: int, feedthrough: bool, readings: Sequence[Reading]) -> float | None:
-    """Cost that a black box of this order reaches in a few steps; None where it has no start.
-
-    An input that runs on to the next sample reaches the output of the same one through any plant.
-    """
-    if any(rate_factor(r.data) > 1 for r in readings):
-        return None
-    try:
-        lines, plane = lines_in_plane(readings)
-        direct = feedthrough or readings[0].hold.reaches_next
-        chart = Chart(first_model(lines, order, direct), direct, plane, readings[0].sample_time)
-        solution = minimise(Objective(chart, lines), np.zeros(chart.size), limit=12)
-    except (InputError, np.linalg.LinAlgError):
-        return None
-    return solution.cost
-
-
 def cost_of(model: DiscreteModel, reading: Reading) -> float:
     """Cost of a sampled model on the lines of a reading, its transient fitted to them."""
     experiment = reading.at_lines().lines(Plane())
     chart = Chart(model.matrices, bool(model.matrices.D.any()), Plane(), model.dt)
     point = Objective(chart, [experiment]).point(np.zeros(chart.size))
     return np.inf if point is None else point.cost
-
-
-def lines_in_plane(readings: Sequence[Reading]) -> tuple[list[SpectralExperiment], Plane]:
-    """The lines of a sampled model, in the plane over which the first one's spread."""
-    experiments = [r.at_lines().lines(Plane()) for r in readings]
-    first = experiments[0]
-    plane = plane_for(first.points.z[first.lines.strongest()])
-    return [e.in_plane(plane) for e in experiments], plane
 
 
 def _descend(chart: Chart, experiments: Sequence[Experiment]) -> tuple[Chart, Solution, Objective]:
@@ -130,6 +105,8 @@ def coefficient_estimate(
     none = np.zeros(0)
     solution = minimum.solution
     failure = "" if solution.converged else solution.message
+    rows = minimum.objective.n_rows
+    evidence = Evidence([], none, none, failure, n_rows=rows, n_unknowns=len(values))
     return Estimate(
         model=model,
         names=names,
@@ -140,6 +117,6 @@ def coefficient_estimate(
         problem=minimum,
         hold=hold,
         dt=dt,
-        warnings=findings(Evidence([], none, none, failure)),
+        warnings=findings(evidence),
         **minimum.outcome(),
     )

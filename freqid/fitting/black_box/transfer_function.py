@@ -9,11 +9,8 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
-from freqid.fitting.black_box.output_error import (
-    coefficient_estimate,
-    fit_output_error,
-    lines_in_plane,
-)
+from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
+from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment
@@ -69,7 +66,7 @@ def fit_transfer_function(
             at = Delay(delay, unit)
             unknown, known = ([at], []) if estimated else ([], [at] if late else [])
             model = _with_gains(chained(spec, poles, scale, names), experiments, delay)
-            structure = GreyStructure(model, None, unknown, known)
+            structure = GreyStructure(model, None, unknown, known, anonymous=True)
             objective = Objective(structure, experiments)
             if objective.point(structure.start) is None:
                 continue

@@ -123,8 +123,8 @@ def balanced(model: StateSpace) -> StateSpace:
         size_B, size_C = float(np.linalg.norm(B)), float(np.linalg.norm(C))
         ratio = np.sqrt(size_C / size_B) if size_B and size_C else 1.0
         return StateSpace(A, B * ratio, C / ratio, D)
-    reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T)
-    observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C)
+    reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T, method="bilinear")
+    observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C, method="bilinear")
     try:
         L, K = np.linalg.cholesky(reach), np.linalg.cholesky(observe)
     except np.linalg.LinAlgError:
@@ -133,6 +133,17 @@ def balanced(model: StateSpace) -> StateSpace:
     T = L @ Vt.T / np.sqrt(s)
     Ti = (U / np.sqrt(s)).T @ K.T
     return StateSpace(Ti @ A @ T, Ti @ B, C @ T, D)
+
+
+def to_plane(model: StateSpace, plane: Plane) -> StateSpace:
+    """A model in z, Φ, Γ, C, D, in another plane: what ``from_plane`` takes back."""
+    a = plane.a
+    if a == 0:
+        return model
+    A, B, C, D = model
+    eye = np.eye(len(A))
+    Phi = (A - a * eye) @ np.linalg.inv(eye - a * A)
+    return StateSpace(Phi, (eye + a * Phi) @ B / (1 - a**2), C, D)
 
 
 def from_plane(model: StateSpace, plane: Plane) -> StateSpace:

@@ -227,7 +227,8 @@ class _SpectralEvaluation:
         self.residual = e.lines.rows(y - e.lines.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
-        if e.transient is not None:
+        # a plant without states has no free motion
+        if e.transient is not None and basis.to_basis.size:
             self.shared = e.transient.shared and realisation.period is None
             same = self.shared or e.discrete
             self.free = self.plant if same else transition(basis, e.transient.dt)

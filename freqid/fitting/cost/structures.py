@@ -28,7 +28,7 @@ class GreyStructure:
     """A grey box: free parameters in units of their own size, then ``unknown`` nuisances.
 
     ``known`` nuisances stay at their start. ``start`` gives values to begin from; one next to zero
-    keeps the size of the model's own.
+    keeps the size of the model's own. The unknowns of an ``anonymous`` one mean nothing to a user.
     """
 
     def __init__(
@@ -37,6 +37,7 @@ class GreyStructure:
         start: Mapping[str, float] | None = None,
         unknown: Sequence[Nuisance] = (),
         known: Sequence[Nuisance] = (),
+        anonymous: bool = False,
     ) -> None:
         self.model, self.unknown, self.known = model, tuple(unknown), tuple(known)
         self.parameters = model.free_parameters
@@ -47,7 +48,8 @@ class GreyStructure:
         sizes = zip(values, self.parameters, strict=True)
         scale = [max(abs(v), 1e-3 * abs(p.value)) or 1.0 for v, p in sizes]
         everything: list[Parameter | Nuisance] = [*self.parameters, *self.unknown]
-        self.names = [each.name for each in everything]
+        self._labels = [each.name for each in everything]
+        self.names = [] if anonymous else self._labels
         self.units = [each.unit for each in everything]
         self.values = np.array([*values, *(n.start for n in self.unknown)])
         self.scale = np.array([*scale, *(n.size for n in self.unknown)])
@@ -123,4 +125,4 @@ class GreyStructure:
 
     def describe(self, x: FloatArray) -> str:
         """The parameter values at x."""
-        return ", ".join(f"{n}={v:g}" for n, v in zip(self.names, x * self.scale, strict=True))
+        return ", ".join(f"{n}={v:g}" for n, v in zip(self._labels, x * self.scale, strict=True))

@@ -7,12 +7,12 @@ of the parameters make gains and frequencies additive, so this stage walks in fr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
-from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.checks import ComplexArray, FloatArray, IntArray
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Structure
 from freqid.lti import Hold, PeriodicHold, Realisation, sampled_response
 
@@ -23,10 +23,20 @@ _REACH = 16.0
 
 
 class LogResponse:
-    """log(G/Ĝ) on a few lines of an experiment: the residual of the first stage."""
+    """log(G/Ĝ) on a few lines of an experiment: the residual of the first stage.
 
-    def __init__(self, omega: FloatArray, response: ComplexArray, hold: Hold) -> None:
+    ``weight`` (outputs, inputs, lines) says how well Ĝ is known.
+    """
+
+    def __init__(
+        self,
+        omega: FloatArray,
+        response: ComplexArray,
+        hold: Hold,
+        weight: FloatArray | float = 1.0,
+    ) -> None:
         self.omega, self.measured, self.hold = omega, response, hold
+        self.weight = np.broadcast_to(weight, response.shape)
         self.n_rows = 2 * response.size
 
     @property
@@ -42,14 +52,14 @@ class LogResponse:
 class _LogEvaluation:
     def __init__(self, target: LogResponse, realisation: Realisation) -> None:
         G, self.dG = sampled_response(realisation, target.omega, target.hold)
-        self.G = G
+        self.G, self.weight = G, target.weight
         ratio = G / target.measured
         error = np.log(np.abs(ratio)) + 1j * np.angle(ratio)
-        self.residual = error.reshape(-1).view(float)
+        self.residual = (error * target.weight).reshape(-1).view(float)
         self.transient: FloatArray | None = None
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        relative = self.dG / self.G
+        relative = self.dG / self.G * self.weight
         return relative.reshape(len(relative), -1).view(float)
 
 
@@ -82,17 +92,39 @@ class LogStructure:
         return self.inner.describe(self.value(xi))
 
 
-def log_targets(experiments: Sequence[Experiment]) -> list[LogResponse]:
-    """First-stage experiments, empty where no response can be read off the data."""
+# a response as the data's black box has it, at omega (rad/s), and its relative standard error
+Smooth = Callable[[FloatArray], tuple[ComplexArray, FloatArray]]
+# relative standard errors up to which lines count alike
+_SURE = 0.05
+
+
+def log_targets(
+    experiments: Sequence[SpectralExperiment], smooth: Smooth | None
+) -> list[LogResponse]:
+    """First-stage experiments: ``smooth`` at lines that the input drives.
+
+    Without it the ratio of output and input is taken where one input frequency rules, as in a
+    response; empty where that cannot be read off the data.
+    """
     targets = []
     for e in experiments:
-        if not isinstance(e, SpectralExperiment):
-            return []
-        response = _empirical(e)
-        if response is None:
-            return []
-        targets.append(LogResponse(*response, e.hold))
+        if smooth is None:
+            response = _empirical(e)
+            if response is None:
+                return []
+            targets.append(LogResponse(*response, e.hold))
+            continue
+        power = (np.abs(e.lines.U) ** 2).sum(axis=(0, 1)).reshape(-1, e.lines.aliases).max(axis=1)
+        driven = e.lines.counted & (power > 1e-3 * power.max()) & (e.lines.omega > 0)
+        omega = e.lines.omega[_evenly(np.flatnonzero(driven))]
+        G, error = smooth(omega)
+        targets.append(LogResponse(omega, G, e.hold, 1 / np.maximum(error / _SURE, 1)))
     return targets
+
+
+def _evenly(lines: IntArray) -> IntArray:
+    """So many of them as the first stage takes."""
+    return lines[np.unique(np.linspace(0, len(lines) - 1, _LINES).astype(int))]
 
 
 def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
@@ -122,5 +154,5 @@ def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
     kept = np.flatnonzero(usable)
     if len(kept) < 8:
         return None
-    kept = kept[np.unique(np.linspace(0, len(kept) - 1, _LINES).astype(int))]
+    kept = _evenly(kept)
     return lines.omega[kept], G[:, :, kept]

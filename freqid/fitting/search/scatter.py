@@ -33,6 +33,7 @@ def promising(
                 G = structure.responses(points, target.omega[few], target.hold)
                 ratio = G / target.measured[..., few]
                 error = np.log(np.abs(ratio)) ** 2 + np.angle(ratio) ** 2
+                error = error * target.weight[..., few] ** 2
                 cost += error.sum(axis=(1, 2, 3))
     else:
         points = _scattered(structure, start, max(_GLANCES // 8, count), seed)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.stats
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective
@@ -24,8 +25,10 @@ _HOPELESS = 4.0
 BUDGET = 48
 # a cost of so many times the noise's own is explained by it
 _EXPLAINED = 1.5
-# a cost of so many times a black box's is no local minimum
-_NEAR = 1.05
+# starts in vain after which a search ends
+_PATIENCE = 12
+# a cost of so much more than a black box's is all but its own; level of a gap that noise explains
+_TOUCHES, _CERTAIN = 1e-3, 0.999
 # costs that agree to this belong to one minimum
 _SAME = 1e-6
 # evaluations of a start that is not the first, of a first stage, and the last step of that
@@ -39,6 +42,8 @@ class Found:
     solution: Solution
     n_starts: int = 1
     n_agreed: int = 1
+    # starts since the best minimum was found
+    n_stale: int = 0
 
     def joined(self, other: Solution, rounding: float) -> Found:
         """With the end of one start more."""
@@ -46,41 +51,50 @@ class Found:
         if abs(gap) <= _SAME * self.solution.cost + rounding:
             best = other if gap < 0 else self.solution
             return dataclasses.replace(self, solution=best, n_agreed=self.n_agreed + 1)
-        return Found(other, self.n_starts, 1) if gap < 0 else self
+        return Found(other, self.n_starts) if gap < 0 else self
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The cost of a black box of the model's order on the same lines, which none goes below.
+
+    Beyond ``explained`` the gap is no chance: so much more freedom does not fit that much noise.
+    """
+
+    cost: float
+    explained: float
+
+    @classmethod
+    def of(cls, cost: float, extra: int, freedom: int) -> Bound:
+        """``extra`` unknowns more than the model's; ``freedom`` real values less unknowns."""
+        gap = scipy.stats.chi2.ppf(_CERTAIN, max(extra, 1)) / max(freedom, 1)
+        return cls(cost, cost * (1 + float(gap)))
 
 
 @dataclass
 class StopRule:
     """When a search has found enough: at its count of starts, or, for None, when it is sure.
 
-    Sure is a cost at rounding, or at the data's own noise (``floor``), or one in which enough
-    starts agree: two near the cost of a black box of the same order (``reference``), more above it.
-    Both are asked for only after the first start.
+    Sure is a cost at rounding, or so near that of a black box of the model's order (``bound``),
+    which none goes below, that no better minimum is left; else a cost in which two starts agree
+    next to that bound, or at the data's own noise (``floor``), or more of them above it.
     """
 
     n_starts: int | None
     rounding: float
     floor: Callable[[], float]
-    reference: Callable[[], float | None]
-    _explained: float = 0.0
-    _black_box: float | None = None
+    bound: Bound | None
+    _explained: float | None = None
 
     @property
     def limit(self) -> int:
         """Starts at the most."""
         return BUDGET if self.n_starts is None else self.n_starts
 
-    def after_first(self, found: Found) -> bool:
-        """Whether one start is enough."""
-        if self.n_starts is not None:
-            return self.limit == 1
-        self._explained = max(_EXPLAINED * self.floor(), self.rounding)
-        return found.solution.cost <= self._explained
-
-    def ask_reference(self) -> None:
-        """Fit the black box that says how many starts have to agree."""
-        if self.n_starts is None:
-            self._black_box = self.reference()
+    def sure(self, found: Found) -> bool:
+        """Whether no better minimum can be left to find."""
+        cost = found.solution.cost
+        return cost <= max(self.rounding, self.bound.cost * (1 + _TOUCHES) if self.bound else 0.0)
 
     def enough(self, found: Found) -> bool:
         """Whether no start more is needed."""
@@ -88,57 +102,74 @@ class StopRule:
             return True
         if self.n_starts is not None:
             return False
-        cost, black_box = found.solution.cost, self._black_box
-        if cost <= self._explained:
+        if self.sure(found) or found.n_stale >= _PATIENCE:
             return True
-        if black_box is None:
-            return found.n_agreed >= 3
-        near = cost <= _NEAR * max(black_box, self.rounding)
+        cost = found.solution.cost
+        if self._explained is None:
+            self._explained = _EXPLAINED * self.floor()
+        if self.bound is None:
+            return found.n_agreed >= (1 if cost <= self._explained else 3)
+        near = cost <= max(self.bound.explained, self.rounding)
         return found.n_agreed >= (2 if near else 4)
 
 
 class Search:
-    """Both stages on one cost. ``targets`` are those of the first stage, empty for none."""
+    """Both stages on one cost. ``targets`` are those of the first stage, empty for none.
+
+    ``floor`` gives, when it is asked, the cost that the data's own noise explains; ``bound`` is the
+    cost of a black box of the model's order on the same lines, None where there is none.
+    """
 
     def __init__(
         self,
         objective: Objective,
         targets: Sequence[LogResponse],
         floor: Callable[[], float],
-        reference: Callable[[], float | None],
+        bound: Bound | None,
     ) -> None:
         self.objective, self.targets = objective, targets
-        self.floor, self.reference = floor, reference
+        self.floor, self.bound = floor, bound
         self._best_log_cost = np.inf
 
     def run(self, start: FloatArray, n_starts: int | None, seed: int) -> Found:
-        """The best minimum from ``start`` and, unless it explains the data, from scattered ones."""
+        """The best minimum from ``start`` and, unless it is sure, from scattered starts.
+
+        It never ends above the cost of the start itself.
+        """
         rounding = self.objective.rounding
-        rule = StopRule(n_starts, rounding, self.floor, self.reference)
-        found = Found(self._first(start))
-        if not rule.after_first(found):
-            if n_starts is None:
-                found = self._straight(start, found)
-            rule.ask_reference()
-            starts = self._more(start, rule.limit - 1, seed)
-            while not rule.enough(found):
-                begin = next(starts)
-                found = dataclasses.replace(found, n_starts=found.n_starts + 1)
-                solution = self._followed(begin)
-                if solution is not None:
-                    found = found.joined(solution, rounding)
+        rule = StopRule(n_starts, rounding, self.floor, self.bound)
+        found = self._first(start, rule)
+        starts = self._more(start, max(rule.limit - 1, 1), seed)
+        while not rule.enough(found):
+            begin = next(starts)
+            found = dataclasses.replace(
+                found, n_starts=found.n_starts + 1, n_stale=found.n_stale + 1
+            )
+            solution = self._followed(begin)
+            if solution is not None:
+                found = found.joined(solution, rounding)
         return self._finished(found)
 
     def _more(self, start: FloatArray, count: int, seed: int) -> Iterator[FloatArray]:
         """Scattered starts, the most promising first, made when the first is asked for."""
         yield from promising(self.objective, start, self.targets, count, seed)
 
-    def _first(self, start: FloatArray) -> Solution:
-        """Both stages from the user's start. Raises InputError where it cannot be computed."""
+    def _first(self, start: FloatArray, rule: StopRule) -> Found:
+        """Both stages from the user's start, and the true cost from the start itself.
+
+        A first stage may lead away from what is near: unless its end is sure, it has to stand
+        beside the descent from the start. Raises InputError where that cannot be computed.
+        """
         walked = self._first_stage(start) if self.targets else None
-        if walked is None:
-            return minimise(self.objective, start)
-        return polish(self.objective, walked)
+        own = self.objective.point(start)
+        if walked is not None and self.objective.point(walked) is not None:
+            found = Found(polish(self.objective, walked))
+            beside = own is None or found.solution.cost <= own.cost
+            if beside and (rule.sure(found) or own is None):
+                return found
+            other = minimise(self.objective, start, limit=_LIMIT)
+            return found.joined(other, rule.rounding)
+        return Found(minimise(self.objective, start))
 
     def _followed(self, start: FloatArray) -> Solution | None:
         """Both stages from a scattered start; None where they lead nowhere."""
@@ -149,17 +180,6 @@ class Search:
             return None if walked is None else polish(self.objective, walked, limit=_LIMIT)
         except InputError:
             return None
-
-    def _straight(self, start: FloatArray, found: Found) -> Found:
-        """The true cost from the start itself: a first stage may lead away from what is near."""
-        if not self.targets:
-            return found
-        try:
-            solution = minimise(self.objective, start, limit=_LIMIT)
-        except InputError:
-            return found
-        better = solution.cost < found.solution.cost * (1 - _SAME)
-        return found.joined(solution, self.objective.rounding) if better else found
 
     def _first_stage(self, start: FloatArray) -> FloatArray | None:
         structure = LogStructure(self.objective.structure, start)

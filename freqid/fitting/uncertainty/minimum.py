@@ -31,6 +31,8 @@ class Minimum:
 
     objective: Objective
     solution: Solution
+    # where the data alone are least, which a prior has moved from
+    alone: FloatArray | None = None
 
     @property
     def structure(self) -> EstimatedStructure:
@@ -75,8 +77,8 @@ class Minimum:
 
     @property
     def noise_variance(self) -> float:
-        """Variance of each real value of the weighted residual."""
-        return self.cost / self.freedom
+        """Variance of each real value of the weighted residual, a prior's pull left out."""
+        return self.cost / self.freedom if self.prior is None else self.prior.variance
 
     @property
     def exact(self) -> bool:
@@ -115,7 +117,7 @@ class Minimum:
         Samples in time, and what is down to rounding, are taken for white.
         """
         H = self.determined.inverse
-        score = None if self.exact else score_covariance(self.objective, self.x)
+        score = None if self.exact else score_covariance(self.objective, self.x, self.alone)
         if score is None:
             return self.determined.scatter(self.noise_variance * H)
         if self.prior is not None:

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.ndimage
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.lti import eliminate
 
@@ -34,18 +34,22 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
 
 
-def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
+def score_covariance(
+    objective: Objective, x: FloatArray, alone: FloatArray | None = None
+) -> FloatArray | None:
     """Σ σ²(ω) JᵀJ over the lines (P, P): what coloured noise does to the gradient.
 
     With H = JᵀJ the covariance of the estimate is H⁻¹ M H⁻¹ whatever the noise's colour (Ljung,
     System Identification, 1999, section 9.4); σ² is the local mean of the squared residual. None
-    where the experiments have no lines, or nothing but rounding is left.
+    where the experiments have no lines, or nothing but rounding is left. ``alone`` (P,) is where
+    the data alone are least: what they leave there is noise, what a prior makes them leave is not.
     """
     lines = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
     if len(lines) < len(objective.experiments):
         return None
     try:
         realisation = objective.structure.realise(x)
+        noise_at = realisation if alone is None else objective.structure.realise(alone)
     except Exception:  # the user's function may raise anything
         return None
     total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
@@ -54,20 +58,26 @@ def score_covariance(objective: Objective, x: FloatArray) -> FloatArray | None:
             step = max(e.n_lines // _LINES, 1)
             few = e.thinned(step) if step > 1 else e
             evaluation = few.at(realisation)
-            r, T, delta = evaluation.residual, evaluation.transient, None
-            Q = np.zeros((0, len(r)))
-            if T is not None:
-                Q, delta = eliminate(T, r)
-                r = r - (Q @ r) @ Q
+            r, Q, delta = _projected(evaluation)
             J = evaluation.jacobian(delta)
             J = J - (J @ Q.T) @ Q
-            power = _local_power(r, few)
+            left = r if noise_at is realisation else _projected(few.at(noise_at))[0]
+            power = _local_power(left, few)
             total += (J * power) @ J.T / step
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)
     if not np.isfinite(total).all():
         return None
     return total * rows / max(rows - unknown - len(x), 1)
+
+
+def _projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """The residual with the transient taken off, the rows that span that, and its unknowns."""
+    r, T = evaluation.residual, evaluation.transient
+    if T is None:
+        return r, np.zeros((0, len(r))), None
+    Q, delta = eliminate(T, r)
+    return r - (Q @ r) @ Q, Q, delta
 
 
 def _local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:

@@ -180,7 +180,11 @@ def as_hold(hold: Hold | str | None, dt: float, remembered: Hold | None = None) 
     if isinstance(hold, str) and hold in Hold.named:
         return Hold.named[hold].at(dt)
     names = ", ".join(map(repr, Hold.named))
+    kinds = ", ".join(
+        f"{kind.__name__}({'period' if issubclass(kind, PeriodicHold) else ''})"
+        for kind in Hold.named.values()
+    )
     raise InputError(
-        f"hold={hold!r} is not a hold; expected {names} (at the record's sample time), "
-        "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
+        f"hold={hold!r} is not a hold; expected {names} (at the record's sample time), {kinds} or "
+        "None"
     )

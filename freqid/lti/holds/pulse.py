@@ -40,7 +40,9 @@ class Pulse:
     def __init__(self, *terms: Term) -> None:
         self.terms = terms
         self.reaches_next = any(t.following for t in terms)
-        self.constant = not self.reaches_next and all(t.power == 0 == t.rate for t in terms)
+        level = [t.now for t in terms if t.power == 0 == t.rate]
+        # the sample itself for the whole period, which is all that a delay knows to shift
+        self.constant = not self.reaches_next and len(level) == len(terms) and sum(level) == 1
         # the highest power of s beside each rate
         self._powers = {
             rate: max(t.power for t in terms if t.rate == rate)
@@ -119,7 +121,8 @@ class Pulse:
             if t.following:
                 more = _times(t.following, value)
                 following = more if following is None else following + more
-        assert now is not None
+        if now is None:
+            now = 0 * part(self.terms[0])
         return Weights(now, following)
 
 

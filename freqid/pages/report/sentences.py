@@ -52,14 +52,22 @@ def verdict(est: Estimate) -> Verdict:
         return Verdict(doubt, says)
     if not np.isfinite(std).all():
         return Verdict(doubt, "The data do not determine every parameter.")
+    if est.witness.verdict == "lacking":
+        return Verdict(doubt, f"{est.witness.sentence[0].upper()}{est.witness.sentence[1:]}.")
     worst = int(np.nanargmax(relative)) if np.isfinite(relative).any() else 0
     return Verdict(
         "Nothing speaks against this estimate.",
         f"It explains {est.fit_percent:.2f} % of what was fitted, the search converged, and "
         f"the least certain parameter, {est.names[worst]}, is known to "
-        f"{100 * relative[worst]:.2g} %.",
+        f"{100 * relative[worst]:.2g} %. {_heard(est)}".strip(),
         trusted=True,
     )
+
+
+def _heard(est: Estimate) -> str:
+    """What the witness says for the estimate, where there is one."""
+    sentence = est.witness.sentence
+    return f"{sentence[0].upper()}{sentence[1:]}." if est.witness.verdict == "complete" else ""
 
 
 def bias(est: Estimate) -> dict[str, float]:

@@ -1,0 +1,134 @@
+"""Reference: a black box of a plant's order beside it, on the same lines and under the same hold.
+
+It needs no start, costs milliseconds, and holds the plant as a special case: its response is a
+target with the noise taken off, and its cost a bound that no plant of the order goes below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.subspace import plane_for
+from freqid.fitting.cost.charts import Chart, to_plane
+from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import Solution, polish
+from freqid.lti import PeriodicHold, Plane, StateSpace
+from freqid.models import GreyBox
+
+# evaluations of a black box at the most, and the gain that ends them
+_LIMIT, _TOLERANCE = 60, 1e-7
+
+
+def lines_in_plane(
+    readings: Sequence[Reading], count: int | None = None
+) -> tuple[list[SpectralExperiment], Plane]:
+    """The lines of a sampled model, in the plane over which the first one's spread.
+
+    ``count`` is about how many of them are taken; None for all. Raises InputError for data that no
+    one sampled model can stand for.
+    """
+    periods = [r.sample_time for r in readings]
+    kinds = {type(r.hold).__name__ for r in readings}
+    if len(kinds) > 1 or max(periods) > min(periods) * (1 + 1e-9):
+        raise InputError(
+            f"data are held in several ways ({', '.join(sorted(kinds))}, "
+            f"{min(periods):g} to {max(periods):g} s): no one sampled model stands for all; fit "
+            "a TransferFunction or a GreyBox"
+        )
+    experiments = [r.at_lines().lines(Plane()) for r in readings]
+    if count is not None:
+        experiments = list(thinned_to(experiments, count))
+    first = experiments[0]
+    plane = plane_for(first.points.z[first.lines.strongest()])
+    return [e.in_plane(plane) for e in experiments], plane
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A black box where its cost is least: its chart, and the point in it."""
+
+    objective: Objective
+    solution: Solution
+
+    @classmethod
+    def of(cls, model: GreyBox, readings: Sequence[Reading], count: int | None = None) -> Reference:
+        """Of the model's order, from the data alone, on about ``count`` lines.
+
+        Raises InputError where no black box of the order stands beside the model, saying why.
+        """
+        dt = _common_period(readings)
+        lines, plane = lines_in_plane(readings, count)
+        direct = bool(model.state_space().D.any()) or readings[0].hold.reaches_next
+        order = len(model.state_space().A)
+        try:
+            chart = Chart(first_model(lines, order, direct), direct, plane, dt)
+            return cls._descended(Objective(chart, lines))
+        except np.linalg.LinAlgError as error:
+            raise InputError(f"the black box of order {order} has no start: {error}") from None
+
+    @classmethod
+    def _descended(cls, objective: Objective) -> Reference:
+        chart = objective.structure
+        assert isinstance(chart, Chart)
+        start = np.zeros(chart.size)
+        return cls(objective, polish(objective, start, limit=_LIMIT, tolerance=_TOLERANCE))
+
+    @property
+    def chart(self) -> Chart:
+        """The black boxes around this one."""
+        assert isinstance(self.objective.structure, Chart)
+        return self.objective.structure
+
+    @property
+    def cost(self) -> float:
+        """What it leaves of the data."""
+        return self.solution.cost
+
+    @property
+    def unknowns(self) -> int:
+        """How many numbers it could choose, initial states left out."""
+        return self.chart.size
+
+    def on(self, readings: Sequence[Reading]) -> Reference:
+        """The same followed to the minimum on all lines of other readings of the same data."""
+        experiments = [r.at_lines().lines(Plane()).in_plane(self.chart.plane) for r in readings]
+        chart = self.chart.moved(self.solution.x)
+        return self._descended(Objective(chart, experiments))
+
+    def beside(self, model: GreyBox, readings: Sequence[Reading]) -> Reference:
+        """One that begins from a model: it leaves no more than the model does."""
+        hold = readings[0].hold
+        assert isinstance(hold, PeriodicHold)
+        at, s = model.state_space(), model.sampled(hold)
+        # what reaches the next sample, z Γ⁺, is (zI − Φ)Γ⁺ + ΦΓ⁺
+        gamma, D = s.gamma + s.phi @ s.gamma_next, at.D + at.C @ s.gamma_next
+        centre = to_plane(StateSpace(s.phi, gamma, at.C, D), self.chart.plane)
+        chart = Chart(centre, self.chart.feedthrough, self.chart.plane, self.chart.dt)
+        experiments = [r.at_lines().lines(Plane()).in_plane(chart.plane) for r in readings]
+        return self._descended(Objective(chart, experiments))
+
+    def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
+        """Response (outputs, inputs, K) at omega (rad/s), and its relative standard error."""
+        G, dG = self.chart.response(self.solution.x, omega, None)
+        half = np.linalg.pinv(self.solution.point.jacobian)
+        freedom = self.objective.n_rows - self.unknowns - self.solution.point.n_initial
+        noise = self.cost / max(freedom, 1)
+        spread = np.tensordot(half.T, dG, (1, 0))
+        std = np.sqrt(noise * (np.abs(spread) ** 2).sum(axis=0))
+        return G, std / np.maximum(np.abs(G), 1e-300)
+
+
+def _common_period(readings: Sequence[Reading]) -> float:
+    """The period in s at which one sampled model can stand for all readings."""
+    if any(not isinstance(r.hold, PeriodicHold) for r in readings):
+        raise InputError("an input without a hold has no sampled model of the plant's own order")
+    if any(r.skip_zero != readings[0].skip_zero for r in readings):
+        raise InputError("the data are read at different lines")
+    return readings[0].sample_time

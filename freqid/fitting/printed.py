@@ -1,0 +1,51 @@
+"""An Estimate in words: for a file, for a screen, for a notebook."""
+
+from __future__ import annotations
+
+import dataclasses
+from html import escape
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from freqid.fitting.estimate import Estimate
+
+
+def as_dict(est: Estimate) -> dict[str, object]:
+    """Plain numbers and strings."""
+    table = est.parameters.astype(object).where(est.parameters.notna(), None)
+    return {
+        "parameters": table.to_dict(orient="index"),
+        "cost": est.cost,
+        "fit_percent": est.fit_percent,
+        "converged": bool(est.converged),
+        "message": est.message,
+        "warnings": list(est.warnings),
+        "witness": dataclasses.asdict(est.witness),
+        "hold": est.hold.name,
+        "hold_period": est.hold_period,
+        "dt": est.dt,
+        "covariance": est.covariance_matrix.tolist(),
+    }
+
+
+def _witness(est: Estimate) -> list[str]:
+    """What the witness says, where there is one to hear."""
+    if est.testimony is None:
+        return []
+    return [f"witness {est.witness.verdict}: {est.witness.sentence}"]
+
+
+def as_text(est: Estimate) -> str:
+    """Each parameter with its error, the witness, the warnings."""
+    lines = [f"<Estimate: {est.fit_percent:.2f} % fit, cost {est.cost:.4g}, {est.hold!r}"]
+    for name, row in est.parameters.iterrows():
+        lines.append(f"  {name} = {row['value']:.6g} ± {row['std']:.2g} {row['unit']}".rstrip())
+    lines += [f"  {line}" for line in (*_witness(est), *(f"warning: {w}" for w in est.warnings))]
+    return "\n".join(lines) + ">"
+
+
+def as_html(est: Estimate) -> str:
+    """The same as a table with a list under it."""
+    notes = "".join(f"<li>{escape(w)}</li>" for w in (*_witness(est), *est.warnings))
+    head = f"fit {est.fit_percent:.2f} %, {escape(repr(est.hold))}"
+    return f"<p>{head}</p>{est.parameters.to_html(escape=True)}<ul>{notes}</ul>"

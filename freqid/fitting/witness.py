@@ -1,0 +1,136 @@
+"""Testimony: a black box of the plant's order beside an estimate, and what the two costs say.
+
+The black box holds the plant as a special case, so V ≥ V_bb. Where the plant is right
+
+    F = ((V − V_bb)/(n_bb − n)) / (V_bb/(N − n_bb))
+
+is F-distributed on those degrees of freedom, N counting real values less initial states (theory of
+nested models: Seber and Wild, Nonlinear Regression, 1989, section 5.3). In coloured noise both
+costs are taken with weights from what the black box itself leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+
+from freqid.checks import ComplexArray, InputError
+from freqid.data import Record
+from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.noise_models import MeasuredNoise
+from freqid.fitting.reading import Reading
+from freqid.fitting.residuals import errors_of
+from freqid.fitting.search.descent import Solution, polish
+from freqid.fitting.search.verdict import Verdict, Witness
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.models import DiscreteModel
+
+# level below which the black box explains the data so much better that it is no chance
+_LEVEL = 0.01
+# gap between the costs, relative, in which no better minimum can hide
+_TOUCHES = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Testimony:
+    """What a witness is heard on: it is called when it is asked for."""
+
+    minimum: Minimum
+    readings: Sequence[Reading]
+    n_agreed: int
+
+    def __call__(self) -> Witness:
+        """The witness; absent, with the reason, where there is none."""
+        structure = self.minimum.structure
+        assert isinstance(structure, GreyStructure)
+        if structure.unknown:
+            return Witness("absent", "the period of the hold is unknown to a black box")
+        if any(r.initial_state == "zero" for r in self.readings):
+            return Witness("absent", "an initial state at rest is none of a black box's lines")
+        try:
+            return self._heard(structure, [r.at_lines() for r in self.readings])
+        except (InputError, np.linalg.LinAlgError) as error:
+            return Witness("absent", str(error))
+
+    def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
+        model, order = structure.at(self.minimum.x), len(structure.model.state_space().A)
+        grey = self._grey(structure, readings)
+        if grey.cost <= 1e-18 * self.minimum.objective.energy:
+            sentence = "the estimate leaves nothing but the rounding of the data"
+            return Witness("complete", sentence, 0.0, 0.0, 1.0)
+        found = Reference.of(model, readings)
+        beside = found.beside(model, readings)
+        box = min(found, beside, key=lambda r: r.cost)
+        free = len(self.minimum.x) - int(self.minimum.determined.loose.sum())
+        top = box.unknowns - free
+        bottom = box.objective.n_rows - box.solution.point.n_initial - box.unknowns
+        if top < 1 or bottom < 1:
+            return Witness("absent", f"a black box of order {order} has no more freedom", box.cost)
+        f = self._statistic(structure, readings, box, grey) * bottom / top
+        p = float(scipy.stats.f.sf(f, top, bottom))
+        numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
+        verdict, sentence = self._verdict(order, numbers, p, grey.cost / box.cost - 1)
+        return Witness(verdict, sentence, box.cost, float(f), p, (top, bottom))
+
+    def _verdict(self, order: int, numbers: str, p: float, gap: float) -> tuple[Verdict, str]:
+        if p < _LEVEL:
+            return "lacking", (
+                f"a black box of order {order} explains the data better ({numbers}): a better "
+                "minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
+                "the right hold"
+            )
+        if gap > _TOUCHES and self.n_agreed < 2:
+            return "absent", (
+                f"a black box of order {order} explains the data no better ({numbers}), but they "
+                "are too noisy for it to tell one minimum from another"
+            )
+        return "complete", (
+            f"no better minimum is left to find: a black box of order {order} explains the data no "
+            f"better ({numbers})"
+        )
+
+    def _grey(self, structure: GreyStructure, readings: Sequence[Reading]) -> Solution:
+        """The estimate's minimum on the lines, without what was known before."""
+        if self.minimum.prior is None and not any(r.in_time for r in self.readings):
+            return self.minimum.solution
+        return polish(Objective(structure, [r.lines() for r in readings]), self.minimum.x)
+
+    def _statistic(
+        self, structure: GreyStructure, readings: Sequence[Reading], box: Reference, grey: Solution
+    ) -> float:
+        """(V − V_bb)/V_bb, weighted by what the black box leaves where nothing else is known."""
+        model = DiscreteModel(
+            box.chart.in_z(box.solution.x), box.chart.dt, readings[0].hold,
+            structure.model.inputs or (), structure.model.outputs or (),
+        )  # fmt: skip
+        weighted = []
+        for r in readings:
+            left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
+            if left is not None and _coloured(left.error):
+                weighted.append(r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples)))
+            else:
+                weighted.append(r)
+        if all(new is old for new, old in zip(weighted, readings, strict=True)):
+            return max(grey.cost / box.cost - 1, 0.0)
+        seen = Objective(structure, [r.lines() for r in weighted])
+        other = box.on(weighted)
+        return max(polish(seen, grey.x).cost / other.cost - 1, 0.0)
+
+
+def _coloured(error: ComplexArray) -> bool:
+    """Whether the power of errors (outputs, K) is not spread evenly over the lines.
+
+    Bartlett's test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series,
+    1981, section 6.2.5); weights that were not needed would add their own scatter.
+    """
+    power = np.abs(error) ** 2
+    K = power.shape[1]
+    share = np.cumsum(power, axis=1) / power.sum(axis=1, keepdims=True)
+    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1)
+    p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
+    return bool((p < _LEVEL / len(power)).any())
