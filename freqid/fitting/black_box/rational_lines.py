@@ -28,6 +28,8 @@ _STEPS = 6
 _SETTLED = 0.3
 # polynomials of so few poles need not be made orthonormal anew as the weights change
 FEW = 4
+# a cost of this part of the data's energy is next to their rounding
+_ROUNDING = 1e-16
 # Gauss-Newton steps at the most, and the part of the cost that the last one gains
 _DESCENTS = 60
 _GAIN = 1e-9
@@ -57,6 +59,8 @@ class RationalLines:
         self.w = np.concatenate([e.points.z for e in experiments])
         self.Y = np.concatenate([e.lines.Y[0, 0] for e in experiments])
         self.U = np.concatenate([e.lines.U[0, 0] for e in experiments])
+        # steps fail at this cost for no other reason than the data's own digits
+        self.rounding = _ROUNDING * float(np.vdot(self.Y, self.Y).real)
         state = np.concatenate([e.points.U[0, 0] for e in experiments])
         self.driven = self.U if feedthrough else state
         ends = np.cumsum([e.n_lines for e in experiments])
@@ -130,7 +134,7 @@ class RationalLines:
                 if damping and gain <= _GAIN * cost:
                     break
                 damping = damping / 10 if damping > 1e-6 else 0.0
-            elif not len(R):
+            elif not len(R) or best.cost <= self.rounding:
                 break
             else:
                 damping, straight = max(10 * damping, 1e-3), False

@@ -55,6 +55,8 @@ def first_model(
 
 
 def _believed(lines: RationalLines, found: Fitted) -> bool:
+    if found.cost <= lines.rounding:
+        return True
     if not found.straight:
         return False
     energy = sum(e.energy for e in lines.experiments)
