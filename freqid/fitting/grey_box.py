@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
@@ -30,6 +31,10 @@ from freqid.models import GreyBox
 
 # lines on which the minimum is looked for
 _LINES = 600
+# a start that costs so many times more on a part of the lines costs more on all
+_FAR = 1.1
+# local noise, and a cost, of this part of the data's energy are those of their rounding
+_QUIET, _EXACT = 1e-11, 1e-15
 
 
 @fits(GreyBox)
@@ -70,7 +75,13 @@ def _search(
         spectral = [r.lines() for r in at_lines]
     # a long record has more lines than it takes to find the minimum: refine on all of them last
     few = thinned_to(spectral, _LINES)
-    scout = objective if few is objective.experiments else Objective(structure, few)
+    scout = objective if few is spectral and not in_time else Objective(structure, few)
+    found = _without_noise(scout, structure, few)
+    if found is not None and not in_time:
+        objective.n_evaluations = scout.n_evaluations
+        if scout is objective:
+            return found
+        return dataclasses.replace(found, solution=_on_all(objective, scout, found))
     beside = _reference(structure, at_lines)
     targets = log_targets(few, None if beside is None else beside.response)
     # a hold whose period is unknown is not one that the black box has
@@ -82,7 +93,21 @@ def _search(
         return dataclasses.replace(found, solution=_in_time(objective, structure, found))
     if scout is objective:
         return found
-    return dataclasses.replace(found, solution=_on_all(objective, structure, found))
+    return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+
+
+def _without_noise(
+    scout: Objective, structure: GreyStructure, few: Sequence[SpectralExperiment]
+) -> Found | None:
+    """The minimum of data that are down to rounding, which needs no black box; None for others."""
+    energy = sum(e.energy for e in few)
+    if not 0 < noise_floor(few) <= _QUIET * energy:
+        return None
+    try:
+        found = Search(scout, log_targets(few, None), lambda: 0.0, None).run(structure.start, 1, 0)
+    except InputError:
+        return None
+    return found if found.solution.cost <= _EXACT * energy else None
 
 
 def _reference(structure: GreyStructure, readings: Sequence[Reading]) -> Reference | None:
@@ -106,13 +131,17 @@ def _bound(beside: Reference, structure: GreyStructure) -> Bound | None:
     return Bound.of(beside.cost, beside.unknowns - len(structure.names), rows)
 
 
-def _on_all(objective: Objective, structure: GreyStructure, found: Found) -> Solution:
+def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:
     """From the minimum on a part of the lines to that on all, no worse than the start."""
     best = polish(objective, found.solution.x)
-    own = objective.point(structure.start)
+    start = cast(GreyStructure, objective.structure).start
+    there = scout.point(start)
+    if there is None or there.cost > _FAR * found.solution.cost + scout.rounding:
+        return best
+    own = objective.point(start)
     if own is None or best.cost <= own.cost:
         return best
-    other = polish(objective, structure.start)
+    other = polish(objective, start)
     return other if other.cost < best.cost else best
 
 

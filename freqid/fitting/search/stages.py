@@ -161,9 +161,11 @@ class Search:
         beside the descent from the start. Raises InputError where that cannot be computed.
         """
         walked = self._first_stage(start) if self.targets else None
-        own = self.objective.point(start)
         if walked is not None and self.objective.point(walked) is not None:
             found = Found(polish(self.objective, walked))
+            if found.solution.cost <= rule.rounding:
+                return found
+            own = self.objective.point(start)
             beside = own is None or found.solution.cost <= own.cost
             if beside and (rule.sure(found) or own is None):
                 return found
