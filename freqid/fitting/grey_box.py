@@ -52,6 +52,7 @@ def fit_grey_box(
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     found = _search(structure, objective, readings, options)
+    found = dataclasses.replace(found, solution=_unmirrored(objective, structure, found.solution))
     alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
     minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
@@ -94,6 +95,25 @@ def _search(
     if scout is objective:
         return found
     return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+
+
+def _unmirrored(objective: Objective, structure: GreyStructure, solution: Solution) -> Solution:
+    """The same minimum with its unphysical signs turned, where that costs nothing.
+
+    A mode written with ω and ζ is the same at −ω and −ζ.
+    """
+    x = solution.x.copy()
+    for i, p in enumerate(structure.parameters):
+        value = x[i] * structure.scale[i]
+        low, high = p.physical
+        if not low <= value <= high and low <= -value <= high and p.lower <= -value <= p.upper:
+            x[i] = -x[i]
+    if (x == solution.x).all():
+        return solution
+    point = objective.point(x)
+    if point is None or point.cost > solution.cost * (1 + 1e-9) + objective.rounding:
+        return solution
+    return dataclasses.replace(solution, x=x, point=point)
 
 
 def _without_noise(

@@ -17,6 +17,9 @@ from freqid.fitting.noise_models import BiasIntegral, NoiseModel
 from freqid.frf import spectra
 from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold, as_hold
 
+# sums of squares below this have lost their digits
+_LEAST = 1e-280
+
 InitialState = Literal["estimate", "zero", "steady"]
 Domain = Literal["frequency", "time"]
 
@@ -155,7 +158,14 @@ def read_for(
 
 
 def enough_rows(experiments: Sequence[Experiment], n_parameters: int) -> None:
-    """ValueError when the data are fewer than the parameters."""
+    """ValueError when the data are fewer than the parameters, or no numbers to work with."""
+    energy = float(sum(e.energy for e in experiments))
+    if not np.isfinite(energy) or energy < _LEAST:
+        size = "zero, or too small" if energy < _LEAST else "too large"
+        raise InputError(
+            f"outputs are {size} in what is fitted, so that their squares leave the range of "
+            "numbers: check the channel and the band, or give the output in other units"
+        )
     n_rows = sum(e.n_rows for e in experiments)
     if n_rows < n_parameters:
         raise InputError(

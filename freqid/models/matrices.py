@@ -191,10 +191,11 @@ class MatrixFunction:
 
 def _dense(matrices: Sequence[object], dtype: type) -> list[Array]:
     A, B, C, D = matrices
-    A, B, C = (np.asarray(M, dtype=dtype) for M in (A, B, C))
+    # copies: a function may fill the same arrays at every call
+    A, B, C = (np.array(M, dtype=dtype) for M in (A, B, C))
     if D is None or np.asarray(D).ndim == 0:
         D = np.full((C.shape[0], B.shape[1]), 0 if D is None else D, dtype)
-    return [A, B, C, np.asarray(D, dtype=dtype)]
+    return [A, B, C, np.array(D, dtype=dtype)]
 
 
 def _shaped(matrices: Sequence[object], values: Mapping[str, float]) -> StateSpace:

@@ -98,6 +98,58 @@ def test_three_masses_from_a_factor_three(seed):
     assert est.cost < 1.002 * black.cost
 
 
+def test_a_mode_is_not_its_mirror_image():
+    model = light_mode()
+    for seed in range(8):
+        record = fq.simulate(model, fq.white_noise(600, seed=seed), 0.01).with_noise(0.1, seed=seed)
+        est = fq.fit(model, record, start={"w": -35.0, "z": -0.1})
+        assert est["w"] == pytest.approx(40, rel=0.02)
+        assert est["z"] > 0
+        assert not est.warnings
+
+
+def test_a_function_may_fill_the_same_arrays_at_every_call():
+    A, B, C = np.zeros((2, 2), complex), np.zeros((2, 1), complex), np.array([[1.0, 0]])
+
+    def reused(b, c, k):
+        A[0, 1], A[1, 0], A[1, 1], B[1, 0] = 1, -k, -c, b
+        return (A, B, C, None) if np.iscomplexobj(b + c + k) else (A.real, B.real, C, None)
+
+    model = fq.GreyBox(reused, stiff().parameters)
+    record = fq.simulate(stiff(), fq.white_noise(500), 0.01)
+    est = fq.fit(model, record, start={"b": 1300.0, "c": 5.0, "k": 1900.0})
+    assert worst(est, stiff()) < 1e-6
+
+
+def test_the_edge_of_where_a_model_can_be_computed_is_named():
+    def broken(b, a):
+        return [[-a if a < 90 else np.nan]], [[b]], [[1.0]], None
+
+    parameters = [fq.Parameter("b", 80.0), fq.Parameter("a", 80.0)]
+    record = fq.simulate(fq.first_order(), fq.white_noise(800), 1e-3).with_noise(0.001)
+    est = fq.fit(fq.GreyBox(broken, parameters), record)
+    assert not est.converged
+    assert any("cannot be computed" in w for w in est.warnings)
+
+
+@pytest.mark.parametrize("size", [1e200, 1e-300, 0.0])
+def test_outputs_beyond_the_range_of_numbers_are_named(size):
+    record = fq.simulate(fq.first_order(), fq.white_noise(300), 1e-3)
+    scaled = fq.Record(record.u, size * record.y, record.dt)
+    for model in (fq.first_order(), fq.OutputError(1), fq.TransferFunction(0, 1)):
+        with pytest.raises(ValueError, match="outputs are"):
+            fq.fit(model, scaled)
+
+
+@pytest.mark.parametrize("size", [1e100, 1e-100])
+def test_outputs_of_any_other_size_are_fitted_alike(size):
+    record = fq.simulate(fq.first_order(), fq.white_noise(300), 1e-3).with_noise(0.01)
+    scaled = fq.Record(record.u, size * record.y, record.dt)
+    est, plain = fq.fit(fq.first_order(b=100 * size), scaled), fq.fit(fq.first_order(), record)
+    assert est["b"] / size == pytest.approx(plain["b"], rel=1e-6)
+    assert est["a"] == pytest.approx(plain["a"], rel=1e-6)
+
+
 # the witness -------------------------------------------------------------------------------------
 
 

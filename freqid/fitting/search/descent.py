@@ -28,6 +28,8 @@ class Solution:
 
 # relative gain in cost that ends a search within bounds
 _BOUNDED = 1e-9
+# a step that would gain this part of the cost shows that a search has not come to its end
+_EDGE = 1e-6
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
 _WALL = 1e100
 
@@ -47,6 +49,7 @@ def minimise(
             f"{objective.failure}; give another start"
         )
     size = len(start) + 1
+    objective.failure = None
 
     def residual(x: FloatArray) -> FloatArray:
         point = objective.point(x)
@@ -76,6 +79,10 @@ def minimise(
     point = objective.point(result.x)
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
+    wanted = point.triangle[:-1, -1]
+    if objective.failure is not None and wanted @ wanted > _EDGE * point.cost + objective.rounding:
+        message = f"the cost falls on where the model cannot be computed ({objective.failure})"
+        return Solution(result.x, point, False, message)
     return Solution(result.x, point, result.status > 0, result.message)
 
 
