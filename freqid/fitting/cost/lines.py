@@ -50,11 +50,6 @@ class Lines:
         return self.omega_input.size // len(self.omega)
 
     @property
-    def line_scale(self) -> FloatArray | float:
-        """What is in the data of each line already, (K,) or one."""
-        return self.scale[0, 0] if self.inside else 1.0
-
-    @property
     def counted(self) -> BoolArray:
         """Which lines have a weight, (K,)."""
         kept: BoolArray = np.any(self.scale > 0, axis=(0, 1))
