@@ -17,6 +17,7 @@ from freqid.fitting.hold_tests import rejected_hold
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.witness import Testimony
 from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
 
@@ -152,8 +153,15 @@ def _noise_weighted(model: object, readings: Sequence[Reading], options: SearchO
             break
     if known:
         est = fitter_of(model)(model, readings, _again(est, options))
+    testimony = est.testimony
+    if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
+        testimony = testimony.after(first.testimony)
     return dataclasses.replace(
-        est, nominal=first.nominal, n_starts=first.n_starts, n_agreed=first.n_agreed
+        est,
+        nominal=first.nominal,
+        n_starts=first.n_starts,
+        n_agreed=first.n_agreed,
+        testimony=testimony,
     )
 
 

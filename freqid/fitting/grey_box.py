@@ -258,7 +258,8 @@ def _estimate(
         hold=hold,
         dt=reading.data.dt,
         n_starts=found.n_starts,
-        n_agreed=found.n_agreed,
+        # the descent from a start itself, beside its first stage, is no start of its own
+        n_agreed=min(found.n_agreed, found.n_starts),
         warnings=findings(evidence),
         **minimum.outcome(),
     )

@@ -11,6 +11,7 @@ costs are taken with weights from what the black box itself leaves.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -43,6 +44,10 @@ class Testimony:
     minimum: Minimum
     readings: Sequence[Reading]
     n_agreed: int
+
+    def after(self, search: Testimony) -> Testimony:
+        """The same where the minimum was found by an earlier search."""
+        return dataclasses.replace(self, n_agreed=search.n_agreed)
 
     def __call__(self) -> Witness:
         """The witness; absent, with the reason, where there is none."""

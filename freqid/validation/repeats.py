@@ -30,9 +30,9 @@ def hold_bias(
     The model of ``est`` is fitted to the same ``data`` with the hold that the records remember, in
     the ``band`` and with the ``weights`` of the estimate where none are given; ``bias`` is the
     estimate less that, to be drawn beside ``std``, the error bar of the noise. Columns estimate,
-    remembered, bias and std; the ratio of bias to std says
-    which of the two rules. Coefficients of a black box mean another thing under another hold, so
-    that there the rows are frequency (Hz) and damping of its modes in turn.
+    remembered, bias and std; the ratio of bias to std says which of the two rules. Coefficients of
+    a black box mean another thing under another hold, so that there the rows are frequency (Hz) and
+    damping of its modes in turn.
     """
     import pandas as pd
 

@@ -198,6 +198,18 @@ def test_the_witness_of_an_output_slower_than_its_input(plant, fast):
         assert witness.cost < 5
 
 
+@pytest.mark.parametrize("weights", [None, "noise"])
+def test_a_short_noisy_record_has_its_witness_too(weights):
+    """The gap of the costs is large in few data: the search behind the estimate counts."""
+    verdicts = []
+    for seed in range(10):
+        record = fq.simulate(light_mode(), fq.white_noise(400, seed=seed), 0.01)
+        est = fq.fit(light_mode(), record.with_noise(0.5, seed=seed), weights=weights)
+        assert 1 <= est.n_agreed <= est.n_starts
+        verdicts.append(est.witness.verdict)
+    assert verdicts.count("complete") >= 8
+
+
 def test_where_there_is_no_witness_it_says_why(plant, slow):
     assert "hold is unknown" in fq.fit(plant, slow, hold="estimate", band=(10, 80)).witness.sentence
     assert fq.fit(fq.OutputError(3), slow).witness.verdict == "absent"

@@ -105,9 +105,9 @@ class StopRule:
         if self.sure(found) or found.n_stale >= _PATIENCE:
             return True
         cost = found.solution.cost
-        if self._explained is None:
-            self._explained = _EXPLAINED * self.floor()
         if self.bound is None:
+            if self._explained is None:
+                self._explained = _EXPLAINED * self.floor()
             return found.n_agreed >= (1 if cost <= self._explained else 3)
         near = cost <= max(self.bound.explained, self.rounding)
         return found.n_agreed >= (2 if near else 4)
