@@ -10,11 +10,11 @@ import numpy as np
 
 from freqid.bias.apparent import true_plant
 from freqid.bias.asymptotic import grey_asymptote, model_responses
-from freqid.bias.batched_fit import Answers, Batch, Problem, descend, solve
+from freqid.bias.batched_fit import Batch, Problem, solve
 from freqid.bias.conditions import Conditions
 from freqid.checks import BoolArray, FloatArray, InputError
 from freqid.excitation import InputSpectrum
-from freqid.fitting import Evidence, GreyStructure, SearchOptions, findings
+from freqid.fitting import Answers, Evidence, GreyStructure, SearchOptions, descend, findings
 from freqid.lti import TOLERANCE, Hold, as_hold
 from freqid.models import GreyBox
 

@@ -14,6 +14,7 @@ from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import line_errors
+from freqid.fitting.search.batched import Answers, descend
 from freqid.fitting.search.descent import settled
 from freqid.fitting.uncertainty.covariance import determined
 from freqid.fitting.uncertainty.minimum import Minimum, Spread

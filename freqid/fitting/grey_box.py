@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import cast
 
 import numpy as np
 
-from freqid.checks import InputError, unknown
+from freqid.checks import FloatArray, InputError, unknown
 from freqid.data import input_dt, rate_factor
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
@@ -26,11 +27,13 @@ from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Bound, Found, Search
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
-from freqid.lti import ZeroOrderHold
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
 from freqid.models import GreyBox
 
-# lines on which the minimum is looked for
-_LINES = 600
+# lines on which the minimum is looked for, and how many times more for noise as large as the signal
+_LINES, _NOISY = 600, 10
+# lines on which many starts walk together
+_ROUND_LINES = 60
 # a start that costs so many times more on a part of the lines costs more on all
 _FAR = 1.1
 # local noise, and a cost, of this part of the data's energy are those of their rounding
@@ -75,19 +78,24 @@ def _search(
     if in_time:
         spectral = [r.lines() for r in at_lines]
     # a long record has more lines than it takes to find the minimum: refine on all of them last
-    few = thinned_to(spectral, _LINES)
+    lines = _lines_wanted(spectral)
+    few = thinned_to(spectral, lines)
     scout = objective if few is spectral and not in_time else Objective(structure, few)
-    found = _without_noise(scout, structure, few)
+    found = _without_noise(scout, structure, few, spectral)
     if found is not None and not in_time:
         objective.n_evaluations = scout.n_evaluations
         if scout is objective:
             return found
         return dataclasses.replace(found, solution=_on_all(objective, scout, found))
-    beside = _reference(structure, at_lines)
-    targets = log_targets(few, None if beside is None else beside.response)
+    beside = _reference(structure, at_lines, lines)
+    smooth = None if beside is None else beside.response
+    targets = log_targets(few, smooth)
+    rounds = None if smooth is None else partial(log_targets, few, smooth, _ROUND_LINES)
     # a hold whose period is unknown is not one that the black box has
-    bound = None if beside is None or structure.unknown else _bound(beside, structure)
-    search = Search(scout, targets, lambda: noise_floor(few), bound)
+    share = sum(e.n_lines for e in few) / sum(e.n_lines for e in spectral)
+    bound = None if beside is None or structure.unknown else _bound(beside, structure, share)
+    aliased = partial(_out_of_sight, structure, [r.hold for r in at_lines])
+    search = Search(scout, targets, lambda: noise_floor(spectral), bound, rounds, aliased)
     found = search.run(structure.start, options.n_starts, options.seed)
     objective.n_evaluations = scout.n_evaluations
     if in_time:
@@ -95,6 +103,15 @@ def _search(
     if scout is objective:
         return found
     return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+
+
+def _out_of_sight(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:
+    """Whether a mode lies above the Nyquist frequency of a hold, where it looks like another."""
+    periods = [h.period for h in holds if isinstance(h, PeriodicHold)]
+    if not periods or structure.unknown:
+        return False
+    poles = structure.at(x).poles
+    return bool((np.abs(poles.imag) > np.pi / min(periods) * (1 + 1e-9)).any())
 
 
 def _unmirrored(objective: Objective, structure: GreyStructure, solution: Solution) -> Solution:
@@ -117,11 +134,14 @@ def _unmirrored(objective: Objective, structure: GreyStructure, solution: Soluti
 
 
 def _without_noise(
-    scout: Objective, structure: GreyStructure, few: Sequence[SpectralExperiment]
+    scout: Objective,
+    structure: GreyStructure,
+    few: Sequence[SpectralExperiment],
+    every: Sequence[SpectralExperiment],
 ) -> Found | None:
     """The minimum of data that are down to rounding, which needs no black box; None for others."""
     energy = sum(e.energy for e in few)
-    if not 0 < noise_floor(few) <= _QUIET * energy:
+    if not 0 < noise_floor(every) <= _QUIET * energy:
         return None
     try:
         found = Search(scout, log_targets(few, None), lambda: 0.0, None).run(structure.start, 1, 0)
@@ -130,7 +150,15 @@ def _without_noise(
     return found if found.solution.cost <= _EXACT * energy else None
 
 
-def _reference(structure: GreyStructure, readings: Sequence[Reading]) -> Reference | None:
+def _lines_wanted(experiments: Sequence[SpectralExperiment]) -> int:
+    """How many lines tell one minimum from another: more of them where noise outweighs signal."""
+    energy, noise = sum(e.energy for e in experiments), noise_floor(experiments)
+    return int(_LINES * (1 + _NOISY * noise / max(energy - noise, 1e-3 * energy)))
+
+
+def _reference(
+    structure: GreyStructure, readings: Sequence[Reading], lines: int
+) -> Reference | None:
     """A black box of the plant's order on the lines of the search; None where there is none.
 
     Of an output slower than its input a sampled one finds no minimum to rely on.
@@ -138,17 +166,21 @@ def _reference(structure: GreyStructure, readings: Sequence[Reading]) -> Referen
     if any(rate_factor(r.data) > 1 for r in readings):
         return None
     try:
-        return Reference.of(structure.model, readings, _LINES)
+        return Reference.of(structure.model, readings, lines)
     except InputError:
         return None
 
 
-def _bound(beside: Reference, structure: GreyStructure) -> Bound | None:
-    """What no plant of the order goes below; None where the black box itself has no minimum."""
+def _bound(beside: Reference, structure: GreyStructure, share: float) -> Bound | None:
+    """What no plant of the order goes below; None where the black box itself has no minimum.
+
+    Lines that stand for others, a ``share`` of all, tell no more than themselves.
+    """
     if not beside.solution.converged:
         return None
-    rows = beside.objective.n_rows - beside.unknowns - beside.solution.point.n_initial
-    return Bound.of(beside.cost, beside.unknowns - len(structure.names), rows)
+    used = beside.unknowns + beside.solution.point.n_initial
+    rows = int(share * beside.objective.n_rows) - used
+    return Bound(beside.cost, beside.unknowns - len(structure.names), rows)
 
 
 def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:

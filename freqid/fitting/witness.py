@@ -28,13 +28,19 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
-from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.models import DiscreteModel
 
 # level below which the black box explains the data so much better that it is no chance
 _LEVEL = 0.01
 # gap between the costs, relative, in which no better minimum can hide
 _TOUCHES = 1e-3
+# relative standard error of a parameter that the data leave open; starts that have to agree then
+_OPEN, _WANTED = 0.5, 4
+# level below which a second start has to agree
+_DOUBT = 0.05
+# the same where both have the same freedom, and so the same minimum
+_ALIKE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,28 +74,51 @@ class Testimony:
         if grey.cost <= 1e-18 * self.minimum.objective.energy:
             sentence = "the estimate leaves nothing but the rounding of the data"
             return Witness("complete", sentence, 0.0, 0.0, 1.0)
+        if not self.minimum.solution.converged:
+            return Witness("absent", "the descent has not come to a minimum")
         found = Reference.of(model, readings)
         beside = found.beside(model, readings)
         box = min(found, beside, key=lambda r: r.cost)
         free = len(self.minimum.x) - int(self.minimum.determined.loose.sum())
         top = box.unknowns - free
         bottom = box.objective.n_rows - box.solution.point.n_initial - box.unknowns
-        if top < 1 or bottom < 1:
-            return Witness("absent", f"a black box of order {order} has no more freedom", box.cost)
+        if bottom < 1:
+            return Witness("absent", "the data are too few for a black box beside it", box.cost)
+        if top < 1:
+            return self._alike(order, box.cost, grey.cost / box.cost - 1)
         f = self._statistic(structure, readings, box, grey) * bottom / top
         p = float(scipy.stats.f.sf(f, top, bottom))
         numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
-        verdict, sentence = self._verdict(order, numbers, p, grey.cost / box.cost - 1)
+        gap = grey.cost / box.cost - 1
+        verdict, sentence = self._verdict(order, numbers, p, gap, self._open())
         return Witness(verdict, sentence, box.cost, float(f), p, (top, bottom))
 
-    def _verdict(self, order: int, numbers: str, p: float, gap: float) -> tuple[Verdict, str]:
+    def _alike(self, order: int, cost: float, gap: float) -> Witness:
+        """A plant with as much freedom as the black box: the same minimum, or a missed one."""
+        freedom = f"a black box of order {order} has no more freedom"
+        if gap <= _ALIKE:
+            return Witness("complete", f"no better minimum is left to find: {freedom}", cost)
+        if gap <= _TOUCHES:
+            return Witness("absent", f"{freedom}, and its own minimum is not quite this one", cost)
+        sentence = f"{freedom} and leaves {100 * gap:.2g} % less: a better minimum was missed"
+        return Witness("lacking", sentence, cost)
+
+    def _open(self) -> bool:
+        """Whether a parameter is so badly known that distant ones explain the data alike."""
+        std = np.sqrt(np.diag(Spread(np.ones(len(self.minimum.x)), self.minimum).covariance))
+        return bool((std > _OPEN * np.abs(self.minimum.x)).any())
+
+    def _verdict(
+        self, order: int, numbers: str, p: float, gap: float, undetermined: bool
+    ) -> tuple[Verdict, str]:
         if p < _LEVEL:
             return "lacking", (
                 f"a black box of order {order} explains the data better ({numbers}): a better "
                 "minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
                 "the right hold"
             )
-        if gap > _TOUCHES and self.n_agreed < 2:
+        wanted = _WANTED if undetermined else 2 if p < _DOUBT else 1
+        if gap > _TOUCHES and self.n_agreed < wanted:
             return "absent", (
                 f"a black box of order {order} explains the data no better ({numbers}), but they "
                 "are too noisy for it to tell one minimum from another"

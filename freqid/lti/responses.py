@@ -42,7 +42,12 @@ def points(omega: FloatArray, hold: Hold) -> ComplexArray:
 
 
 def on_circle(angle: FloatArray) -> ComplexArray:
-    """exp(j·angle); a cosine and a sine take half of the time of a complex exponential."""
+    """exp(j·angle); a cosine and a sine take half of the time of a complex exponential.
+
+    Complex angles lie off the circle: a positive damping, outside of it.
+    """
+    if np.iscomplexobj(angle):
+        return np.exp(1j * angle)
     z = np.empty(angle.shape, complex)
     np.cos(angle, out=z.real)
     np.sin(angle, out=z.imag)

@@ -16,13 +16,11 @@ from freqid.checks import ComplexArray, InputError
 from freqid.fitting.black_box.rational_lines import FEW, Fitted, RationalLines
 from freqid.fitting.black_box.subspace import identify, observed
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
-from freqid.fitting.search.noise_floor import noise_floor
 from freqid.lti import StateSpace
 
-# a minimum that was found without a detour and leaves less than this part of the data's energy, or
-# little more than their noise, is believed
+# a minimum that was found without a detour and leaves less than this part of the data's energy is
+# believed; in more noise than that there may be a better one a little below
 _BELIEVED = 0.03
-_EXPLAINED = 1.5
 # lines that are enough to come next to the minimum
 _LINES = 20000
 # poles of larger models beyond those that are wanted
@@ -59,10 +57,7 @@ def _believed(lines: RationalLines, found: Fitted) -> bool:
         return True
     if not found.straight:
         return False
-    energy = sum(e.energy for e in lines.experiments)
-    if found.cost <= _BELIEVED * energy:
-        return True
-    return found.cost <= _EXPLAINED * noise_floor(lines.experiments)
+    return found.cost <= _BELIEVED * sum(e.energy for e in lines.experiments)
 
 
 def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:

@@ -178,15 +178,15 @@ class SpectralExperiment:
         Y = self.lines.error(self.lines.Y)
         return float(np.vdot(Y, Y).real)
 
-    def thinned(self, step: int) -> SpectralExperiment:
-        """One in ``step`` of the lines that count, weighted so that costs stay comparable."""
-        # weights may leave out lines with a period of their own
-        kept = np.flatnonzero(self.lines.counted)[::step]
-        more = np.sqrt(step)
+    def thinned(self, part: float = 1.0, evenly: bool = False) -> SpectralExperiment:
+        """About a ``part`` of the lines that count, weighted so that costs stay comparable."""
+        kept, weight = self.lines.spread(part, evenly)
+        more = np.sqrt(weight)
+        aliases = self.lines.aliases
         return dataclasses.replace(
             self,
             lines=self.lines.some(kept, more),
-            points=self.points.some(runs(kept, self.lines.aliases), more),
+            points=self.points.some(runs(kept, aliases), np.repeat(more, aliases)),
             transient=self.transient and self.transient.some(kept, more),
         )
 
@@ -199,8 +199,8 @@ def thinned_to(
     experiments: Sequence[SpectralExperiment], count: int
 ) -> Sequence[SpectralExperiment]:
     """About ``count`` lines of all experiments together; the same ones where they are fewer."""
-    step = sum(e.n_lines for e in experiments) // count
-    return [e.thinned(step) for e in experiments] if step > 1 else experiments
+    part = count / max(sum(e.n_lines for e in experiments), 1)
+    return [e.thinned(part) for e in experiments] if part <= 0.5 else experiments
 
 
 class _SpectralEvaluation:

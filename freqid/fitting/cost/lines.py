@@ -10,6 +10,11 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
 from freqid.lti import Hold, PeriodicHold, Plane, on_circle
 
+# lines that hold this part of the input's energy are driven
+_ENERGY = 0.999
+# so small a part of the lines is few
+_FEW = 0.2
+
 
 @dataclass(frozen=True)
 class Lines:
@@ -69,13 +74,39 @@ class Lines:
         power = np.abs(self.U).sum(axis=(0, 1)).reshape(-1, self.aliases)
         return np.arange(len(power)) * self.aliases + power.argmax(axis=1)
 
-    def some(self, lines: IntArray, factor: float) -> Lines:
-        """Some of the lines, the data multiplied so that costs stay comparable."""
+    def spread(self, part: float, evenly: bool) -> tuple[IntArray, FloatArray]:
+        """About a ``part`` of the lines that count, and the weight of each: how many it stands for.
+
+        Unless ``evenly`` lines are wanted, those that hold the input's energy, where they are few,
+        are half of the part, which tell the response, and the rest the other half, which tell the
+        transient and the noise.
+        """
+        # weights may leave out lines with a period of their own
+        counted = np.flatnonzero(self.counted)
+        power = (np.abs(self.U) ** 2).sum(axis=(0, 1)).reshape(-1, self.aliases).sum(axis=1)
+        power = power[counted]
+        order = np.argsort(-power)
+        energy = np.cumsum(power[order])
+        driven = np.zeros(len(counted), bool)
+        driven[order[: int(np.searchsorted(energy, _ENERGY * energy[-1])) + 1]] = True
+        if evenly or driven.sum() >= _FEW * len(counted):
+            groups, wanted = [counted], part * len(counted)
+        else:
+            groups, wanted = [counted[driven], counted[~driven]], part * len(counted) / 2
+        steps = [max(int(len(group) / wanted * (1 + 1e-9)), 1) for group in groups]
+        kept = [group[::step] for group, step in zip(groups, steps, strict=True)]
+        weight = np.repeat([float(step) for step in steps], [len(k) for k in kept])
+        lines = np.concatenate(kept)
+        order = np.argsort(lines)
+        return lines[order], weight[order]
+
+    def some(self, lines: IntArray, factor: FloatArray) -> Lines:
+        """Some of the lines, the data multiplied (lines,) so that costs stay comparable."""
         inputs = runs(lines, self.aliases)
         return Lines(
             self.omega[lines],
             self.omega_input[lines],
-            self.U[..., inputs] * factor,
+            self.U[..., inputs] * np.repeat(factor, self.aliases),
             self.Y[..., lines] * factor,
             self.scale[..., lines],
             self.inside,
@@ -89,8 +120,8 @@ class Points:
     z: ComplexArray
     U: ComplexArray
 
-    def some(self, inputs: IntArray, factor: float) -> Points:
-        """At some of the input's lines."""
+    def some(self, inputs: IntArray, factor: FloatArray) -> Points:
+        """At some of the input's lines, each multiplied."""
         return Points(self.z[inputs], self.U[..., inputs] * factor)
 
     def in_plane(self, plane: Plane, U: ComplexArray) -> Points:
@@ -135,10 +166,11 @@ class Transient:
             factor = factor * np.repeat(lines.scale[0, 0], aliases)
         return cls(dt, z, factor, aliases, shared)
 
-    def some(self, lines: IntArray, factor: float) -> Transient:
+    def some(self, lines: IntArray, factor: FloatArray) -> Transient:
         """At some of the lines."""
         at = runs(lines, self.aliases)
-        return dataclasses.replace(self, z=self.z[at], factor=self.factor[at] * factor)
+        more = np.repeat(factor, self.aliases)
+        return dataclasses.replace(self, z=self.z[at], factor=self.factor[at] * more)
 
     def in_plane(self, plane: Plane) -> Transient:
         """A transient in z seen in another plane."""

@@ -47,6 +47,12 @@ class ScannableStructure(Structure, Protocol):
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""
         ...
 
+    def sensitivities(
+        self, points: FloatArray, omega: FloatArray, hold: Hold
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
+        ...
+
 
 class EstimatedStructure(Structure, Protocol):
     """A structure that says what a user asks of an estimate, each with its derivatives by x."""

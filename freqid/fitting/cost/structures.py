@@ -14,8 +14,11 @@ from freqid.lti import (
     Linearisation,
     Realisation,
     StateSpace,
+    eigenbasis_of_many,
     eigenvalues_and_derivatives,
     many_responses,
+    points as points_of,
+    response_and_derivatives,
     sampled_response,
 )
 from freqid.models import GreyBox, Parameter
@@ -100,6 +103,33 @@ class GreyStructure:
         theta = points * self.scale
         columns = dict(zip(self.physical_names, theta.T, strict=True))
         return many_responses(self.model.state_spaces(**columns), omega, hold)
+
+    def sensitivities(
+        self, points: FloatArray, omega: FloatArray, hold: Hold
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
+        if self.unknown or self.known:
+            return self._one_by_one(points, omega, hold)
+        try:
+            at, d = self.model.linearise_many(points * self.scale, self.physical_names)
+        except Exception:  # the user's function may raise anything at one of the points
+            return self._one_by_one(points, omega, hold)
+        basis = eigenbasis_of_many(at, d.times(self.scale[:, None, None]))
+        z = points_of(omega, hold)
+        return response_and_derivatives(basis.through(hold), np.tile(z, (len(points), 1)))
+
+    def _one_by_one(
+        self, points: FloatArray, omega: FloatArray, hold: Hold
+    ) -> tuple[ComplexArray, ComplexArray]:
+        p, m, count = self.model.n_outputs, self.model.n_inputs, points.shape[1]
+        G = np.full((len(points), p, m, len(omega)), np.nan + 0j)
+        dG = np.full((len(points), count, p, m, len(omega)), np.nan + 0j)
+        for i, x in enumerate(points):
+            try:
+                G[i], dG[i] = sampled_response(self.realise(x), omega, hold)
+            except Exception:
+                continue
+        return G, dG
 
     def response(
         self, x: FloatArray, omega: FloatArray, hold: Hold | None

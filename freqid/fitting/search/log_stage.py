@@ -48,19 +48,27 @@ class LogResponse:
         """Evaluate at one trial point."""
         return _LogEvaluation(self, realisation)
 
+    def error(self, G: ComplexArray) -> FloatArray:
+        """log(G/Ĝ) as real rows, (…, rows)."""
+        ratio = G / self.measured
+        error = (np.log(np.abs(ratio)) + 1j * np.angle(ratio)) * self.weight
+        return error.reshape(*G.shape[:-3], -1).view(float)
+
+    def relative(self, G: ComplexArray, dG: ComplexArray) -> FloatArray:
+        """Derivatives of the same, (…, P, rows)."""
+        change = dG / G[..., None, :, :, :] * self.weight
+        return change.reshape(*dG.shape[:-3], -1).view(float)
+
 
 class _LogEvaluation:
     def __init__(self, target: LogResponse, realisation: Realisation) -> None:
-        G, self.dG = sampled_response(realisation, target.omega, target.hold)
-        self.G, self.weight = G, target.weight
-        ratio = G / target.measured
-        error = np.log(np.abs(ratio)) + 1j * np.angle(ratio)
-        self.residual = (error * target.weight).reshape(-1).view(float)
+        self.target = target
+        self.G, self.dG = sampled_response(realisation, target.omega, target.hold)
+        self.residual = target.error(self.G)
         self.transient: FloatArray | None = None
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        relative = self.dG / self.G * self.weight
-        return relative.reshape(len(relative), -1).view(float)
+        return self.target.relative(self.G, self.dG)
 
 
 class LogStructure:
@@ -82,10 +90,12 @@ class LogStructure:
 
     def realise(self, xi: FloatArray) -> Realisation:
         """The plant and its derivatives by xi."""
+        return self.inner.realise(self.value(xi)).scaled(self.slope(xi))
+
+    def slope(self, xi: FloatArray) -> FloatArray:
+        """Derivative of each inner unknown by its own, (P,)."""
         x = self.value(xi)
-        realisation = self.inner.realise(x)
-        by = np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
-        return realisation.scaled(by)
+        return np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
 
     def describe(self, xi: FloatArray) -> str:
         """The trial point in the user's words."""
@@ -94,37 +104,63 @@ class LogStructure:
 
 # a response as the data's black box has it, at omega (rad/s), and its relative standard error
 Smooth = Callable[[FloatArray], tuple[ComplexArray, FloatArray]]
-# relative standard errors up to which lines count alike
-_SURE = 0.05
+# relative standard errors up to which lines count alike, and from which they tell nothing
+_SURE, _KNOWN = 0.05, 1.0
 
 
 def log_targets(
-    experiments: Sequence[SpectralExperiment], smooth: Smooth | None
+    experiments: Sequence[SpectralExperiment],
+    smooth: Smooth | None,
+    count: int = _LINES,
+    damping: float = 0.0,
 ) -> list[LogResponse]:
-    """First-stage experiments: ``smooth`` at lines that the input drives.
+    """First-stage experiments: ``smooth`` at about ``count`` lines that the input drives.
 
-    Without it the ratio of output and input is taken where one input frequency rules, as in a
-    response; empty where that cannot be read off the data.
+    With a ``damping`` the responses are those at s = (damping + j) ω, where the resonances of the
+    plant and of its model are blunt and find one another from farther away. Without ``smooth`` the
+    ratio of output and input is taken where one input frequency rules, as in a response; empty
+    where that cannot be read off the data.
     """
     targets = []
     for e in experiments:
         if smooth is None:
             response = _empirical(e)
-            if response is None:
+            if response is None or damping:
                 return []
             targets.append(LogResponse(*response, e.hold))
             continue
-        power = (np.abs(e.lines.U) ** 2).sum(axis=(0, 1)).reshape(-1, e.lines.aliases).max(axis=1)
-        driven = e.lines.counted & (power > 1e-3 * power.max()) & (e.lines.omega > 0)
-        omega = e.lines.omega[_evenly(np.flatnonzero(driven))]
-        G, error = smooth(omega)
-        targets.append(LogResponse(omega, G, e.hold, 1 / np.maximum(error / _SURE, 1)))
+        omega = _told(e.lines.omega[e.lines.counted & (e.lines.omega > 0)], smooth, count)
+        if len(omega) < 2:
+            return []
+        at = omega * (1 - 1j * damping) if damping else omega
+        G, error = smooth(at)
+        targets.append(LogResponse(at, G, e.hold, 1 / np.maximum(error / _SURE, 1)))
     return targets
 
 
-def _evenly(lines: IntArray) -> IntArray:
-    """So many of them as the first stage takes."""
-    return lines[np.unique(np.linspace(0, len(lines) - 1, _LINES).astype(int))]
+def _told(omega: FloatArray, smooth: Smooth, count: int) -> FloatArray:
+    """About so many of the lines at which the response is known: where it turns and bends, half of
+    them, and the others evenly, along the frequency and along its logarithm.
+    """
+    if len(omega) < 2:
+        return omega
+    even = np.linspace(0, len(omega) - 1, 2 * count)
+    ratios = np.searchsorted(omega, np.geomspace(omega[0], omega[-1], 2 * count))
+    few = omega[np.unique(np.append(even, np.minimum(ratios, len(omega) - 1)).astype(int))]
+    G, error = smooth(few)
+    known = (error < _KNOWN).all(axis=(0, 1))
+    if known.sum() < 2:
+        return few[known]
+    few, G = few[known], G[..., known]
+    bend = np.minimum(np.abs(np.diff(np.log(G), axis=-1)), 1).mean(axis=(0, 1))
+    way = np.concatenate([[0], np.cumsum(bend + bend.mean() + 1e-9)])
+    at = np.searchsorted(way, np.linspace(0, way[-1], count))
+    return few[np.unique(np.minimum(at, len(few) - 1))]
+
+
+def _evenly(count: int) -> IntArray:
+    """Numbers of so many of ``count`` lines as the first stage takes."""
+    return np.unique(np.linspace(0, count - 1, _LINES).astype(int))
 
 
 def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
@@ -154,5 +190,5 @@ def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
     kept = np.flatnonzero(usable)
     if len(kept) < 8:
         return None
-    kept = _evenly(kept)
+    kept = kept[_evenly(len(kept))]
     return lines.omega[kept], G[:, :, kept]

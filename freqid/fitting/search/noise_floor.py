@@ -31,7 +31,7 @@ def _local_noise(e: Experiment) -> float:
         return 0.0
     if not (e.lines.scale > 0).all():
         # among lines that are left out nothing is smooth
-        e = e.thinned(1)
+        e = e.thinned(evenly=True)
     width, K = 12, e.n_lines
     count = K // width
     if count < 4:

@@ -42,6 +42,17 @@ def promising(
     return points[np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")[:count]]
 
 
+def around(structure: ScannableStructure, start: FloatArray, count: int, seed: int) -> FloatArray:
+    """Scattered points (count, P), half of them on half of the way from the start."""
+    points = _scattered(structure, start, count, seed)
+    near = points[: count // 2]
+    alike = near * start > 0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        geometric = start * np.sqrt(near / start)
+    points[: count // 2] = np.where(alike, geometric, (start + near) / 2)
+    return np.clip(points, structure.lower, structure.upper)
+
+
 def _scattered(
     structure: ScannableStructure, start: FloatArray, count: int, seed: int
 ) -> FloatArray:

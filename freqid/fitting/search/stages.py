@@ -9,30 +9,46 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias, cast
 
 import numpy as np
 import scipy.stats
 
 from freqid.checks import FloatArray, InputError
-from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.objective import Objective, ScannableStructure
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.log_stage import LogResponse, LogStructure
-from freqid.fitting.search.scatter import promising
+from freqid.fitting.search.scatter import around, promising
+from freqid.fitting.search.walks import walked
 
 # a first stage this much worse than the best one so far is not followed up
 _HOPELESS = 4.0
-# starts of n_starts="auto" at the most
-BUDGET = 48
+# starts of n_starts="auto" at the most, those of one round, and the places that are followed up
+BUDGET, _ROUND, _FOLLOWED = 145, 24, 8
+# damping at which a round begins
+_BLUNT = 1.0
 # a cost of so many times the noise's own is explained by it
 _EXPLAINED = 1.5
-# starts in vain after which a search ends
-_PATIENCE = 12
-# a cost of so much more than a black box's is all but its own; level of a gap that noise explains
-_TOUCHES, _CERTAIN = 1e-3, 0.999
+# starts in vain after which a search without a black box ends
+_PATIENCE = 60
+# a cost of so much more than a black box's is all but its own
+_TOUCHES = 1e-3
+# level of a gap to a black box below which it is no chance
+_CHANCE = 1e-3
+# above that level of the gap so many starts that agree are enough; else the last number
+_AGREEMENT, _DOUBTED = ((0.2, 1), (0.05, 2)), 4
 # costs that agree to this belong to one minimum
 _SAME = 1e-6
 # evaluations of a start that is not the first, of a first stage, and the last step of that
 _LIMIT, _FIRST_LIMIT, _FIRST_STEP = 120, 80, 0.02
+# relative gain of the cost that ends the descent with signs kept
+_KEPT = 1e-5
+
+
+# starts tried, starts that led to a place, and the minimum below it
+Visit: TypeAlias = "tuple[int, int, Solution | None]"
+# targets of the first stage by the damping at which they are taken
+Rounds: TypeAlias = "Callable[[float], Sequence[LogResponse]]"
 
 
 @dataclass(frozen=True)
@@ -45,30 +61,35 @@ class Found:
     # starts since the best minimum was found
     n_stale: int = 0
 
-    def joined(self, other: Solution, rounding: float) -> Found:
-        """With the end of one start more."""
+    def joined(self, other: Solution, rounding: float, visits: int = 1) -> Found:
+        """With the end of one place more, to which so many starts have led."""
         gap = other.cost - self.solution.cost
         if abs(gap) <= _SAME * self.solution.cost + rounding:
             best = other if gap < 0 else self.solution
-            return dataclasses.replace(self, solution=best, n_agreed=self.n_agreed + 1)
-        return Found(other, self.n_starts) if gap < 0 else self
+            return dataclasses.replace(self, solution=best, n_agreed=self.n_agreed + visits)
+        return Found(other, self.n_starts, visits) if gap < 0 else self
 
 
 @dataclass(frozen=True)
 class Bound:
     """The cost of a black box of the model's order on the same lines, which none goes below.
 
-    Beyond ``explained`` the gap is no chance: so much more freedom does not fit that much noise.
+    It has ``extra`` unknowns more than the model; ``freedom`` real values are left to tell noise.
     """
 
     cost: float
-    explained: float
+    extra: int
+    freedom: int
 
-    @classmethod
-    def of(cls, cost: float, extra: int, freedom: int) -> Bound:
-        """``extra`` unknowns more than the model's; ``freedom`` real values less unknowns."""
-        gap = scipy.stats.chi2.ppf(_CERTAIN, max(extra, 1)) / max(freedom, 1)
-        return cls(cost, cost * (1 + float(gap)))
+    def level(self, cost: float) -> float:
+        """How often noise alone makes the gap to a right model's cost as large as this one."""
+        gap = max(cost / self.cost - 1, 0.0) * max(self.freedom, 1)
+        return float(scipy.stats.chi2.sf(gap, max(self.extra, 1)))
+
+
+def agreement(level: float) -> int:
+    """Starts that have to agree on a minimum above a black box, by the level of the gap."""
+    return next((count for least, count in _AGREEMENT if level > least), _DOUBTED)
 
 
 @dataclass
@@ -96,25 +117,36 @@ class StopRule:
         cost = found.solution.cost
         return cost <= max(self.rounding, self.bound.cost * (1 + _TOUCHES) if self.bound else 0.0)
 
+    def explains(self, cost: float) -> bool:
+        """Whether a cost is one that a right model may leave."""
+        return self.bound is not None and (
+            cost <= self.bound.cost * (1 + _TOUCHES) or self.bound.level(cost) > _CHANCE
+        )
+
     def enough(self, found: Found) -> bool:
-        """Whether no start more is needed."""
-        if found.n_starts >= self.limit:
-            return True
+        """Whether no start more is needed; a given count is always used up."""
         if self.n_starts is not None:
             return False
-        if self.sure(found) or found.n_stale >= _PATIENCE:
+        if self.sure(found):
             return True
         cost = found.solution.cost
+        # starts of both kinds, on a leash and without
+        both = found.n_starts > 2 * _ROUND
         if self.bound is None:
             if self._explained is None:
                 self._explained = _EXPLAINED * self.floor()
-            return found.n_agreed >= (1 if cost <= self._explained else 3)
-        near = cost <= max(self.bound.explained, self.rounding)
-        return found.n_agreed >= (2 if near else 4)
+            if cost <= self._explained or found.n_stale >= _PATIENCE:
+                return True
+            return found.n_agreed >= 3 and both
+        wanted = agreement(self.bound.level(cost))
+        return found.n_agreed >= wanted and (both or self.explains(cost))
 
 
 class Search:
-    """Both stages on one cost. ``targets`` are those of the first stage, empty for none.
+    """Both stages on one cost. ``targets`` are those of the first stage, empty for none;
+    ``rounds`` gives those of many starts together, at a damping of the responses. A place that is
+    ``aliased`` has a mode where samples cannot see it, and gives way to any other place that is
+    explained as well.
 
     ``floor`` gives, when it is asked, the cost that the data's own noise explains; ``bound`` is the
     cost of a black box of the model's order on the same lines, None where there is none.
@@ -126,8 +158,12 @@ class Search:
         targets: Sequence[LogResponse],
         floor: Callable[[], float],
         bound: Bound | None,
+        rounds: Rounds | None = None,
+        aliased: Callable[[FloatArray], bool] = lambda x: False,
     ) -> None:
         self.objective, self.targets = objective, targets
+        self.aliased = aliased
+        self.rounds: Rounds = rounds or (lambda damping: [] if damping else targets)
         self.floor, self.bound = floor, bound
         self._best_log_cost = np.inf
 
@@ -139,20 +175,63 @@ class Search:
         rounding = self.objective.rounding
         rule = StopRule(n_starts, rounding, self.floor, self.bound)
         found = self._first(start, rule)
-        starts = self._more(start, max(rule.limit - 1, 1), seed)
-        while not rule.enough(found):
-            begin = next(starts)
+        more = self._together if self.targets else self._one_by_one
+        tried = found.n_starts
+        done = rule.enough(found) and (n_starts is not None or not self.aliased(found.solution.x))
+        ends = iter(()) if done else more(start, rule, seed)
+        for count, visits, solution in ends:
+            tried += count
             found = dataclasses.replace(
-                found, n_starts=found.n_starts + 1, n_stale=found.n_stale + 1
+                found, n_starts=tried, n_stale=found.n_stale + max(count, visits)
             )
-            solution = self._followed(begin)
             if solution is not None:
-                found = found.joined(solution, rounding)
+                found = self._better(found, solution, visits, rule)
+            if rule.enough(found) and not self.aliased(found.solution.x):
+                break
         return self._finished(found)
 
-    def _more(self, start: FloatArray, count: int, seed: int) -> Iterator[FloatArray]:
-        """Scattered starts, the most promising first, made when the first is asked for."""
-        yield from promising(self.objective, start, self.targets, count, seed)
+    def _better(self, found: Found, other: Solution, visits: int, rule: StopRule) -> Found:
+        """The better of two minima; of two that noise does not tell apart the one in sight."""
+        joined = found.joined(other, rule.rounding, visits)
+        new, old = self.aliased(other.x), self.aliased(found.solution.x)
+        if new == old or not rule.explains(max(other.cost, found.solution.cost)):
+            return joined
+        return found if new else Found(other, found.n_starts, visits)
+
+    def _one_by_one(self, start: FloatArray, rule: StopRule, seed: int) -> Iterator[Visit]:
+        """Ends of scattered starts, the most promising first, made when they are asked for."""
+        if rule.limit < 2:
+            return
+        points = promising(self.objective, start, self.targets, rule.limit - 1, seed)
+        for begin in points:
+            try:
+                yield 1, 1, minimise(self.objective, begin, limit=_LIMIT)
+            except InputError:
+                yield 1, 1, None
+
+    def _together(self, start: FloatArray, rule: StopRule, seed: int) -> Iterator[Visit]:
+        """Ends of the places to which rounds of scattered starts lead, the likeliest first."""
+        structure = cast(ScannableStructure, self.objective.structure)
+        best, left, number = np.inf, rule.limit - 1, 0
+        # far off the axis modes find their own over a longer way
+        targets = [t for t in (self.rounds(_BLUNT), self.rounds(0.0)) if t]
+        while left > 0:
+            count = min(left, _ROUND)
+            left -= count
+            starts = around(structure, start, max(count, 2), seed + number)[:count]
+            # every second round goes without a leash, and so farther
+            free = bool(number % 2)
+            began = starts if number else np.vstack([start, starts])
+            places = walked(began, structure, targets[-1:] if free else targets, not free)
+            number += 1
+            yield count, 0, None
+            best = min([best, *(place.cost for place in places)])
+            for place in places[:_FOLLOWED]:
+                if place.cost > _HOPELESS * best:
+                    break
+                end = self._followed(np.clip(place.x, structure.lower, structure.upper))
+                if end is not None:
+                    yield 0, place.visits, end
 
     def _first(self, start: FloatArray, rule: StopRule) -> Found:
         """Both stages from the user's start, and the true cost from the start itself.
@@ -173,15 +252,17 @@ class Search:
             return found.joined(other, rule.rounding)
         return Found(minimise(self.objective, start))
 
-    def _followed(self, start: FloatArray) -> Solution | None:
-        """Both stages from a scattered start; None where they lead nowhere."""
+    def _followed(self, x: FloatArray) -> Solution | None:
+        """The true cost from a place: first with its signs kept, then with all of them free."""
+        kept = LogStructure(self.objective.structure, x)
+        second = Objective(kept, self.objective.experiments)
         try:
-            if not self.targets:
-                return minimise(self.objective, start, limit=_LIMIT)
-            walked = self._first_stage(start)
-            return None if walked is None else polish(self.objective, walked, limit=_LIMIT)
+            near = polish(second, np.where(kept.log, 0.0, x), _FIRST_STEP, _LIMIT, _KEPT)
+            return polish(self.objective, kept.value(near.x), limit=_LIMIT)
         except InputError:
             return None
+        finally:
+            self.objective.n_evaluations += second.n_evaluations
 
     def _first_stage(self, start: FloatArray) -> FloatArray | None:
         structure = LogStructure(self.objective.structure, start)

@@ -56,7 +56,7 @@ def score_covariance(
     with np.errstate(all="ignore"):
         for e in lines:
             step = max(e.n_lines // _LINES, 1)
-            few = e.thinned(step) if step > 1 else e
+            few = e.thinned(1 / step, evenly=True) if step > 1 else e
             evaluation = few.at(realisation)
             r, Q, delta = _projected(evaluation)
             J = evaluation.jacobian(delta)
