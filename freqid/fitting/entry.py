@@ -89,8 +89,13 @@ def fit(
     sets = as_data_sets(data)
     estimated = isinstance(hold, str) and hold == "estimate"
     skip_zero = isinstance(model, GreyBox) and model.integrates
+    late = isinstance(model, GreyBox) and bool(model.delay_sources)
+    if late and (domain == "time" or initial_state == "zero"):
+        raise InputError("a delay needs domain='frequency' and no initial state at rest")
     readings = [
-        Reading.of(d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero)
+        Reading.of(
+            d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late
+        )
         for d, noise in zip(sets, _noise_models(weights, data, sets), strict=True)
     ]
     options = SearchOptions(count, seed, start, estimated)

@@ -205,9 +205,9 @@ class Estimate:
         variance = response_variance(*self._unknowns, frf.omega, hold)
         return dataclasses.replace(frf, variance=variance)
 
-    def to_control(self) -> control.StateSpace:
+    def to_control(self, pade: int | None = None) -> control.StateSpace:
         """The estimated model as a ``control.StateSpace``."""
-        return self.model.to_control()
+        return self.model.to_control(pade)
 
     def to_continuous(self, hold: Hold | str | None = None) -> control.StateSpace:
         """A black-box model in continuous time, by inverting its hold (see ``OutputError``)."""

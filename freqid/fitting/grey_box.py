@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import cast
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, unknown
+from freqid.checks import InputError, unknown
 from freqid.data import input_dt, rate_factor
-from freqid.fitting.black_box.reference import Reference
-from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.priors import Prior
@@ -20,24 +16,14 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import SearchOptions, fits
+from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading, enough_rows, read_for
-from freqid.fitting.search.descent import Solution, minimise, polish
-from freqid.fitting.search.log_stage import log_targets
-from freqid.fitting.search.noise_floor import noise_floor
-from freqid.fitting.search.stages import Bound, Found, Search
+from freqid.fitting.search.descent import Solution, minimise
+from freqid.fitting.search.stages import Found
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
-from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
+from freqid.lti import ZeroOrderHold
 from freqid.models import GreyBox
-
-# lines on which the minimum is looked for, and how many times more for noise as large as the signal
-_LINES, _NOISY = 600, 10
-# lines on which many starts walk together
-_ROUND_LINES = 60
-# a start that costs so many times more on a part of the lines costs more on all
-_FAR = 1.1
-# local noise, and a cost, of this part of the data's energy are those of their rounding
-_QUIET, _EXACT = 1e-11, 1e-15
 
 
 @fits(GreyBox)
@@ -54,64 +40,13 @@ def fit_grey_box(
     experiments = read_for((model.n_outputs, model.n_inputs), readings)
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
-    found = _search(structure, objective, readings, options)
+    found = search_grey(structure, objective, readings, options)
     found = dataclasses.replace(found, solution=_unmirrored(objective, structure, found.solution))
     alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
     minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
     est = _estimate(structure, minimum, found, readings[0])
     return dataclasses.replace(est, testimony=Testimony(minimum, tuple(readings), found.n_agreed))
-
-
-def _search(
-    structure: GreyStructure,
-    objective: Objective,
-    readings: Sequence[Reading],
-    options: SearchOptions,
-) -> Found:
-    """The best minimum; a fit in time looks for it at the lines of the same data, then polishes."""
-    at_lines = [r.at_lines() for r in readings]
-    spectral = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
-    in_time = len(spectral) < len(objective.experiments)
-    if options.refit and not in_time:
-        return Found(polish(objective, structure.start))
-    if in_time:
-        spectral = [r.lines() for r in at_lines]
-    # a long record has more lines than it takes to find the minimum: refine on all of them last
-    lines = _lines_wanted(spectral)
-    few = thinned_to(spectral, lines)
-    scout = objective if few is spectral and not in_time else Objective(structure, few)
-    found = _without_noise(scout, structure, few, spectral)
-    if found is not None and not in_time:
-        objective.n_evaluations = scout.n_evaluations
-        if scout is objective:
-            return found
-        return dataclasses.replace(found, solution=_on_all(objective, scout, found))
-    beside = _reference(structure, at_lines, lines)
-    smooth = None if beside is None else beside.response
-    targets = log_targets(few, smooth)
-    rounds = None if smooth is None else partial(log_targets, few, smooth, _ROUND_LINES)
-    # a hold whose period is unknown is not one that the black box has
-    share = sum(e.n_lines for e in few) / sum(e.n_lines for e in spectral)
-    bound = None if beside is None or structure.unknown else _bound(beside, structure, share)
-    aliased = partial(_out_of_sight, structure, [r.hold for r in at_lines])
-    search = Search(scout, targets, lambda: noise_floor(spectral), bound, rounds, aliased)
-    found = search.run(structure.start, options.n_starts, options.seed)
-    objective.n_evaluations = scout.n_evaluations
-    if in_time:
-        return dataclasses.replace(found, solution=_in_time(objective, structure, found))
-    if scout is objective:
-        return found
-    return dataclasses.replace(found, solution=_on_all(objective, scout, found))
-
-
-def _out_of_sight(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:
-    """Whether a mode lies above the Nyquist frequency of a hold, where it looks like another."""
-    periods = [h.period for h in holds if isinstance(h, PeriodicHold)]
-    if not periods or structure.unknown:
-        return False
-    poles = structure.at(x).poles
-    return bool((np.abs(poles.imag) > np.pi / min(periods) * (1 + 1e-9)).any())
 
 
 def _unmirrored(objective: Objective, structure: GreyStructure, solution: Solution) -> Solution:
@@ -131,84 +66,6 @@ def _unmirrored(objective: Objective, structure: GreyStructure, solution: Soluti
     if point is None or point.cost > solution.cost * (1 + 1e-9) + objective.rounding:
         return solution
     return dataclasses.replace(solution, x=x, point=point)
-
-
-def _without_noise(
-    scout: Objective,
-    structure: GreyStructure,
-    few: Sequence[SpectralExperiment],
-    every: Sequence[SpectralExperiment],
-) -> Found | None:
-    """The minimum of data that are down to rounding, which needs no black box; None for others."""
-    energy = sum(e.energy for e in few)
-    if not 0 < noise_floor(every) <= _QUIET * energy:
-        return None
-    try:
-        found = Search(scout, log_targets(few, None), lambda: 0.0, None).run(structure.start, 1, 0)
-    except InputError:
-        return None
-    return found if found.solution.cost <= _EXACT * energy else None
-
-
-def _lines_wanted(experiments: Sequence[SpectralExperiment]) -> int:
-    """How many lines tell one minimum from another: more of them where noise outweighs signal."""
-    energy, noise = sum(e.energy for e in experiments), noise_floor(experiments)
-    return int(_LINES * (1 + _NOISY * noise / max(energy - noise, 1e-3 * energy)))
-
-
-def _reference(
-    structure: GreyStructure, readings: Sequence[Reading], lines: int
-) -> Reference | None:
-    """A black box of the plant's order on the lines of the search; None where there is none.
-
-    Of an output slower than its input a sampled one finds no minimum to rely on.
-    """
-    if any(rate_factor(r.data) > 1 for r in readings):
-        return None
-    try:
-        return Reference.of(structure.model, readings, lines)
-    except InputError:
-        return None
-
-
-def _bound(beside: Reference, structure: GreyStructure, share: float) -> Bound | None:
-    """What no plant of the order goes below; None where the black box itself has no minimum.
-
-    Lines that stand for others, a ``share`` of all, tell no more than themselves.
-    """
-    if not beside.solution.converged:
-        return None
-    used = beside.unknowns + beside.solution.point.n_initial
-    rows = int(share * beside.objective.n_rows) - used
-    return Bound(beside.cost, beside.unknowns - len(structure.names), rows)
-
-
-def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:
-    """From the minimum on a part of the lines to that on all, no worse than the start."""
-    best = polish(objective, found.solution.x)
-    start = cast(GreyStructure, objective.structure).start
-    there = scout.point(start)
-    if there is None or there.cost > _FAR * found.solution.cost + scout.rounding:
-        return best
-    own = objective.point(start)
-    if own is None or best.cost <= own.cost:
-        return best
-    other = polish(objective, start)
-    return other if other.cost < best.cost else best
-
-
-def _in_time(objective: Objective, structure: GreyStructure, found: Found) -> Solution:
-    """The minimum in time next to that at the lines."""
-    # a twin with an unstable estimate has no counterpart from rest: the start may be nearer
-    points = [(x, objective.point(x)) for x in (found.solution.x, structure.start)]
-    nearer = sorted((p.cost, i) for i, (_, p) in enumerate(points) if p is not None)
-    tried = [points[i][0] for _, i in nearer] or [structure.start]
-    best = minimise(objective, tried[0])
-    for x in tried[1:]:
-        other = minimise(objective, x, limit=40)
-        if other.cost < best.cost * (1 - 1e-9):
-            best = minimise(objective, other.x)
-    return best
 
 
 def _with_prior(

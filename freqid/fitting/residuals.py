@@ -50,7 +50,7 @@ def line_errors(
     """
     if initial_state == "zero":
         raise InputError("initial_state='zero' has no errors at lines; use 'estimate'")
-    late = bool(model.delay)
+    late = model.late
     reading = Reading.of(
         record, hold, band, initial_state=initial_state,  # type: ignore[arg-type]
         skip_zero=model.integrates, delayed=late,

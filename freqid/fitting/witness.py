@@ -20,6 +20,7 @@ import scipy.stats
 
 from freqid.checks import ComplexArray, InputError
 from freqid.data import Record
+from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
@@ -64,13 +65,25 @@ class Testimony:
         if any(r.initial_state == "zero" for r in self.readings):
             return Witness("absent", "an initial state at rest is none of a black box's lines")
         try:
-            return self._heard(structure, [r.at_lines() for r in self.readings])
+            if structure.model.delay_sources:
+                structure, readings = self._in_step(structure)
+            else:
+                readings = [r.at_lines() for r in self.readings]
+            return self._heard(structure, readings)
         except (InputError, np.linalg.LinAlgError) as error:
             return Witness("absent", str(error))
 
+    def _in_step(self, structure: GreyStructure) -> tuple[GreyStructure, list[Reading]]:
+        """The plant with less than a sample of delay, on the data with the rest taken off."""
+        model = structure.at(self.minimum.x)
+        shifts = whole_samples(model, self.readings[0])
+        readings = [in_step(r.at_lines(), shifts).with_(delayed=True) for r in self.readings]
+        nearer = with_less_delay(model, readings[0].sample_time, shifts)
+        return GreyStructure(nearer), readings
+
     def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
-        model, order = structure.at(self.minimum.x), len(structure.model.state_space().A)
         grey = self._grey(structure, readings)
+        model, order = structure.at(grey.x), len(structure.model.state_space().A)
         if grey.cost <= 1e-18 * self.minimum.objective.energy:
             sentence = "the estimate leaves nothing but the rounding of the data"
             return Witness("complete", sentence, 0.0, 0.0, 1.0)
@@ -130,9 +143,11 @@ class Testimony:
 
     def _grey(self, structure: GreyStructure, readings: Sequence[Reading]) -> Solution:
         """The estimate's minimum on the lines, without what was known before."""
-        if self.minimum.prior is None and not any(r.in_time for r in self.readings):
+        late = structure is not self.minimum.structure
+        if self.minimum.prior is None and not late and not any(r.in_time for r in self.readings):
             return self.minimum.solution
-        return polish(Objective(structure, [r.lines() for r in readings]), self.minimum.x)
+        begin = structure.start if late else self.minimum.x
+        return polish(Objective(structure, [r.lines() for r in readings]), begin)
 
     def _statistic(
         self, structure: GreyStructure, readings: Sequence[Reading], box: Reference, grey: Solution

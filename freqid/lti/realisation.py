@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,18 +38,28 @@ class Timing:
         return replace(self, parameter=None if self.parameter == index else self.parameter - 1)
 
 
+class Delayed(NamedTuple):
+    """A plant behind late inputs, what multiplies each of these (inputs, lines), and by how many
+    whole samples it shifts them.
+    """
+
+    plant: SampledPlant
+    late: ComplexArray
+    shifts: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Realisation:
     """A plant at one trial point of the search, prepared once for all experiments.
 
-    ``period`` is the period of a zero-order hold where it is estimated, ``delay`` that of the
-    inputs.
+    ``period`` is the period of a zero-order hold where it is estimated, ``delay`` that of all
+    inputs, or one for each.
     """
 
     linearisation: Linearisation
     basis: Basis
     period: Timing | None = None
-    delay: Timing | None = None
+    delay: tuple[Timing, ...] | None = None
     # the plant through each hold, which the experiments share
     seen: dict[tuple[Hold, int], SampledPlant] = field(default_factory=dict, compare=False)
 
@@ -57,7 +68,7 @@ class Realisation:
         cls,
         linearisation: Linearisation,
         period: Timing | None = None,
-        delay: Timing | None = None,
+        delay: tuple[Timing, ...] | None = None,
     ) -> Realisation:
         """Choose the state coordinates for these matrices."""
         return cls(linearisation, basis_of(*linearisation), period, delay)
@@ -70,7 +81,7 @@ class Realisation:
             Linearisation(at, d.times(factor)),
             self.basis.scaled(factor),
             self.period and self.period.scaled(by),
-            self.delay and self.delay.scaled(by),
+            self.delay and tuple(t.scaled(by) for t in self.delay),
         )
 
     def without(self, index: int) -> Realisation:
@@ -80,30 +91,56 @@ class Realisation:
         return Realisation.of(
             Linearisation(at, fewer),
             self.period and self.period.without(index),
-            self.delay and self.delay.without(index),
+            self.delay and tuple(t.without(index) for t in self.delay),
         )
 
     def at_known_period(self) -> Realisation:
         """The same point, to be seen through holds whose period is given."""
         return replace(self, period=None, seen={})
 
-    def delayed(
-        self, hold: Hold, omega: FloatArray, z: ComplexArray
-    ) -> tuple[SampledPlant, ComplexArray]:
-        """The plant behind a late zero-order hold, and the whole samples of delay as a factor."""
-        delay = self.delay or Timing(0.0)
+    @property
+    def delays(self) -> tuple[Timing, ...]:
+        """One for each input."""
+        m = self.linearisation.at.B.shape[-1]
+        given = self.delay or (Timing(0.0),)
+        return given * m if len(given) == 1 else given
+
+    def delayed(self, hold: Hold, omega: FloatArray, z: ComplexArray) -> Delayed:
+        """The plant behind a late zero-order hold, and the whole samples of delay as factors."""
+        times = self.delays
         if not isinstance(hold, PeriodicHold):
-            return self.basis.through(hold), np.exp(-1j * omega * delay.value)
+            turn = [np.exp(-1j * omega * t.value) for t in times]
+            return Delayed(self.basis.through(hold), np.array(turn), (0,) * len(times))
         if not hold.constant:
-            raise InputError(f"delay={delay.value:g} s needs a zero-order hold, not {hold!r}")
-        steps = np.floor(delay.value / hold.period)
-        plant, moved = self.basis.delayed(hold.period, delay.value / hold.period - steps)
-        if delay.parameter is not None:
-            dgamma, dnext = plant.dgamma.copy(), np.array(plant.dgamma_next)
-            dgamma[delay.parameter] = moved * delay.scale
-            dnext[delay.parameter] = -moved * delay.scale
-            plant = replace(plant, dgamma=dgamma, dgamma_next=dnext)
-        return plant, z ** -(steps + 1)
+            worst = max(t.value for t in times)
+            raise InputError(f"delay={worst:g} s needs a zero-order hold, not {hold!r}")
+        # a step that comes a whole number of samples late is the last moment of a fraction of one:
+        # so a feedthrough answers to the sample that it should
+        samples = [t.value / hold.period for t in times]
+        shifts = tuple(int(np.ceil(s - 1e-9)) for s in samples)
+        fractions = [min(s - q + 1, 1.0) for s, q in zip(samples, shifts, strict=True)]
+        seen = {f: self.basis.delayed(hold.period, f) for f in dict.fromkeys(fractions)}
+        plant = seen[fractions[0]][0]
+        parts = {
+            name: np.array(getattr(plant, name))
+            for name in ("gamma", "gamma_next", "dgamma", "dgamma_next")
+        }
+        for i, (f, t) in enumerate(zip(fractions, times, strict=True)):
+            other, moved = seen[f]
+            for name, part in parts.items():
+                part[..., i] = getattr(other, name)[..., i]
+            if t.parameter is not None:
+                parts["dgamma"][t.parameter, :, i] += moved[:, i] * t.scale
+                parts["dgamma_next"][t.parameter, :, i] -= moved[:, i] * t.scale
+        late = np.array([z**-q for q in shifts])
+        moved_plant = replace(
+            plant,
+            gamma=parts["gamma"],
+            gamma_next=parts["gamma_next"],
+            dgamma=parts["dgamma"],
+            dgamma_next=parts["dgamma_next"],
+        )
+        return Delayed(moved_plant, late, shifts)
 
     def seen_through(
         self, hold: Hold, lift: int, omega: FloatArray, z: ComplexArray
@@ -133,9 +170,11 @@ def sampled_response(
     if realisation.delay is None:
         plant, z, moving = realisation.seen_through(hold, 1, omega, z)
         return response_and_derivatives(plant, z, moving)
-    plant, late = realisation.delayed(hold, omega, z)
+    plant, late, _ = realisation.delayed(hold, omega, z)
     G, dG = response_and_derivatives(plant, z)
     G, dG = G * late, dG * late
-    if realisation.delay.parameter is not None and not isinstance(hold, PeriodicHold):
-        dG[realisation.delay.parameter] -= 1j * omega * realisation.delay.scale * G
+    if not isinstance(hold, PeriodicHold):
+        for i, t in enumerate(realisation.delays):
+            if t.parameter is not None:
+                dG[t.parameter, :, i] -= 1j * omega * t.scale * G[:, i]
     return G, dG

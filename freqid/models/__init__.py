@@ -9,7 +9,14 @@ from freqid.models.model import Model
 from freqid.models.output_error import DiscreteModel, OutputError, coefficients_of
 from freqid.models.parameter import Parameter
 from freqid.models.plants import PLANTS, drivetrain, first_order, two_mass
-from freqid.models.simulation import FreeMotion, forcing, propagate, simulate
+from freqid.models.simulation import (
+    FreeMotion,
+    forcing,
+    late_sampled,
+    late_samples,
+    propagate,
+    simulate,
+)
 from freqid.models.transfer_function import (
     ContinuousModel,
     TransferFunction,

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, channel_names, unknown
+from freqid.checks import FloatArray, InputError, channel_names, finite, unknown
 from freqid.lti import Linearisation, StateSpace
-from freqid.models.matrices import Jacobian, Matrices, MatrixFunction
+from freqid.models.matrices import Jacobian, Matrices, MatrixFunction, without
 from freqid.models.model import Model
 from freqid.models.parameter import Parameter
 from freqid.models.ties import Ties
@@ -35,6 +35,8 @@ class GreyBox(Model):
             (dA, dB, dC, dD) of the matrices; complex steps or differences are taken without it.
         vectorized: True says that ``matrices`` also takes arrays of values, (batch,), and then
             returns matrices with that leading axis. It only saves time.
+        input_delay: by how much the inputs come late: in s, the name of a parameter (in s, which
+            ``matrices`` need not take), or one of these for each input.
 
     Raises ValueError when the matrices do not have agreeing shapes or are not finite, or when two
     parameters share a name.
@@ -46,7 +48,6 @@ class GreyBox(Model):
     """
 
     dt = 0.0
-    delay = 0.0
 
     matrices: Matrices
     parameters: Sequence[Parameter]
@@ -56,6 +57,7 @@ class GreyBox(Model):
     vectorized: bool = False
     ties: Mapping[str, str] = field(default_factory=dict)
     jacobian: Jacobian | None = None
+    input_delay: float | str | Sequence[float | str] | None = None
     _function: MatrixFunction = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -69,13 +71,57 @@ class GreyBox(Model):
             raise InputError(f"parameters={names} has a name twice; names must differ")
         ties = Ties(self.ties, names)
         nominal = ties.resolve({p.name: p.value for p in parameters})
-        function = MatrixFunction(self.matrices, ties, self.vectorized, self.jacobian, nominal)
+        timing = self._delay_names(names)
+        function = MatrixFunction(
+            without(self.matrices, timing), ties, self.vectorized, self.jacobian, nominal
+        )
         object.__setattr__(self, "_function", function)
         at = self.state_space()
+        given = self._given_delays
+        if len(given) not in (0, 1, at.B.shape[1]):
+            raise InputError(
+                f"input_delay has {len(given)} entries for {at.B.shape[1]} inputs; give one, or "
+                "one for each"
+            )
         object.__setattr__(
             self, "outputs", channel_names("outputs", self.outputs, at.C.shape[0], "y")
         )
         object.__setattr__(self, "inputs", channel_names("inputs", self.inputs, at.B.shape[1], "u"))
+
+    @property
+    def _given_delays(self) -> tuple[float | str, ...]:
+        given = self.input_delay
+        if given is None:
+            return ()
+        return (given,) if isinstance(given, (str, int, float)) else tuple(given)
+
+    def _delay_names(self, names: Sequence[str]) -> list[str]:
+        """Parameters that are delays; ValueError for a delay that cannot be one."""
+        for d in self._given_delays:
+            if not isinstance(d, str):
+                finite("input_delay", d)
+            elif d not in names:
+                raise InputError(unknown("input_delay", d, names))
+            elif d in self.ties:
+                raise InputError(f"input_delay={d!r} is tied; tie the other parameter to it")
+        return [d for d in self._given_delays if isinstance(d, str)]
+
+    @property
+    def delay_sources(self) -> tuple[float | str, ...]:
+        """What tells the delay of each input: seconds, or a parameter's name; empty for none."""
+        given = self._given_delays
+        return given * self.n_inputs if len(given) == 1 else given
+
+    @property
+    def delays(self) -> tuple[float, ...]:
+        """Delay of each input in s."""
+        values, sources = self.values, self.delay_sources or (0.0,) * self.n_inputs
+        return tuple(values[d] if isinstance(d, str) else float(d) for d in sources)
+
+    @property
+    def delay(self) -> float:  # type: ignore[override]
+        """The longest delay of an input in s."""
+        return max(self.delays, key=abs, default=0.0)
 
     @property
     def values(self) -> dict[str, float]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +17,26 @@ Jacobian = Callable[..., Mapping[str, Sequence[object]]]
 
 # small enough that its square vanishes beside any matrix entry
 _COMPLEX_STEP = 1e-100
+
+
+def without(function: Matrices, names: Sequence[str]) -> Matrices:
+    """The function of parameters of which it does not take some."""
+    if not names:
+        return function
+    taken = inspect.signature(function).parameters
+    if any(p.kind is p.VAR_KEYWORD for p in taken.values()):
+        return function
+    left_out = tuple(name for name in names if name not in taken)
+    return _Without(function, left_out) if left_out else function
+
+
+@dataclass(frozen=True)
+class _Without:
+    function: Matrices
+    names: tuple[str, ...]
+
+    def __call__(self, **values: object) -> Sequence[object]:
+        return self.function(**{k: v for k, v in values.items() if k not in self.names})
 
 
 class MatrixFunction:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, InputError
+from freqid.checks import ComplexArray, InputError, whole
 from freqid.data import FrequencyResponse
 from freqid.lti import (
     BandLimited,
@@ -57,6 +57,16 @@ class Model(ABC):
         return len(self.outputs or ())
 
     @property
+    def delays(self) -> tuple[float, ...]:
+        """Delay of each input in s."""
+        return (self.delay,) * self.n_inputs
+
+    @property
+    def late(self) -> bool:
+        """Whether any input comes late."""
+        return any(self.delays)
+
+    @property
     def poles(self) -> ComplexArray:
         """Poles, (n,): in rad/s, or in the z plane where the model is a sampled one."""
         return np.linalg.eigvals(self.state_space().A).astype(complex)
@@ -80,7 +90,7 @@ class Model(ABC):
     def still(self) -> Realisation:
         """The model at its values, for what moves none of them."""
         at = self.state_space()
-        delay = Timing(self.delay) if self.delay else None
+        delay = tuple(map(Timing, self.delays)) if self.late else None
         return Realisation.of(Linearisation(at, at.still()), delay=delay)
 
     def sampled(self, hold: Hold) -> Sampled:
@@ -118,8 +128,8 @@ class Model(ABC):
             )
         between = BandLimited() if hold is None or self.dt else hold
         z = on_circle(at * self.dt) if self.dt else points(at, between)
-        if self.delay:
-            plant, late = self.still().delayed(between, at, z)
+        if self.late:
+            plant, late, _ = self.still().delayed(between, at, z)
             G = transfer(plant, z) * late
         else:
             G = transfer(basis_of(self.state_space()).through(between), z)
@@ -130,22 +140,38 @@ class Model(ABC):
             input_names=self.inputs, output_names=self.outputs,
         )  # fmt: skip
 
-    def to_control(self) -> control.StateSpace:
+    def to_control(self, pade: int | None = None) -> control.StateSpace:
         """The model as a ``control.StateSpace``, continuous or discrete as it is.
 
-        Raises ValueError for a model with a delay, which control systems do not have.
+        A delay becomes Padé's approximation of order ``pade``. Raises ValueError for a model with
+        a delay where no order is given: control systems have none.
         """
         import control
 
-        if self.delay:
+        names = {"inputs": list(self.inputs or ()), "outputs": list(self.outputs or ())}
+        plain = control.ss(*self.state_space(), self.dt, **names)
+        if not self.late:
+            return plain
+        worst = max(self.delays, key=abs)
+        if pade is None:
             raise InputError(
-                f"control systems have no delay and this model has {self.delay:g} s; use "
-                "dataclasses.replace(model, delay=0).to_control() with control.pade(delay, order)"
+                f"control systems have no delay and this model has {worst:g} s; give "
+                "to_control(pade=order), or sample it: simulate knows the delay"
             )
-        return control.ss(
-            *self.state_space(), self.dt,
-            inputs=list(self.inputs or ()), outputs=list(self.outputs or ()),
-        )  # fmt: skip
+        whole("pade", pade)
+        if min(self.delays) < 0:
+            raise InputError(f"delay={min(self.delays):g} s is early, which no system can be")
+        late = control.append(*(_pade(delay, pade) for delay in self.delays))
+        at = control.series(late, plain)
+        return control.ss(at.A, at.B, at.C, at.D, self.dt, **names)
+
+
+def _pade(delay: float, order: int) -> control.StateSpace:
+    import control
+
+    if delay == 0:
+        return control.ss([], [], [], [[1.0]])
+    return control.ss(control.tf(*control.pade(delay, order)))
 
 
 class MatrixModel(Model):

@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError, choice, whole
 from freqid.models.grey_box import GreyBox
+from freqid.models.matrices import without
 from freqid.models.parameter import Parameter
 
 
@@ -67,6 +68,7 @@ def drivetrain(
     n_masses: int,
     outputs: Sequence[str] = ("motor velocity",),
     gear: float = 1 / 118,
+    input_delay: float | str | None = None,
     **values: float,
 ) -> GreyBox:
     """A chain of ``n_masses`` inertias behind a gear, springs and dampers between them.
@@ -76,7 +78,9 @@ def drivetrain(
     "position" (rad), "velocity" (rad/s) or "acceleration" (rad/s²). Parameters: inertias J1 (motor)
     to Jn in kg m², stiffnesses k1 … in N m/rad and dampings d1 … in N m s/rad of the joints, the
     motor's friction fm in N m s/rad, and the gear ratio, which is fixed; ``values`` replaces the
-    defaults. Raises ValueError for fewer than two masses, an unknown output or parameter.
+    defaults. ``input_delay`` is by how much the torque comes late, in s, or the name of one more
+    parameter for it, begun from zero. Raises ValueError for fewer than two masses, an unknown
+    output or parameter.
 
     >>> drivetrain(3).free_parameters[-1].name
     'fm'
@@ -93,9 +97,12 @@ def drivetrain(
     parameters += [Parameter(f"k{i}", 1.5e5 * i, "N m/rad") for i in range(1, n)]
     parameters += [Parameter(f"d{i}", 10.0 * i, "N m s/rad") for i in range(1, n)]
     parameters += [Parameter("fm", 1e-3, "N m s/rad"), Parameter("gear", gear, "1", fixed=True)]
+    if isinstance(input_delay, str):
+        parameters.append(Parameter(input_delay, 0.0, "s"))
     model = GreyBox(
-        partial(_drivetrain, n, tuple(names)),
+        without(partial(_drivetrain, n, tuple(names)), [str(input_delay)]),
         parameters,
+        input_delay=input_delay,
         inputs=["torque"],
         outputs=names,
         name=f"drivetrain of {n} masses",

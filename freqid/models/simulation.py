@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive, samples
 from freqid.data import Record
-from freqid.lti import Hold, PeriodicHold, Sampled, as_hold
+from freqid.lti import Hold, PeriodicHold, Sampled, ZeroOrderHold, as_hold
 from freqid.models.conversion import ModelLike, as_model
+from freqid.models.model import Model
 
 
 def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
@@ -83,6 +84,38 @@ def forcing(sampled: Sampled, u: FloatArray) -> FloatArray:
     return sampled.gamma @ u + sampled.gamma_next @ following
 
 
+def late_sampled(plant: Model, hold: PeriodicHold) -> Sampled:
+    """Sampled matrices of a plant whose inputs come late, for inputs shifted by whole samples.
+
+    x(k+1) = Φ x(k) + Γ v(k) + Γ⁺ v(k+1) with v(k) = u(k − q) and q the delay in samples, broken
+    ones counted: the input steps once in every period. Raises ValueError for another hold.
+    """
+    if not hold.constant:
+        raise InputError(f"hold={hold!r}: a delay needs a zero-order hold or a band-limited input")
+    system, h = plant.state_space(), hold.period
+    whole = hold.sampled(system.A, system.B)
+    gamma, following = whole.gamma.copy(), 0 * whole.gamma
+    for i, (delay, q) in enumerate(zip(plant.delays, late_samples(plant, h), strict=True)):
+        before = (delay / h - q + 1) * h
+        if h - before <= 1e-12 * h:
+            continue
+        b = system.B[:, [i]]
+        old, new = (ZeroOrderHold(t).sampled(system.A, b) for t in (before, h - before))
+        gamma[:, [i]], following[:, [i]] = new.phi @ old.gamma, new.gamma
+    return Sampled(whole.phi, gamma, following)
+
+
+def late_samples(plant: Model, period: float) -> list[int]:
+    """By how many samples of a period (s) each input comes late, broken ones counted."""
+    return [int(np.ceil(delay / period - 1e-9)) for delay in plant.delays]
+
+
+def _shifted(u: FloatArray, steps: int) -> FloatArray:
+    """u(k − steps) for every k of u (N,), zero before its start, held after its end."""
+    at = np.arange(len(u)) - steps
+    return np.where(at < 0, 0.0, u[np.clip(at, 0, len(u) - 1)])
+
+
 def simulate(
     model: ModelLike,
     u: ArrayLike,
@@ -118,8 +151,6 @@ def simulate(
             f"hold={between!r} must have the period dt={dt:g} s of the input's samples"
         )
     plant = as_model(model)
-    if plant.delay:
-        raise InputError("model has a delay; simulate it without and shift the input by hand")
     system = plant.state_space()
     inputs = u.reshape(len(u), -1)
     n, m = system.B.shape
@@ -130,7 +161,14 @@ def simulate(
         raise InputError(f"initial_state has shape {x0.shape}; the model has {n} states")
     if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
         raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
-    if plant.dt or isinstance(between, PeriodicHold):
+    if plant.late and isinstance(between, PeriodicHold):
+        late, shifts = late_sampled(plant, between), late_samples(plant, dt)
+        seen = np.array([_shifted(c, q) for c, q in zip(inputs.T, shifts, strict=True)])
+        # an input of the next sample has come already when it is late by less than one
+        following = np.array([_shifted(c, q - 1) for c, q in zip(inputs.T, shifts, strict=True)])
+        x = propagate(late.phi, late.gamma @ seen + late.gamma_next @ following, x0)
+        y = (system.C @ x + system.D @ seen).T
+    elif plant.dt or isinstance(between, PeriodicHold):
         sampled = plant.sampled(between)
         x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
         y = (system.C @ x + system.D @ inputs.T).T

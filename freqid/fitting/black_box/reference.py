@@ -20,7 +20,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
 from freqid.lti import PeriodicHold, Plane, StateSpace
-from freqid.models import GreyBox
+from freqid.models import GreyBox, late_sampled
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
@@ -65,7 +65,9 @@ class Reference:
         """
         dt = _common_period(readings)
         lines, plane = lines_in_plane(readings, count)
-        direct = bool(model.state_space().D.any()) or readings[0].hold.reaches_next
+        # what is left of a delay within a sample lets the input through, too
+        direct = bool(model.state_space().D.any() or model.delay_sources)
+        direct = direct or readings[0].hold.reaches_next
         order = len(model.state_space().A)
         try:
             chart = Chart(first_model(lines, order, direct), direct, plane, dt)
@@ -107,6 +109,8 @@ class Reference:
         hold = readings[0].hold
         assert isinstance(hold, PeriodicHold)
         at, s = model.state_space(), model.sampled(hold)
+        if model.late:
+            s = late_sampled(model, hold)
         # what reaches the next sample, z Γ⁺, is (zI − Φ)Γ⁺ + ΦΓ⁺
         gamma, D = s.gamma + s.phi @ s.gamma_next, at.D + at.C @ s.gamma_next
         centre = to_plane(StateSpace(s.phi, gamma, at.C, D), self.chart.plane)

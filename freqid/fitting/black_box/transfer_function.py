@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
+from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
@@ -35,6 +36,8 @@ from freqid.models import (
 
 # frequencies over which poles are spread to begin from
 _SPREAD = 20
+# samples of delay that are tried, and how many of these delays are followed
+_LONGEST, _FOLLOWED = 24, 3
 
 
 @fits(TransferFunction, black_box=True)
@@ -57,11 +60,8 @@ def fit_transfer_function(
     omega = 2 * np.pi * np.geomspace(*_edges(first), _SPREAD)
     scale = float(np.exp(np.log(omega).mean()))
     unit = input_dt(first.data)
-    # delays to begin from: one that is off by half a turn at the top of the band is lost
-    apart = min(max(np.pi / omega[-1], unit), 20 * unit)
-    delays = apart * np.arange(8) if spec.delay == "estimate" else np.array([float(spec.delay)])
     best: tuple[Solution, Objective] | None = None
-    for delay in delays.tolist():
+    for delay in _delays(spec, readings, omega, unit):
         for poles in _starting_poles(spec, readings, omega, delay):
             at = Delay(delay, unit)
             unknown, known = ([at], []) if estimated else ([], [at] if late else [])
@@ -77,6 +77,31 @@ def fit_transfer_function(
         raise InputError("no start for the transfer function could be computed; change its order")
     objective = best[1]
     return _estimate(spec, Minimum(objective, minimise(objective, best[0].x)), first.hold, unit)
+
+
+def _delays(
+    spec: TransferFunction, readings: Sequence[Reading], omega: FloatArray, unit: float
+) -> list[float]:
+    """Delays to begin from (s): the known one, or those at which black boxes explain most.
+
+    Where no record can be put in step, delays that are half a turn apart at the top of the band.
+    """
+    if spec.delay != "estimate":
+        return [float(spec.delay)]
+    shape, tried = channel_counts(readings[0].data), []
+    for q in range(_LONGEST):
+        try:
+            seen, plane = lines_in_plane([in_step(r, (q,) * shape[1]) for r in readings])
+            chart = Chart(first_model(seen, spec.poles, True), True, plane, readings[0].sample_time)
+        except (InputError, np.linalg.LinAlgError):
+            break
+        point = Objective(chart, seen).point(np.zeros(chart.size))
+        if point is not None:
+            tried.append((point.cost / sum(e.n_rows for e in seen), max(q - 0.5, 0.0) * unit))
+    if tried:
+        return [delay for _, delay in sorted(tried)[:_FOLLOWED]]
+    apart = min(max(np.pi / omega[-1], unit), 20 * unit)
+    return (apart * np.arange(8)).tolist()
 
 
 def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float) -> Estimate:
@@ -136,8 +161,13 @@ def _starting_poles(
 
 def _first_guess(order: int, readings: Sequence[Reading], delay: float) -> ComplexArray:
     """Poles in z of the data with the delay taken off the input, where their start lands."""
-    lines, plane = lines_in_plane(readings)
-    shifted = [e.behind(delay) for e in lines]
+    try:
+        q = int(np.ceil(delay / readings[0].sample_time - 1e-9))
+        count = channel_counts(readings[0].data)[1]
+        shifted, plane = lines_in_plane([in_step(r, (q,) * count) for r in readings])
+    except InputError:
+        lines, plane = lines_in_plane(readings)
+        shifted = [e.behind(delay) for e in lines]
     chart = Chart(first_model(shifted, order, True), True, plane, readings[0].sample_time)
     return np.linalg.eigvals(chart.in_z(np.zeros(chart.size)).A).astype(complex)
 

@@ -12,6 +12,7 @@ Inverse Problems 19, 2003).
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data import FrequencyResponse
+from freqid.fitting.cost.delays import unknown_inputs
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf import Spectra
 from freqid.lti import (
@@ -211,19 +213,22 @@ class _SpectralEvaluation:
         # a sampled model's matrices are what they are, whatever made them
         hold = BandLimited() if e.discrete else e.hold
         omega = e.lines.omega_input.ravel()
+        self.unknown: ComplexArray | None = None
         if self.delay is not None:
-            self.plant, late = realisation.delayed(hold, omega, e.points.z)
-            self.z, self.moving = e.points.z, None
-            self.U, self.U_state = self.U * late, self.U_state * late
+            self.plant, late, shifts = realisation.delayed(hold, omega, e.points.z)
+            self.z, self.moving, self.delay = e.points.z, None, realisation.delays
+            self.U, self.U_state = self.U * late[:, None], self.U_state * late[:, None]
+            if e.transient is not None:
+                unit = np.repeat(e.transient.factor / e.transient.z, e.lines.aliases)
+                unit = unit / e.lines.aliases
+                self.unknown = unknown_inputs(self.z, unit, shifts, e.n_rows)
         else:
             self.plant, self.z, self.moving = realisation.seen_through(
                 hold, e.lift, omega, e.points.z
             )
         self.inverse = self.plant.resolvent(self.z)
-        drive = self.plant.drive(self.z, self.U_state)
-        self.x = self.plant.solve(self.z, drive, self.inverse)
-        self.forced = self.plant.output(self.x, self.U)
-        y = sum_runs(self.forced, e.lines.aliases)
+        self.x = self._states(self.U_state)
+        y = sum_runs(self.plant.output(self.x, self.U), e.lines.aliases)
         self.residual = e.lines.rows(y - e.lines.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
@@ -238,11 +243,22 @@ class _SpectralEvaluation:
             seen = sum_runs(self._w * e.transient.factor, e.transient.aliases)
             columns = np.moveaxis(basis.to_basis.T @ seen, 0, 1)
             self.transient = e.lines.rows(columns[:, :, None, :])
+            if self.unknown is not None:
+                self._x_unknown = self._states(self.unknown)
+                y = self.plant.output(self._x_unknown, self.unknown)
+                late_rows = e.lines.rows(sum_runs(y, e.lines.aliases).swapaxes(0, 1)[:, :, None])
+                self.transient = np.concatenate([self.transient, late_rows])
+
+    def _states(self, U: ComplexArray) -> ComplexArray:
+        return self.plant.solve(self.z, self.plant.drive(self.z, U), self.inverse)
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         rows, t = self.experiment.lines.rows, self.experiment.transient
         if initial is None or self._w is None or t is None:
             return rows(self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x))
+        if self.unknown is not None:
+            known = len(initial) - self.unknown.shape[1]
+            return self._with_past(initial[known:]).jacobian(initial[:known])
         delta = (self.basis.to_basis @ initial)[:, None, None]
         x_free = self.free.solve(t.z, delta * t.factor, self.free_inverse)
         if self.shared:
@@ -255,8 +271,21 @@ class _SpectralEvaluation:
         dy = self.plant.sensitivity(
             self.z, w, x, self.U_state, aliases, direct=self.U, moving=self.moving
         )
-        delay = self.delay
-        if delay and delay.parameter is not None and not isinstance(e.hold, PeriodicHold):
-            turned = -1j * e.lines.omega_input.ravel() * delay.scale * self.forced
-            dy[delay.parameter] += sum_runs(turned, aliases)
+        if self.delay is None or isinstance(e.hold, PeriodicHold):
+            return dy
+        for i, t in enumerate(self.delay):
+            if t.parameter is not None:
+                turned = np.zeros_like(self.U)
+                turned[i] = -1j * e.lines.omega_input.ravel() * t.scale * self.U[i]
+                change = self.plant.output(self._states(turned), turned)
+                dy[t.parameter] += sum_runs(change, aliases)
         return dy
+
+    def _with_past(self, samples: FloatArray) -> _SpectralEvaluation:
+        """The same with the samples that were not recorded in its input."""
+        assert self.unknown is not None
+        other = copy.copy(self)
+        more = np.einsum("mck,c->mk", self.unknown, samples)[:, None]
+        other.unknown, other.U, other.U_state = None, self.U + more, self.U_state + more
+        other.x = self.x + np.einsum("nck,c->nk", self._x_unknown, samples)[:, None]
+        return other

@@ -63,7 +63,8 @@ class Delay(Nuisance):
     """Delay of the inputs; ``size`` is the sample time of the input."""
 
     name: ClassVar[str] = "delay"
+    lower: ClassVar[float] = 0.0
 
     def applied(self, plant: Realisation, value: float, parameter: int | None) -> Realisation:
         """The plant behind this delay."""
-        return dataclasses.replace(plant, delay=Timing(value, parameter, self.size))
+        return dataclasses.replace(plant, delay=(Timing(value, parameter, self.size),))

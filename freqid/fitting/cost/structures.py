@@ -14,6 +14,7 @@ from freqid.lti import (
     Linearisation,
     Realisation,
     StateSpace,
+    Timing,
     eigenbasis_of_many,
     eigenvalues_and_derivatives,
     many_responses,
@@ -59,6 +60,26 @@ class GreyStructure:
         self.lower = np.array([each.lower for each in everything]) / self.scale
         self.upper = np.array([each.upper for each in everything]) / self.scale
         self._fixed = model.values
+        self._delays(model)
+
+    def _delays(self, model: GreyBox) -> None:
+        """No input comes early unless a bound allows it."""
+        for i, name in enumerate(self.physical_names):
+            if name in model.delay_sources and np.isneginf(self.lower[i]):
+                self.lower[i] = 0.0
+
+    def _timings(self, values: Mapping[str, float]) -> tuple[Timing, ...] | None:
+        """Delays of the inputs at parameter values, with those that are unknowns."""
+        timings = []
+        for source in self.model.delay_sources:
+            if not isinstance(source, str):
+                timings.append(Timing(float(source)))
+            elif source in self.physical_names:
+                at = self.physical_names.index(source)
+                timings.append(Timing(values[source], at, float(self.scale[at])))
+            else:
+                timings.append(Timing(values[source]))
+        return tuple(timings) or None
 
     @property
     def start(self) -> FloatArray:
@@ -81,14 +102,15 @@ class GreyStructure:
 
     def realise(self, x: FloatArray) -> Realisation:
         """Matrices at x and their derivatives by x; ArithmeticError where there are none."""
-        at, d = self.model.linearise(self._fixed | self.physical(x), self.physical_names)
+        values = self._fixed | self.physical(x)
+        at, d = self.model.linearise(values, self.physical_names)
         if not all(np.isfinite(M).all() for M in at):
             raise ArithmeticError(f"the matrices are not finite at {self.describe(x)}")
         scaled = d.times(self.scale[: self.count, None, None])
         if self.unknown:
             blank = [np.zeros((len(self.unknown), *M.shape)) for M in at]
             scaled = StateSpace(*(np.concatenate(pair) for pair in zip(scaled, blank, strict=True)))
-        plant = Realisation.of(Linearisation(at, scaled))
+        plant = Realisation.of(Linearisation(at, scaled), delay=self._timings(values))
         for place, nuisance in enumerate(self.unknown, self.count):
             plant = nuisance.applied(plant, float(x[place] * nuisance.size), place)
         for nuisance in self.known:
@@ -97,7 +119,7 @@ class GreyStructure:
 
     def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> ComplexArray:
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""
-        if self.unknown:
+        if self.unknown or self.model.delay_sources:
             each = [sampled_response(self.realise(x), omega, hold)[0] for x in points]
             return np.stack(each)
         theta = points * self.scale
@@ -108,7 +130,7 @@ class GreyStructure:
         self, points: FloatArray, omega: FloatArray, hold: Hold
     ) -> tuple[ComplexArray, ComplexArray]:
         """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
-        if self.unknown or self.known:
+        if self.unknown or self.known or self.model.delay_sources:
             return self._one_by_one(points, omega, hold)
         try:
             at, d = self.model.linearise_many(points * self.scale, self.physical_names)

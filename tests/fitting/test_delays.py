@@ -1,0 +1,114 @@
+"""Delays on finite records, of parts of a sample, against simulation on a fine grid."""
+
+import control
+import numpy as np
+import pytest
+
+import freqid as fq
+
+DT, FINE = 0.01, 100
+
+
+def lag(**values):
+    """b/(s + a) behind Td; the function does not know of Td."""
+    model = fq.GreyBox(
+        lambda b, a: ([[-a]], [[b]], [[1.0]], None),
+        [fq.Parameter("b", 50.0), fq.Parameter("a", 20.0), fq.Parameter("Td", 0.0, unit="s")],
+        input_delay="Td",
+    )
+    return model.with_values(**values)
+
+
+def late_record(steps, n=460, seed=0):
+    """White input held at DT, shifted on a grid a hundred times finer: an independent oracle."""
+    u = np.random.default_rng(seed).standard_normal(n)
+    fine = np.repeat(u, FINE)
+    late = np.concatenate([np.zeros(round(steps * FINE)), fine])[: len(fine)]
+    y = fq.simulate(fq.first_order(b=50, a=20), late, DT / FINE).y[::FINE]
+    return fq.Record(u, y, DT)
+
+
+@pytest.mark.parametrize("steps", [0, 0.18, 1, 3.4, 7])
+@pytest.mark.parametrize("cut", ["whole", "running", "slow"])
+def test_a_late_plant_is_as_exact_as_one_in_time(steps, cut):
+    record = late_record(steps)
+    model = lag(Td=steps * DT)
+    assert np.abs(fq.simulate(model, record.u, DT).y - record.y).max() < 1e-11
+    if cut != "whole":
+        record = record.slice(0.6, 4.6)
+    if cut == "slow":
+        record = record.decimate(4, keep_input=True)
+    assert fq.compare(model, record).fit_percent[0] > 100 - 1e-8
+    est = fq.fit(lag(), record, start={"b": 60.0, "a": 15.0, "Td": 0.7 * steps * DT + 0.002})
+    assert est["Td"] == pytest.approx(steps * DT, abs=1e-7 * DT)
+    assert est["a"] == pytest.approx(20, rel=1e-7)
+    known = fq.fit(lag(Td=steps * DT).fix("Td"), record, start={"b": 60.0, "a": 15.0})
+    assert known["b"] == pytest.approx(50, rel=1e-9)
+
+
+@pytest.mark.parametrize("steps", [0.18, 0.25, 3.4])
+@pytest.mark.parametrize("known", [True, False])
+def test_black_boxes_behind_a_delay(steps, known):
+    record = late_record(steps).slice(0.6, 4.6)
+    delay = steps * DT if known else "estimate"
+    est = fq.fit(fq.TransferFunction(0, 1, delay=delay), record)
+    assert est.model.delay == pytest.approx(steps * DT, abs=1e-6 * DT)
+    assert est.fit_percent > 100 - 1e-8
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_error_bars_and_witness_of_a_delay(seed):
+    record = late_record(3.4, 660, seed).with_noise(0.2, seed=seed).slice(0.6, 6.6)
+    est = fq.fit(lag(), record, start={"Td": 0.01, "b": 80.0, "a": 10.0})
+    std = est.parameters["std"]
+    assert abs(est["Td"] - 3.4 * DT) < 4 * std["Td"] < 0.2 * DT
+    assert est.witness.verdict == "complete"
+    without = fq.fit(fq.first_order(b=80, a=10), record)
+    assert without.witness.verdict != "complete" or without.cost > 2 * est.cost
+
+
+def test_each_input_may_have_a_delay_of_its_own():
+    model = fq.GreyBox(
+        lambda b, a, c: ([[-a]], [[b, c]], [[1.0]], [[0.0, 0.3]]),
+        [fq.Parameter("b", 50.0), fq.Parameter("a", 20.0), fq.Parameter("c", -30.0),
+         fq.Parameter("Td", 0.0234)],
+        input_delay=["Td", 0.02],
+    )  # fmt: skip
+    u = np.random.default_rng(3).standard_normal((500, 2))
+    record = fq.simulate(model, u, DT).slice(0.5, 4.8)
+    est = fq.fit(model, record, start={"Td": 0.01, "c": -20.0})
+    assert est["Td"] == pytest.approx(0.0234, rel=1e-7)
+    assert est["c"] == pytest.approx(-30, rel=1e-7)
+
+
+def test_a_delay_in_a_response_and_as_pade():
+    model = lag(Td=0.034)
+    omega = np.linspace(1, 60, 30)
+    plain = fq.first_order(b=50, a=20).frequency_response(omega).response[0, 0]
+    late = model.frequency_response(omega).response[0, 0]
+    assert np.allclose(late, plain * np.exp(-0.034j * omega), rtol=1e-12)
+    with pytest.raises(ValueError, match="pade"):
+        model.to_control()
+    near = control.frequency_response(model.to_control(pade=4), omega).complex
+    assert np.allclose(near, late, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("delay", "text"),
+    [("tau", "tau"), (np.nan, "input_delay"), ([0.1, 0.2], "2 entries for 1")],
+)
+def test_a_delay_that_cannot_be_is_refused(delay, text):
+    with pytest.raises(ValueError, match=text):
+        fq.GreyBox(
+            lambda a: ([[-a]], [[1.0]], [[1.0]], None),
+            [fq.Parameter("a", 1.0)],
+            input_delay=delay,
+        )
+
+
+def test_a_late_input_needs_a_hold_that_is_constant():
+    record = late_record(3.4)
+    with pytest.raises(ValueError, match="zero-order hold"):
+        fq.fit(lag(Td=0.03), record, hold="foh")
+    with pytest.raises(ValueError, match="domain='frequency'"):
+        fq.fit(lag(Td=0.03), record, domain="time")
