@@ -8,11 +8,12 @@ from typing import cast
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
+from freqid.data import Band, FrequencyResponse, channel_counts, common_names, input_dt
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.subspace import identify
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.nuisance import Delay
@@ -21,9 +22,9 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.reading import Reading, enough_rows, read_for
-from freqid.fitting.search.descent import Solution, minimise
+from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti import Hold, PeriodicHold
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
 from freqid.models import (
     ContinuousModel,
     GreyBox,
@@ -36,8 +37,14 @@ from freqid.models import (
 
 # frequencies over which poles are spread to begin from
 _SPREAD = 20
+# evaluations of a black box that begins another
+_STEPS = 40
 # samples of delay that are tried, and how many of these delays are followed
-_LONGEST, _FOLLOWED = 24, 3
+_LONGEST, _FOLLOWED = 24, 6
+# eighths of a turn at the top of a response that are tried
+_TURNS = 160
+# lines on which a delay is looked for
+_FEW = 400
 
 
 @fits(TransferFunction, black_box=True)
@@ -59,7 +66,8 @@ def fit_transfer_function(
     enough_rows(experiments, spec.poles + (spec.zeros + 1) * shape[0] * shape[1] + estimated)
     omega = 2 * np.pi * np.geomspace(*_edges(first), _SPREAD)
     scale = float(np.exp(np.log(omega).mean()))
-    unit = input_dt(first.data)
+    # a delay is counted in samples, or in turns at the top of a response without any
+    unit = input_dt(first.data) or float(1 / omega[-1])
     best: tuple[Solution, Objective] | None = None
     for delay in _delays(spec, readings, omega, unit):
         for poles in _starting_poles(spec, readings, omega, delay):
@@ -89,19 +97,38 @@ def _delays(
     if spec.delay != "estimate":
         return [float(spec.delay)]
     shape, tried = channel_counts(readings[0].data), []
-    for q in range(_LONGEST):
+    responses = all(isinstance(r.data, FrequencyResponse) and _unheld(r) for r in readings)
+    # a response tells delays of up to a turn between two of its lines
+    gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
+    step = np.pi / 4 / omega[-1]
+    count = min(int(np.pi / gap / step), _TURNS) if responses else _LONGEST
+    for q in range(count):
         try:
-            seen, plane = lines_in_plane([in_step(r, (q,) * shape[1]) for r in readings])
-            chart = Chart(first_model(seen, spec.poles, True), True, plane, readings[0].sample_time)
+            if responses:
+                delay = q * step
+                point = _folded(spec.poles, readings, omega, delay)[2]
+            else:
+                delay = max(q - 0.5, 0.0) * unit
+                point = _in_step_cost(spec.poles, [in_step(r, (q,) * shape[1]) for r in readings])
         except (InputError, np.linalg.LinAlgError):
             break
-        point = Objective(chart, seen).point(np.zeros(chart.size))
-        if point is not None:
-            tried.append((point.cost / sum(e.n_rows for e in seen), max(q - 0.5, 0.0) * unit))
+        tried.append((point, delay))
     if tried:
-        return [delay for _, delay in sorted(tried)[:_FOLLOWED]]
+        # the best one, its neighbours, and every other valley
+        costs = [np.inf, *(cost for cost, _ in tried), np.inf]
+        valleys = [t for i, t in enumerate(tried, 1) if t[0] <= min(costs[i - 1], costs[i + 1])]
+        chosen = sorted(tried)[:_FOLLOWED] + sorted(valleys)[1:_FOLLOWED]
+        return list(dict.fromkeys(delay for _, delay in chosen))
     apart = min(max(np.pi / omega[-1], unit), 20 * unit)
     return (apart * np.arange(8)).tolist()
+
+
+def _in_step_cost(order: int, readings: Sequence[Reading]) -> float:
+    """What a sampled black box leaves of each real value."""
+    seen, plane = lines_in_plane(readings)
+    chart = Chart(identify(seen, order, True), True, plane, readings[0].sample_time)
+    point = Objective(chart, seen).point(np.zeros(chart.size))
+    return np.inf if point is None else point.cost / sum(e.n_rows for e in seen)
 
 
 def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float) -> Estimate:
@@ -139,6 +166,8 @@ def _starting_poles(
     """Poles to begin from: those of a sampled black box taken to s, and spread ones behind them."""
     starts = []
     try:
+        if all(isinstance(r.data, FrequencyResponse) and _unheld(r) for r in readings):
+            return [_folded(spec.poles, readings, omega, delay, _STEPS)[0]]
         if delay:
             sampled = _first_guess(spec.poles, readings, delay)
         else:
@@ -157,6 +186,45 @@ def _starting_poles(
     if spec.poles % 2:
         spread = np.append(spread, -omega.mean())
     return [*starts, spread]
+
+
+def _unheld(reading: Reading) -> bool:
+    return not isinstance(reading.hold, PeriodicHold)
+
+
+def _folded(
+    order: int, readings: Sequence[Reading], omega: FloatArray, delay: float, steps: int = 0
+) -> tuple[ComplexArray, float, float]:
+    """Poles in s of continuous responses with a delay (s) taken off, from a sampled black box on
+    the folded axis; α, and what the black box leaves.
+
+    z = (1 + s/α)/(1 − s/α) takes the imaginary axis once round the unit circle and a rational
+    function of s to one of z, of the same order and with feedthrough (McKelvey, Akçay and Ljung,
+    IEEE Trans. Automatic Control 41, 1996, section V).
+    """
+    alpha = float(np.exp(np.log(omega[[0, -1]]).mean()))
+    folded = []
+    for r in readings:
+        frf = r.data
+        assert isinstance(frf, FrequencyResponse)
+        ahead = frf.response * np.exp(1j * frf.omega * delay)
+        at = np.arctan(frf.omega / alpha) / np.pi
+        turned = FrequencyResponse(at, ahead, variance=frf.variance, dt=1.0)
+        kept = None
+        if r.band is not None:
+            kept = Band(*(np.arctan(2 * np.pi * f / alpha) / np.pi for f in r.band))
+        folded.append(r.with_(data=turned, hold=ZeroOrderHold(1.0), band=kept, delayed=False))
+    lines, plane = lines_in_plane(folded, None if steps else _FEW)
+    # a subspace is enough to tell one delay from another
+    begin = first_model(lines, order, True) if steps else identify(lines, order, True)
+    chart = Chart(begin, True, plane, 1.0)
+    objective = Objective(chart, lines)
+    x = np.zeros(chart.size)
+    if steps:
+        x = polish(objective, x, limit=steps, tolerance=1e-6).x
+    point = objective.point(x)
+    z = np.linalg.eigvals(chart.in_z(x).A).astype(complex)
+    return alpha * (z - 1) / (z + 1), alpha, np.inf if point is None else point.cost
 
 
 def _first_guess(order: int, readings: Sequence[Reading], delay: float) -> ComplexArray:
