@@ -54,7 +54,8 @@ class Evidence:
 
     ``values`` and ``std`` (P,) of ``parameters``; ``loose`` are sentences on what the data leave
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
-    ``n_rows`` real values of the data were there for ``n_unknowns``.
+    ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
+    a black box whose motions grow.
     """
 
     parameters: Sequence[Parameter]
@@ -66,6 +67,7 @@ class Evidence:
     dt: float = 0.0
     n_rows: int = 0
     n_unknowns: int = 0
+    growing: Sequence[complex] = ()
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -125,6 +127,21 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
                     f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
                 )
                 yield Finding("edge of a bound", sentence, number=float(value))
+
+
+@sign
+def unstable(e: Evidence) -> Iterator[Finding]:
+    """A black box with motions that grow."""
+    if len(e.growing):
+        count = len(e.growing)
+        worst = max(e.growing, key=abs)
+        which = "a pole" if count == 1 else f"{count} poles"
+        yield Finding(
+            "unstable",
+            f"the model has {which} whose motion grows (one at {worst:.5g}): on other data it may "
+            "go anywhere; fit a lower order, or OutputError(order, stable=True)",
+            number=float(count),
+        )
 
 
 @sign

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import InputError, choice, whole
-from freqid.data import FrequencyResponse, Record
-from freqid.fitting.black_box.output_error import cost_of, fit_output_error
-from freqid.fitting.noise_models import GivenWeights
+from freqid.data import FrequencyResponse, Record, channel_counts
+from freqid.fitting.black_box.late import in_step
+from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
+from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 from freqid.lti import Hold, Plane, in_one_blas_thread
 from freqid.models import OutputError
@@ -29,18 +30,24 @@ def select_order(
     *,
     hold: Hold | str | None = None,
     band: tuple[float, float] | None = None,
-    feedthrough: bool = False,
+    feedthrough: bool | None = False,
     initial_state: str = "estimate",
     criterion: str = "mdl",
+    delays: Iterable[int] = (0,),
+    stable: bool = False,
 ) -> pd.DataFrame:
     """Fit OutputError of each order and compare.
 
-    Columns: order, parameters, cost, fit_percent, aic, mdl, cross_validation and converged, one row
-    for each order. AIC = n ln(V/n) + 2k, MDL = n ln(V/n) + k ln n with n real values and k
-    parameters (Ljung, 1999, section 16.4); cross-validation is the cost per real value on each
-    quarter of the lines of the model fitted to the other three. ``attrs["best"]`` is the order with
-    the least ``criterion``: ``"aic"``, ``"mdl"`` or ``"cross_validation"``. Other arguments as in
-    ``fit``. Raises ValueError for no orders, or one that is not a whole number.
+    Columns: order, feedthrough, delay, parameters, cost, fit_percent, aic, mdl, cross_validation,
+    converged and error, one row for each order. AIC = n ln(V/n) + 2k, MDL = n ln(V/n) + k ln n
+    with n real values and k parameters and initial states (Ljung, 1999, section 16.4);
+    cross-validation is the cost per real value on each quarter of the lines of the model and the
+    initial state fitted to the other three. ``feedthrough=None`` tries both; ``delays`` are whole
+    samples by which the inputs may come late. An order that cannot be fitted has its reason in
+    ``error``. ``attrs["best"]`` is the order with the least ``criterion``: ``"aic"``, ``"mdl"`` or
+    ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]`` go with it. Other
+    arguments as in ``fit``. Raises ValueError for no orders, or one that is not a whole number, or
+    where none can be fitted.
 
     >>> import freqid as fq
     >>> record = fq.simulate(fq.first_order(), fq.chirp(2, 40, 2, 1e-3), 1e-3).with_noise(0.01)
@@ -53,32 +60,55 @@ def select_order(
     wanted = [whole("orders", n) for n in orders]
     if not wanted:
         raise InputError("orders is empty; give at least one, such as range(1, 7)")
+    late = [whole("delays", q, least=0) for q in delays]
     reading = Reading.of(data, hold, band, initial_state=initial_state)  # type: ignore[arg-type]
-    lines = np.arange(reading.at_lines().lines(Plane()).n_lines)
-    rows = []
-    for order in wanted:
-        spec = OutputError(order, feedthrough)
-        est = fit_output_error(spec, [reading])
-        n, k = est.n_rows, len(est.values)
-        misfit = n * np.log(max(est.cost, 1e-300) / n)
-        held_out = 0.0
-        for fold in range(_FOLDS):
-            out = lines % _FOLDS == fold
-            kept, left_out = (reading.with_(noise=GivenWeights(1.0 * m)) for m in (~out, out))
-            held_out += cost_of(fit_output_error(spec, [kept]).model, left_out)
-        rows.append(
-            {
-                "order": order,
-                "parameters": k,
-                "cost": est.cost,
-                "fit_percent": est.fit_percent,
-                "aic": misfit + 2 * k,
-                "mdl": misfit + k * np.log(n),
-                "cross_validation": held_out / n,
-                "converged": est.converged,
-            }
-        )
+    n_inputs = channel_counts(data)[1]
+    through = [False, True] if feedthrough is None else [feedthrough]
+    rows = [
+        _row(OutputError(order, direct, stable), q, in_step(reading, (q,) * n_inputs))
+        for q in late
+        for direct in through
+        for order in wanted
+    ]
     table = pd.DataFrame(rows)
-    table.attrs["best"] = int(table["order"].to_numpy()[table[criterion].argmin()])
+    scores = table[criterion].to_numpy()
+    if np.isnan(scores).all():
+        raise InputError(f"no order can be fitted: {table['error'].iloc[0]}")
+    best = table.iloc[int(np.nanargmin(scores))]
+    table.attrs["best"] = int(best["order"])
+    table.attrs["feedthrough"], table.attrs["delay"] = bool(best["feedthrough"]), int(best["delay"])
     table.attrs["criterion"] = criterion
     return table
+
+
+def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:
+    """One row of the table; NaN, and the reason, where there is no fit."""
+    row: dict[str, object] = {
+        "order": spec.order, "feedthrough": spec.feedthrough, "delay": delay, "parameters": 0,
+        "cost": np.nan, "fit_percent": np.nan, "aic": np.nan, "mdl": np.nan,
+        "cross_validation": np.nan, "converged": False, "error": "",
+    }  # fmt: skip
+    try:
+        est = fit_output_error(spec, [reading])
+        held_out = _cross_validation(est, reading)
+    except (InputError, np.linalg.LinAlgError) as error:
+        return {**row, "error": str(error)}
+    n, parameters = est.n_rows, len(est.values)
+    k = parameters + est.minimum.solution.point.n_initial
+    misfit = n * np.log(max(est.cost, 1e-300) / n)
+    return {
+        **row,
+        "parameters": parameters,
+        "cost": est.cost,
+        "fit_percent": est.fit_percent,
+        "aic": misfit + 2 * k,
+        "mdl": misfit + k * np.log(n),
+        "cross_validation": held_out / n,
+        "converged": est.converged,
+    }
+
+
+def _cross_validation(est: Estimate, reading: Reading) -> float:
+    """Cost of all lines, each as the fit to three quarters of the others foresees it."""
+    number = np.arange(reading.at_lines().lines(Plane()).n_lines)
+    return sum(held_out_cost(est, reading, number % _FOLDS != fold) for fold in range(_FOLDS))

@@ -23,14 +23,16 @@ class OutputError:
 
     With ``feedthrough`` the output answers to the input of the same sample (b₀ ≠ 0), as every
     plant does when its input is taken to run in straight lines between samples. Several inputs
-    and outputs share one state space. Raises ValueError for an order that is not a whole number.
+    and outputs share one state space. With ``stable`` no motion grows: the poles stay inside of the
+    unit circle. Raises ValueError for an order that is not a whole number.
 
     >>> OutputError(order=3)
-    OutputError(order=3, feedthrough=False)
+    OutputError(order=3, feedthrough=False, stable=False)
     """
 
     order: int
     feedthrough: bool = False
+    stable: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "order", whole("order", self.order))

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
 from freqid.fitting.black_box.reference import lines_in_plane
-from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.refinement import first_model, nested_model
 from freqid.fitting.cost.charts import Chart
-from freqid.fitting.cost.experiments import Experiment
+from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import SearchOptions, fits
+from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading, enough_rows, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
@@ -25,6 +27,8 @@ from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 # an order too many leaves a flat valley of cancelling poles and zeros: a relative gain in cost this
 # small moves no coefficient by a visible part of its standard error
 _TOLERANCE = 1e-9
+# orders beyond this are none that a few exact lines were meant for
+_HIGH = 12
 _STEPS = 80
 # unknowns of a chart, which are of order one, that have moved so far want a chart of their own
 _FAR = 0.3
@@ -42,16 +46,20 @@ def fit_output_error(
     lines, plane = lines_in_plane(readings)
     n_parameters = spec.order * sum(shape) + spec.feedthrough * shape[0] * shape[1]
     enough_rows(lines, n_parameters)
+    _enough_lines(spec, lines, n_parameters)
     dt = first.sample_time
-    start = first_model(lines, spec.order, spec.feedthrough)
-    chart, solution, objective = _descend(Chart(start, spec.feedthrough, plane, dt), lines)
+    more, seed = (options.n_starts or 1, options.seed) if options else (1, 0)
+    start = nested_model(lines, spec.order, spec.feedthrough, spec.stable, more - 1, seed)
+    centre = Chart(start, spec.feedthrough, plane, dt, stable=spec.stable)
+    chart, solution, objective = _descend(centre, lines)
     if first.in_time:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
-        centre = Chart(chart.in_z(solution.x), spec.feedthrough, Plane(), dt)
+        at = chart.in_z(solution.x)
+        centre = Chart(at, spec.feedthrough, Plane(), dt, stable=spec.stable)
         chart, solution, objective = _descend(centre, samples)
     model = DiscreteModel(chart.in_z(solution.x), dt, first.hold, *common_names([first.data]))
-    return coefficient_estimate(
+    est = coefficient_estimate(
         model,
         model.coefficients()[0],
         lambda points: coefficients_of(chart.in_z(points)),
@@ -59,14 +67,44 @@ def fit_output_error(
         first.hold,
         dt,
     )
+    return dataclasses.replace(est, n_starts=more)
 
 
-def cost_of(model: DiscreteModel, reading: Reading) -> float:
-    """Cost of a sampled model on the lines of a reading, its transient fitted to them."""
-    experiment = reading.at_lines().lines(Plane())
-    chart = Chart(model.matrices, bool(model.matrices.D.any()), Plane(), model.dt)
-    point = Objective(chart, [experiment]).point(np.zeros(chart.size))
-    return np.inf if point is None else point.cost
+def _enough_lines(
+    spec: OutputError, lines: Sequence[SpectralExperiment], n_parameters: int
+) -> None:
+    """ValueError for a high order that has half as many unknowns as there are data."""
+    unknowns = n_parameters + spec.order * sum(e.transient is not None for e in lines)
+    rows = sum(e.n_rows for e in lines)
+    if spec.order > _HIGH and 2 * unknowns > rows:
+        highest = spec.order * rows // (2 * unknowns)
+        raise InputError(
+            f"order={spec.order} has {unknowns} unknowns, initial states counted, for {rows} real "
+            f"values, which it would take for noise; use {max(highest, 1)} or less, widen the band "
+            "or lengthen the record"
+        )
+
+
+def held_out_cost(est: Estimate, reading: Reading, kept: BoolArray) -> float:
+    """Cost on the lines that are not ``kept`` (K,) of a black box fitted to those that are.
+
+    It begins anew: from its estimate it would remember what is held out. The initial state is that of the kept lines: one of their own would explain them, too.
+    """
+    chart = est.minimum.structure
+    assert isinstance(chart, Chart)
+    seen = reading.at_lines().with_(noise=GivenWeights(1.0 * kept))
+    part = seen.lines(Plane()).in_plane(chart.plane)
+    start = first_model([part], len(chart.centre.A), chart.feedthrough)
+    chart = Chart(start, chart.feedthrough, chart.plane, chart.dt)
+    x = polish(Objective(chart, [part]), np.zeros(chart.size), limit=_STEPS, tolerance=1e-6).x
+    lines = reading.at_lines().lines(Plane()).in_plane(chart.plane)
+    evaluation = lines.at(chart.realise(x))
+    fitted = np.repeat(np.broadcast_to(kept, lines.lines.Y.shape).ravel(), 2)
+    left, T = evaluation.residual, evaluation.transient
+    if T is not None:
+        delta = np.linalg.lstsq(T[:, fitted].T, -left[fitted])[0]
+        left = left + delta @ T
+    return float(left[~fitted] @ left[~fitted])
 
 
 def _descend(chart: Chart, experiments: Sequence[Experiment]) -> tuple[Chart, Solution, Objective]:
@@ -106,7 +144,15 @@ def coefficient_estimate(
     solution = minimum.solution
     failure = "" if solution.converged else solution.message
     rows = minimum.objective.n_rows
-    evidence = Evidence([], none, none, failure, n_rows=rows, n_unknowns=len(values))
+    evidence = Evidence(
+        [],
+        none,
+        none,
+        failure,
+        n_rows=rows,
+        n_unknowns=len(values),
+        growing=_growing(model).tolist(),
+    )
     return Estimate(
         model=model,
         names=names,
@@ -120,3 +166,9 @@ def coefficient_estimate(
         warnings=findings(evidence),
         **minimum.outcome(),
     )
+
+
+def _growing(model: Model) -> ComplexArray:
+    """Poles of motions that grow."""
+    poles = model.poles
+    return poles[np.abs(poles) > 1] if model.dt else poles[poles.real > 0]

@@ -33,6 +33,8 @@ _ROUNDING = 1e-16
 # Gauss-Newton steps at the most, and the part of the cost that the last one gains
 _DESCENTS = 60
 _GAIN = 1e-9
+# mirrored poles stay this far inside
+_MARGIN = 0.9999
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,10 @@ class Fitted:
 class RationalLines:
     """The lines of all experiments in a row, and the rational model's columns on them."""
 
-    def __init__(self, experiments: Sequence[SpectralExperiment], feedthrough: bool) -> None:
-        self.experiments, self.feedthrough = experiments, feedthrough
+    def __init__(
+        self, experiments: Sequence[SpectralExperiment], feedthrough: bool, stable: bool = False
+    ) -> None:
+        self.experiments, self.feedthrough, self.stable = experiments, feedthrough, stable
         # with one channel the weights are in the data already
         self.w = np.concatenate([e.points.z for e in experiments])
         self.Y = np.concatenate([e.lines.Y[0, 0] for e in experiments])
@@ -72,12 +76,37 @@ class RationalLines:
                 self.free.append(own)
 
     def minimum(self, poles: ComplexArray) -> Fitted | None:
-        """Where both iterations lead from these poles; None where the polynomials vanish."""
+        """Where both iterations lead from these poles; None where the polynomials vanish.
+
+        Of ``stable`` models poles outside of the unit circle are mirrored on it on the way.
+        """
         try:
             with np.errstate(all="ignore"):
-                return self._descend(*self._approach(poles))
+                basis, x = self._approach(poles)
+                if self.stable and not _inside(basis, x):
+                    basis, x = self._held(mirrored(basis.roots(x[-len(poles) :])))
+                return self._descend(basis, x)
         except np.linalg.LinAlgError:
             return None
+
+    def below(self, poles: ComplexArray) -> Fitted | None:
+        """The minimum below the best model with these poles, never above that; or None."""
+        try:
+            with np.errstate(all="ignore"):
+                return self._descend(*self._held(poles))
+        except np.linalg.LinAlgError:
+            return None
+
+    def _held(self, poles: ComplexArray) -> tuple[PolynomialBasis, FloatArray]:
+        """A basis and x = (b, t, a) with these poles, b and t by least squares."""
+        denominator = np.prod(self.w - poles[:, None], axis=0)
+        weight = np.abs(self.U / denominator)
+        basis = PolynomialBasis.on(self.w, weight, len(poles))
+        lead = basis.Q[0, 0].real / np.prod(np.diag(basis.H, -1))
+        rest = lead * denominator - basis.Q[-1]
+        a = (basis.Q[:-1].conj() @ (weight**2 * rest)).real
+        columns = self._columns(basis, 1 / basis.denominator(a))
+        return basis, np.concatenate([_least(_triangle(columns, self.Y)), a])
 
     def cost(self, poles: ComplexArray) -> float:
         """What the best b and t leave of the data with these poles."""
@@ -141,6 +170,11 @@ class RationalLines:
                 if damping > 1e9:
                     break
             x = best.x + _least(R, damping)
+            while self.stable and damping < 1e9 and not _inside(basis, x):
+                damping, straight = max(10 * damping, 1e-3), False
+                x = best.x + _least(R, damping)
+            if self.stable and not _inside(basis, x):
+                break
             if not damping and cost - R[-1, -1] ** 2 <= _GAIN * cost:
                 return Fitted(basis, x, R[-1, -1] ** 2, straight)
         return best
@@ -160,6 +194,17 @@ class RationalLines:
             if np.isfinite(residues).all():
                 return StateSpace(A, _driving(poles, residues), C, np.zeros((1, 1)))
         return inputs_of(self.experiments, A, C, self.feedthrough)
+
+
+def _inside(basis: PolynomialBasis, x: FloatArray) -> bool:
+    """Whether all poles are inside of the unit circle."""
+    return bool((np.abs(basis.roots(x[1 - len(basis.Q) :])) < 1).all())
+
+
+def mirrored(poles: ComplexArray) -> ComplexArray:
+    """Poles outside of the unit circle, or on it, mirrored to its inside."""
+    size = np.abs(poles)
+    return np.where(size < 1, poles, poles / np.maximum(size, 1) ** 2 * _MARGIN)
 
 
 def _triangle(columns: Sequence[ComplexArray], right: ComplexArray) -> FloatArray:

@@ -8,13 +8,13 @@ ones. On the hard cases of ``benchmarks/black_box_starts.py`` they leave nothing
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from freqid.checks import ComplexArray, InputError
-from freqid.fitting.black_box.rational_lines import FEW, Fitted, RationalLines
-from freqid.fitting.black_box.subspace import identify, observed
+from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.rational_lines import FEW, Fitted, RationalLines, mirrored
+from freqid.fitting.black_box.subspace import identify, inputs_of, observed
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.lti import StateSpace
 
@@ -25,6 +25,10 @@ _BELIEVED = 0.03
 _LINES = 20000
 # poles of larger models beyond those that are wanted
 _LARGER = (2, 4)
+# highest order that begins with all those below
+_CHAIN = 12
+# where one more real pole is tried
+_REAL_PLACES = (-0.95, -0.7, -0.3, 0.05, 0.3, 0.7, 0.9, 0.98)
 
 
 def first_model(
@@ -39,17 +43,89 @@ def first_model(
     # of very many lines a part will do: its minimum is next to that of all
     few = thinned_to(experiments, _LINES)
     lines = RationalLines(few, feedthrough)
+    best = best_of(lines, order, _begun(lines, order))
+    if best is not None and few is not experiments:
+        lines = RationalLines(experiments, feedthrough)
+        best = lines.minimum(best.poles)
+    return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
+
+
+def best_of(lines: RationalLines, order: int, begun: Iterable[ComplexArray]) -> Fitted | None:
+    """The best minimum from several sets of poles, until one is believed."""
     best: Fitted | None = None
-    for poles in _begun(lines, order):
+    for poles in begun:
         found = lines.minimum(poles)
         if found is not None and (best is None or found.cost < best.cost):
             best = found
         if found is not None and found is best and _believed(lines, best):
             break
-    if best is not None and few is not experiments:
-        lines = RationalLines(experiments, feedthrough)
-        best = lines.minimum(best.poles)
-    return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
+    return best
+
+
+def nested_model(
+    experiments: Sequence[SpectralExperiment],
+    order: int,
+    feedthrough: bool,
+    stable: bool,
+    more: int = 0,
+    seed: int = 0,
+) -> StateSpace:
+    """As ``first_model``, never above the model of the order below, with so many starts more.
+
+    Every order begins on its own and from the poles of the one before with one more; so the cost
+    does not rise from one order to the next. ``stable`` models have their poles inside of the unit
+    circle. Raises ValueError where the lines are too few.
+    """
+    if not all(e.single and e.one_to_one for e in experiments):
+        plain = identify(experiments, order, feedthrough)
+        if stable:
+            A = _with_eigenvalues(plain.A, mirrored)
+            return inputs_of(experiments, A, plain.C, feedthrough)
+        return plain
+    few = thinned_to(experiments, _LINES)
+    lines = RationalLines(few, feedthrough, stable)
+    rng = np.random.default_rng(seed)
+    best: Fitted | None = None
+    # of a high order only the last few: the chain from one on would take longer than it is worth
+    for n in range(1 if order <= _CHAIN else order - 2, order + 1):
+        begun = [*_begun(lines, n)]
+        if n == order:
+            begun += [_random_poles(n, rng) for _ in range(more)]
+        found = best_of(lines, n, begun)
+        if best is not None and (found is None or found.cost > best.cost):
+            found = min(_one_more(lines, best, n), key=lambda f: f.cost, default=found)
+        if found is None:
+            break
+        best = found
+        if best.cost <= lines.rounding and n < order:
+            # nothing is left to explain
+            best = best_of(lines, order, _begun(lines, order))
+            break
+    if best is None or len(best.poles) < order:
+        return identify(experiments, order, feedthrough)
+    if few is not experiments:
+        lines = RationalLines(experiments, feedthrough, stable)
+        best = lines.below(best.poles) or best
+    return lines.state_space(best)
+
+
+def _one_more(lines: RationalLines, best: Fitted, order: int) -> list[Fitted]:
+    """Minima below a model with one real pole more, for the places where that is worth most."""
+    tried = sorted((lines.cost(np.append(best.poles, place)), place) for place in _REAL_PLACES)
+    found = [lines.below(np.append(best.poles, place)) for _, place in tried[:2]]
+    return [f for f in found if f is not None and len(f.poles) == order]
+
+
+def _random_poles(order: int, rng: np.random.Generator) -> ComplexArray:
+    pairs = order // 2
+    upper = rng.uniform(0.7, 0.999, pairs) * np.exp(1j * rng.uniform(0.05, 0.95, pairs) * np.pi)
+    poles = np.concatenate([upper, upper.conj()])
+    return np.append(poles, rng.uniform(-0.9, 0.9)) if order % 2 else poles
+
+
+def _with_eigenvalues(A: FloatArray, change: Callable[[ComplexArray], ComplexArray]) -> FloatArray:
+    values, V = np.linalg.eig(A)
+    return np.real(V @ np.diag(change(values.astype(complex))) @ np.linalg.inv(V))
 
 
 def _believed(lines: RationalLines, found: Fitted) -> bool:

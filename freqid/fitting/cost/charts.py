@@ -32,9 +32,15 @@ class Chart:
     names: list[str] = []  # noqa: RUF012
 
     def __init__(
-        self, centre: StateSpace, feedthrough: bool, plane: Plane, dt: float, moves: int = 0
+        self,
+        centre: StateSpace,
+        feedthrough: bool,
+        plane: Plane,
+        dt: float,
+        moves: int = 0,
+        stable: bool = False,
     ) -> None:
-        self.moves, self.dt = moves, dt
+        self.moves, self.dt, self.stable = moves, dt, stable
         self.centre, self.feedthrough, self.plane = balanced(centre), feedthrough, plane
         A, B, C, D = self.centre
         n, m, p = len(A), B.shape[1], len(C)
@@ -73,12 +79,16 @@ class Chart:
         return self._parted(self._origin + x @ self._directions)
 
     def realise(self, x: FloatArray) -> Realisation:
-        """The state space at x and its derivatives."""
-        return Realisation.of(Linearisation(self.matrices(x), self.derivative))
+        """The state space at x and its derivatives; ArithmeticError where it must be stable."""
+        at = self.matrices(x)
+        if self.stable and np.abs(np.linalg.eigvals(at.A)).max(initial=0) >= 1:
+            raise ArithmeticError("the model is unstable there")
+        return Realisation.of(Linearisation(at, self.derivative))
 
     def moved(self, x: FloatArray) -> Chart:
         """A chart around the model at x."""
-        return Chart(self.matrices(x), self.feedthrough, self.plane, self.dt, self.moves + 1)
+        moves, centre = self.moves + 1, self.matrices(x)
+        return Chart(centre, self.feedthrough, self.plane, self.dt, moves, self.stable)
 
     def describe(self, x: FloatArray) -> str:
         """Said of the trial point in errors."""
