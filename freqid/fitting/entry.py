@@ -92,6 +92,11 @@ def fit(
     late = isinstance(model, GreyBox) and bool(model.delay_sources)
     if late and (domain == "time" or initial_state == "zero"):
         raise InputError("a delay needs domain='frequency' and no initial state at rest")
+    if late and estimated:
+        raise InputError(
+            "hold='estimate' and input_delay: a longer hold is a later input, so that one of them "
+            "must be known; name the hold"
+        )
     readings = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late

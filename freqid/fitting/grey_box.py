@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from freqid.checks import InputError, unknown
-from freqid.data import input_dt, rate_factor
+from freqid.data import Record, input_dt, rate_factor
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.priors import Prior
@@ -37,6 +37,7 @@ def fit_grey_box(
     structure = GreyStructure(model, checked_start(model, options.start), hold)
     if not structure.physical_names:
         raise InputError("model has no free parameter; free one with model.free(name)")
+    _possible_delays(structure, readings)
     experiments = read_for((model.n_outputs, model.n_inputs), readings)
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
@@ -47,6 +48,19 @@ def fit_grey_box(
     minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
     est = _estimate(structure, minimum, found, readings[0])
     return dataclasses.replace(est, testimony=Testimony(minimum, tuple(readings), found.n_agreed))
+
+
+def _possible_delays(structure: GreyStructure, readings: Sequence[Reading]) -> None:
+    """ValueError for a delay to begin from that outlasts half of a record."""
+    begin = structure.at(structure.start)
+    for r in readings:
+        if isinstance(r.data, Record) and begin.late:
+            longest, duration = max(begin.delays, key=abs), r.data.n_samples * r.data.dt
+            if abs(longest) > duration / 2:
+                raise InputError(
+                    f"input_delay={longest:g} s outlasts half of a record of {duration:g} s; start "
+                    "from a shorter one"
+                )
 
 
 def _unmirrored(objective: Objective, structure: GreyStructure, solution: Solution) -> Solution:

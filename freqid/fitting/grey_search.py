@@ -30,6 +30,8 @@ from freqid.models import GreyBox
 _LINES, _NOISY = 600, 10
 # lines on which many starts walk together
 _ROUND_LINES = 60
+# evaluations from the start itself to a minimum of data that are down to rounding
+_DIRECT = 40
 # samples of an unknown delay that are tried
 _DELAYS = 20
 # a start that costs so many times more on a part of the lines costs more on all
@@ -103,7 +105,7 @@ def _without_noise(
     if not 0 < noise_floor(every) <= _QUIET * energy:
         return None
     try:
-        found = Search(scout, log_targets(few, None), lambda: 0.0, None).run(structure.start, 1, 0)
+        found = Found(polish(scout, structure.start, limit=_DIRECT))
     except InputError:
         return None
     return found if found.solution.cost <= _EXACT * energy else None

@@ -57,15 +57,19 @@ def select_order(
     import pandas as pd
 
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
-    wanted = [whole("orders", n) for n in orders]
+    if feedthrough not in (True, False, None):
+        raise InputError(f"feedthrough={feedthrough!r} must be True, False or None for both")
+    wanted = [whole("orders", n) for n in ([orders] if isinstance(orders, int) else orders)]
     if not wanted:
         raise InputError("orders is empty; give at least one, such as range(1, 7)")
-    late = [whole("delays", q, least=0) for q in delays]
+    late = [whole("delays", q, least=0) for q in ([delays] if isinstance(delays, int) else delays)]
+    if not late:
+        raise InputError("delays is empty; give at least one, such as range(4)")
     reading = Reading.of(data, hold, band, initial_state=initial_state)  # type: ignore[arg-type]
     n_inputs = channel_counts(data)[1]
     through = [False, True] if feedthrough is None else [feedthrough]
     rows = [
-        _row(OutputError(order, direct, stable), q, in_step(reading, (q,) * n_inputs))
+        _row(OutputError(order, direct, stable), q, in_step(reading, (q,) * n_inputs, max(late)))
         for q in late
         for direct in through
         for order in wanted

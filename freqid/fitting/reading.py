@@ -19,6 +19,8 @@ from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold, as
 
 # sums of squares below this have lost their digits
 _LEAST = 1e-280
+# inputs whose spectra have so small a singular value, squared, are the same
+_DEPENDENT = 1e-14
 
 InitialState = Literal["estimate", "zero", "steady"]
 Domain = Literal["frequency", "time"]
@@ -172,3 +174,21 @@ def enough_rows(experiments: Sequence[Experiment], n_parameters: int) -> None:
             f"data hold {n_rows} real values for {n_parameters} free parameters; widen the band, "
             "lengthen the record or fix parameters"
         )
+
+
+def told_apart(experiments: Sequence[Experiment]) -> None:
+    """ValueError for inputs whose effects no model can tell apart."""
+    lines = [e for e in experiments if isinstance(e, SpectralExperiment)]
+    if not lines or lines[0].lift > 1:
+        return
+    U = np.concatenate([e.lines.U.reshape(len(e.lines.U), -1) for e in lines], axis=1)
+    size = np.linalg.norm(U, axis=1, keepdims=True)
+    unit = U / np.where(size > 0, size, 1)
+    _, s, V = np.linalg.svd(unit @ unit.conj().T)
+    if s[-1] > _DEPENDENT * s[0]:
+        return
+    held = np.flatnonzero(np.abs(V[-1]) > 1e-3) + 1
+    raise InputError(
+        f"inputs {', '.join(map(str, held))} depend on one another: their effects cannot be told "
+        "apart; leave one out, or excite them differently"
+    )

@@ -109,6 +109,8 @@ class Testimony:
     def _alike(self, order: int, cost: float, gap: float) -> Witness:
         """A plant with as much freedom as the black box: the same minimum, or a missed one."""
         freedom = f"a black box of order {order} has no more freedom"
+        if self.minimum.structure.model.delay_sources:  # type: ignore[attr-defined]
+            return Witness("absent", f"{freedom} behind the same delay", cost)
         if gap <= _ALIKE:
             return Witness("complete", f"no better minimum is left to find: {freedom}", cost)
         if gap <= _TOUCHES:

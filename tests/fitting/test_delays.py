@@ -62,9 +62,29 @@ def test_error_bars_and_witness_of_a_delay(seed):
     est = fq.fit(lag(), record, start={"Td": 0.01, "b": 80.0, "a": 10.0})
     std = est.parameters["std"]
     assert abs(est["Td"] - 3.4 * DT) < 4 * std["Td"] < 0.2 * DT
+    # a black box behind the same delay has no more freedom than a lag
+    assert est.witness.verdict == "absent"
+
+
+def test_the_witness_of_a_late_drivetrain():
+    late = fq.drivetrain(2, input_delay="Td")
+    clean = fq.simulate(late.with_values(Td=3.3e-3), fq.chirp(5, 80, 4, 1e-3), 1e-3)
+    record = clean.with_noise(0.05, seed=2)
+    est = fq.fit(late, record)
+    assert est["Td"] == pytest.approx(3.3e-3, abs=4 * est.parameters["std"]["Td"])
     assert est.witness.verdict == "complete"
-    without = fq.fit(fq.first_order(b=80, a=10), record)
-    assert without.witness.verdict != "complete" or without.cost > 2 * est.cost
+    assert fq.fit(fq.drivetrain(2), record).witness.verdict == "lacking"
+
+
+def test_an_output_that_comes_before_the_input_is_named():
+    record = late_record(0, 600)
+    early = fq.Record(record.u[:-20], record.y[20:], DT)
+    est = fq.fit(lag(), early)
+    assert any("Td" in w and w.kind == "edge of a bound" for w in est.warnings)
+    with pytest.raises(ValueError, match="outlasts half"):
+        fq.fit(lag(), record, start={"Td": 100.0})
+    with pytest.raises(ValueError, match="hold='estimate'"):
+        fq.fit(lag(), record, hold="estimate")
 
 
 def test_each_input_may_have_a_delay_of_its_own():

@@ -25,16 +25,19 @@ def whole_samples(model: GreyBox, reading: Reading) -> tuple[int, ...]:
     return tuple(late_samples(model, reading.hold.period))
 
 
-def in_step(reading: Reading, shifts: Sequence[int]) -> Reading:
-    """The reading with each input that many samples later, at the samples where all are known."""
-    if not any(shifts):
+def in_step(reading: Reading, shifts: Sequence[int], least: int = 0) -> Reading:
+    """The reading with each input that many samples later, at the samples where all are known.
+
+    At ``least`` so many samples are left out at the beginning, so that others can be compared.
+    """
+    if not any(shifts) and not least:
         return reading.with_(delayed=False)
     record, hold = reading.data, reading.hold
     if not isinstance(record, Record) or record.factor > 1 or not isinstance(hold, PeriodicHold):
         raise InputError("a delay is taken off a record whose input and output go in step")
     if abs(hold.period / record.dt - 1) > 1e-9:
-        raise InputError("a delay is counted in samples where the hold has their period")
-    first, last = max(*shifts, 0), min(*shifts, 0)
+        raise InputError("the hold has another period than the record: a delay is no whole samples")
+    first, last = max(*shifts, least), min(*shifts, 0)
     count = record.n_samples - first + last
     if 2 * count < record.n_samples:
         raise InputError("the delay outlasts half of the data")

@@ -11,6 +11,7 @@ from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
 from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model, nested_model
+from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
@@ -18,10 +19,10 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.noise_models import GivenWeights
-from freqid.fitting.reading import Reading, enough_rows, read_for
+from freqid.fitting.reading import Reading, enough_rows, read_for, told_apart
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.lti import Hold, Plane
+from freqid.lti import Hold, Plane, StateSpace
 from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 
 # an order too many leaves a flat valley of cancelling poles and zeros: a relative gain in cost this
@@ -29,6 +30,8 @@ from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 _TOLERANCE = 1e-9
 # orders beyond this are none that a few exact lines were meant for
 _HIGH = 12
+# where one more real pole is tried
+_PLACES = (0.9, 0.3, -0.5)
 _STEPS = 80
 # unknowns of a chart, which are of order one, that have moved so far want a chart of their own
 _FAR = 0.3
@@ -49,9 +52,8 @@ def fit_output_error(
     _enough_lines(spec, lines, n_parameters)
     dt = first.sample_time
     more, seed = (options.n_starts or 1, options.seed) if options else (1, 0)
-    start = nested_model(lines, spec.order, spec.feedthrough, spec.stable, more - 1, seed)
-    centre = Chart(start, spec.feedthrough, plane, dt, stable=spec.stable)
-    chart, solution, objective = _descend(centre, lines)
+    told_apart(lines)
+    chart, solution, objective = _nested(spec, lines, plane, dt, more - 1, seed)
     if first.in_time:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
@@ -68,6 +70,41 @@ def fit_output_error(
         dt,
     )
     return dataclasses.replace(est, n_starts=more)
+
+
+Descent = tuple[Chart, Solution, Objective]
+
+
+def _nested(
+    spec: OutputError,
+    lines: Sequence[SpectralExperiment],
+    plane: Plane,
+    dt: float,
+    more: int,
+    seed: int,
+) -> Descent:
+    """The minimum of an order, not above that of the order below with one pole more."""
+
+    def begun(start: StateSpace) -> Descent:
+        return _descend(Chart(start, spec.feedthrough, plane, dt, stable=spec.stable), lines)
+
+    options = spec.feedthrough, spec.stable
+    own = begun(nested_model(lines, spec.order, *options, more, seed))
+    chained = all(e.single and e.one_to_one for e in lines)
+    if chained or not 1 < spec.order <= _HIGH:
+        return own
+    below, less, _ = begun(nested_model(lines, spec.order - 1, *options))
+    if own[1].cost <= less.cost:
+        return own
+    A, _, C, _ = below.matrices(less.x)
+    tried = [own]
+    for place in _PLACES:
+        wider = np.block(
+            [[A, np.zeros((len(A), 1))], [np.zeros((1, len(A))), np.full((1, 1), place)]]
+        )
+        seen = np.column_stack([C, np.linalg.norm(C, axis=1)])
+        tried.append(begun(inputs_of(lines, wider, seen, spec.feedthrough)))
+    return min(tried, key=lambda t: t[1].cost)
 
 
 def _enough_lines(
@@ -88,7 +125,8 @@ def _enough_lines(
 def held_out_cost(est: Estimate, reading: Reading, kept: BoolArray) -> float:
     """Cost on the lines that are not ``kept`` (K,) of a black box fitted to those that are.
 
-    It begins anew: from its estimate it would remember what is held out. The initial state is that of the kept lines: one of their own would explain them, too.
+    It begins anew: from its estimate it would remember what is held out. The initial state is that
+    of the kept lines: one of their own would explain them, too.
     """
     chart = est.minimum.structure
     assert isinstance(chart, Chart)

@@ -39,7 +39,7 @@ _MARGIN = 0.9999
 
 @dataclass(frozen=True)
 class Fitted:
-    """x = (b, t, a) in a basis, its cost, and whether every step on the way there succeeded."""
+    """x = (b, t, a) in a basis, its cost in units of the lines, and whether no step failed."""
 
     basis: PolynomialBasis
     x: FloatArray
@@ -61,11 +61,15 @@ class RationalLines:
         self.experiments, self.feedthrough, self.stable = experiments, feedthrough, stable
         # with one channel the weights are in the data already
         self.w = np.concatenate([e.points.z for e in experiments])
-        self.Y = np.concatenate([e.lines.Y[0, 0] for e in experiments])
-        self.U = np.concatenate([e.lines.U[0, 0] for e in experiments])
+        Y = np.concatenate([e.lines.Y[0, 0] for e in experiments])
+        U = np.concatenate([e.lines.U[0, 0] for e in experiments])
+        # in units of their own, so that no power of them leaves the range of numbers
+        self.sizes = [float(np.abs(x).max()) or 1.0 for x in (Y, U)]
+        self.Y, self.U = Y / self.sizes[0], U / self.sizes[1]
+        self.energy = float(np.vdot(self.Y, self.Y).real)
         # steps fail at this cost for no other reason than the data's own digits
-        self.rounding = _ROUNDING * float(np.vdot(self.Y, self.Y).real)
-        state = np.concatenate([e.points.U[0, 0] for e in experiments])
+        self.rounding = _ROUNDING * self.energy
+        state = np.concatenate([e.points.U[0, 0] for e in experiments]) / self.sizes[1]
         self.driven = self.U if feedthrough else state
         ends = np.cumsum([e.n_lines for e in experiments])
         self.free = []
@@ -191,6 +195,7 @@ class RationalLines:
             apart = poles[:, None] - poles + np.eye(n)
             with np.errstate(all="ignore"):
                 residues = x[:n] @ basis.at(poles)[:n] / (lead * np.prod(apart, axis=1))
+                residues = residues * (self.sizes[0] / self.sizes[1])
             if np.isfinite(residues).all():
                 return StateSpace(A, _driving(poles, residues), C, np.zeros((1, 1)))
         return inputs_of(self.experiments, A, C, self.feedthrough)
@@ -226,6 +231,8 @@ def _least(R: FloatArray, damping: float = 0.0) -> FloatArray:
         pivots = np.abs(np.diag(M))
         if pivots.min() > 1e-10 * pivots.max():
             return np.linalg.solve(M, c)
+    if not np.isfinite(M).all():
+        raise np.linalg.LinAlgError("the columns are not finite")
     return np.linalg.lstsq(M, c)[0]
 
 

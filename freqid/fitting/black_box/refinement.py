@@ -133,7 +133,7 @@ def _believed(lines: RationalLines, found: Fitted) -> bool:
         return True
     if not found.straight:
         return False
-    return found.cost <= _BELIEVED * sum(e.energy for e in lines.experiments)
+    return found.cost <= _BELIEVED * lines.energy
 
 
 def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:

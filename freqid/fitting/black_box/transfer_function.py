@@ -21,7 +21,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
-from freqid.fitting.reading import Reading, enough_rows, read_for
+from freqid.fitting.reading import Reading, enough_rows, read_for, told_apart
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
@@ -63,6 +63,7 @@ def fit_transfer_function(
     readings = [r.with_(delayed=late) for r in readings]
     experiments = read_for(shape, readings)
     estimated = spec.delay == "estimate"
+    told_apart(experiments)
     enough_rows(experiments, spec.poles + (spec.zeros + 1) * shape[0] * shape[1] + estimated)
     omega = 2 * np.pi * np.geomspace(*_edges(first), _SPREAD)
     scale = float(np.exp(np.log(omega).mean()))

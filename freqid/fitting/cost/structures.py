@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -28,6 +29,13 @@ from freqid.models import GreyBox, Parameter
 SPREAD = 10.0
 
 
+def _not_early(p: Parameter, model: GreyBox) -> Parameter:
+    """A delay is not negative unless its start or a bound allows that."""
+    if p.name not in model.delay_sources or p.value < 0 or not np.isneginf(p.lower):
+        return p
+    return dataclasses.replace(p, lower=0.0)
+
+
 class GreyStructure:
     """A grey box: free parameters in units of their own size, then ``unknown`` nuisances.
 
@@ -44,7 +52,7 @@ class GreyStructure:
         anonymous: bool = False,
     ) -> None:
         self.model, self.unknown, self.known = model, tuple(unknown), tuple(known)
-        self.parameters = model.free_parameters
+        self.parameters = tuple(_not_early(p, model) for p in model.free_parameters)
         self.physical_names = [p.name for p in self.parameters]
         self.count = len(self.parameters)
         begin = {} if start is None else start
@@ -60,13 +68,6 @@ class GreyStructure:
         self.lower = np.array([each.lower for each in everything]) / self.scale
         self.upper = np.array([each.upper for each in everything]) / self.scale
         self._fixed = model.values
-        self._delays(model)
-
-    def _delays(self, model: GreyBox) -> None:
-        """No input comes early unless a bound allows it."""
-        for i, name in enumerate(self.physical_names):
-            if name in model.delay_sources and np.isneginf(self.lower[i]):
-                self.lower[i] = 0.0
 
     def _timings(self, values: Mapping[str, float]) -> tuple[Timing, ...] | None:
         """Delays of the inputs at parameter values, with those that are unknowns."""

@@ -24,7 +24,7 @@ from freqid.fitting.search.walks import walked
 # a first stage this much worse than the best one so far is not followed up
 _HOPELESS = 4.0
 # starts of n_starts="auto" at the most, those of one round, and the places that are followed up
-BUDGET, _ROUND, _FOLLOWED = 145, 24, 8
+BUDGET, _ROUND, _FOLLOWED = 145, 12, 6
 # damping at which a round begins
 _BLUNT = 1.0
 # a cost of so many times the noise's own is explained by it
@@ -37,6 +37,8 @@ _TOUCHES = 1e-3
 _CHANCE = 1e-3
 # above that level of the gap so many starts that agree are enough; else the last number
 _AGREEMENT, _DOUBTED = ((0.2, 1), (0.05, 2)), 4
+# starts that agree without an exception where a black box explains more
+_ALIKE = 6
 # costs that agree to this belong to one minimum
 _SAME = 1e-6
 # evaluations of a start that is not the first, of a first stage, and the last step of that
@@ -131,15 +133,17 @@ class StopRule:
             return True
         cost = found.solution.cost
         # starts of both kinds, on a leash and without
-        both = found.n_starts > 2 * _ROUND
+        both = found.n_starts > 4 * _ROUND
         if self.bound is None:
             if self._explained is None:
                 self._explained = _EXPLAINED * self.floor()
             if cost <= self._explained or found.n_stale >= _PATIENCE:
                 return True
             return found.n_agreed >= 3 and both
-        wanted = agreement(self.bound.level(cost))
-        return found.n_agreed >= wanted and (both or self.explains(cost))
+        if self.explains(cost):
+            return found.n_agreed >= agreement(self.bound.level(cost))
+        # the model lacks something, or this is not its minimum
+        return found.n_agreed >= (_DOUBTED if both else _ALIKE)
 
 
 class Search:

@@ -1,0 +1,44 @@
+"""Every number on the search.
+
+    cd benchmarks; python -m search              all of it: hours, resumed where it was interrupted
+    cd benchmarks; python -m search --quick      a hundredth, about five minutes
+    cd benchmarks; python -m search witness      one part
+
+One line of a CSV file a case in ``--out``; delete it to begin anew.
+"""
+
+import argparse
+from functools import partial
+from pathlib import Path
+
+from table import show
+
+from . import minima, orders, speed, store, witness
+
+PARTS = {
+    "minima": (minima.one, minima.summary, 5000),
+    "near": (partial(minima.one, factor=1.2), minima.summary, 1000),
+    "witness": (witness.one, witness.summary, 4000),
+    "orders": (orders.one, orders.summary, 100),
+    "speed": (speed.one, speed.summary, len(speed.CASES)),
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
+    parser.add_argument("--out", type=Path, default=Path("search_results"))
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--count", type=int)
+    given = parser.parse_args()
+    for name in given.parts or PARTS:
+        one, summary, count = PARTS[name]
+        if given.quick:
+            count = max(count // 100, 4)
+        cases = range(min(given.count or count, count))
+        for row in summary(store.resumed(given.out / f"{name}.csv", cases, one)):
+            show(*row)
+
+
+if __name__ == "__main__":
+    main()
