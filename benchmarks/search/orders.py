@@ -25,8 +25,7 @@ def one(case):
     clean = fq.simulate(plant, rng.standard_normal(2000), 1.0)
     record = clean.with_noise(0.01 * clean.y.std(), seed=10**6 + case)
     table = fq.select_order(record, range(1, 8))
-    best = {k: int(table["order"][table[k].idxmin()]) for k in ("mdl", "aic", "cross_validation")}
-    return best
+    return {k: int(table["order"][table[k].idxmin()]) for k in ("mdl", "aic", "cross_validation")}
 
 
 def summary(table):

@@ -12,7 +12,8 @@ from typing import Literal
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import ComplexArray, FloatArray
+from freqid.lti import Hold, PeriodicHold
 from freqid.models import Parameter
 
 Severity = Literal["serious", "minor"]
@@ -55,7 +56,7 @@ class Evidence:
     ``values`` and ``std`` (P,) of ``parameters``; ``loose`` are sentences on what the data leave
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
     ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
-    a black box whose motions grow.
+    a black box whose motions grow, ``out_of_sight`` modes (Hz) above the Nyquist frequency.
     """
 
     parameters: Sequence[Parameter]
@@ -68,6 +69,7 @@ class Evidence:
     n_rows: int = 0
     n_unknowns: int = 0
     growing: Sequence[complex] = ()
+    out_of_sight: Sequence[float] = ()
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -142,6 +144,26 @@ def unstable(e: Evidence) -> Iterator[Finding]:
             "go anywhere; fit a lower order, or OutputError(order, stable=True)",
             number=float(count),
         )
+
+
+@sign
+def above_nyquist(e: Evidence) -> Iterator[Finding]:
+    """A mode that samples show at another frequency."""
+    for mode in e.out_of_sight:
+        yield Finding(
+            "above Nyquist",
+            f"a mode at {mode:.6g} Hz lies above the Nyquist frequency of the input's hold, where "
+            "samples cannot tell it from its mirror image below; sample faster or bound it",
+            number=mode,
+        )
+
+
+def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:
+    """Frequencies (Hz) of continuous poles above the Nyquist frequency of a hold."""
+    if not isinstance(hold, PeriodicHold):
+        return []
+    turning = poles.imag[poles.imag > np.pi / hold.period * (1 + 1e-6)]
+    return sorted(float(w) / (2 * np.pi) for w in turning)
 
 
 @sign

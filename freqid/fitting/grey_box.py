@@ -14,7 +14,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Evidence, findings
+from freqid.fitting.findings import Evidence, findings, out_of_sight
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading, enough_rows, read_for
@@ -149,6 +149,7 @@ def _estimate(
         reading.data.dt,
         minimum.objective.n_rows,
         len(values),
+        out_of_sight=out_of_sight(structure.at(minimum.x).poles, hold),
     )
     return Estimate(
         model=structure.at(minimum.x),

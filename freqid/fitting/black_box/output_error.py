@@ -16,7 +16,7 @@ from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Evidence, findings
+from freqid.fitting.findings import Evidence, findings, out_of_sight
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading, enough_rows, read_for, told_apart
@@ -190,6 +190,7 @@ def coefficient_estimate(
         n_rows=rows,
         n_unknowns=len(values),
         growing=_growing(model).tolist(),
+        out_of_sight=[] if model.dt else out_of_sight(model.poles, hold),
     )
     return Estimate(
         model=model,

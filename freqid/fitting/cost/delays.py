@@ -24,16 +24,17 @@ def unknown_inputs(
     """Late inputs that were not recorded, (inputs, columns, lines); None where there are none.
 
     ``unit`` (lines,) is a sample of one as the lines weight it, ``shifts`` are whole samples of
-    delay for each input, negative where it is early. Raises InputError where a delay leaves fewer
-    than half of the data's ``rows``.
+    delay for each input, negative where it is early. Raises InputError where these would be more
+    than an eighth of the data's ``rows``, and explain noise.
     """
     # early inputs lack the samples after the end: N − 1 … N − r, and z^N is one
     powers = [range(q) if q > 0 else range(-1, q - 1, -1) for q in shifts]
     count = sum(map(len, powers))
     if count == 0 or count * len(z) > _LONG:
         return None
-    if 2 * count > rows:
-        raise InputError(f"a delay of {max(map(abs, shifts))} samples outlasts half of the data")
+    if 8 * count > rows:
+        samples = max(map(abs, shifts))
+        raise InputError(f"a delay of {samples} samples leaves too little of the data")
     E = np.zeros((len(shifts), count, len(z)), complex)
     at = 0
     for i, some in enumerate(powers):
