@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, InputError, whole
@@ -79,8 +80,13 @@ class Model(ABC):
     @property
     def integrates(self) -> bool:
         """Whether there is a pole at zero frequency, up to rounding."""
-        size = np.abs(self.poles - 1 if self.dt else self.poles)
-        return bool((size <= 1e-9 * max(size.max(initial=0), 1.0)).any())
+        A = self.state_space().A
+        if not A.size:
+            return False
+        # rounding splits a double pole by the root of its size, and leaves the matrix singular
+        scaled = scipy.linalg.matrix_balance(A - np.eye(len(A)) if self.dt else A)[0]
+        s = np.linalg.svd(scaled, compute_uv=False)
+        return bool(s[-1] <= 1e-13 * max(s[0], 1e-300))
 
     def linearisation(self) -> Linearisation:
         """The matrices, and their derivatives by the parameters that a fit moves."""

@@ -123,9 +123,12 @@ def characteristic(A: FloatArray) -> FloatArray:
 def numerator_of(matrices: StateSpace, a: FloatArray, output: int, input: int) -> FloatArray:
     """b(z) of a channel pair beside the denominator a(z), (…, n + 1)."""
     A, B, C, D = matrices
-    # det(zI − A + b c) = a(z) + c adj(zI − A) b
-    closed = characteristic(A - B[..., :, input, None] * C[..., output, None, :])
-    return closed - a + D[..., output, input, None] * a
+    # det(zI − A + b c) = a(z) + c adj(zI − A) b is linear in b and c, which may be of size one
+    b, c = B[..., :, input, None], C[..., output, None, :]
+    size = np.linalg.norm(b, axis=-2, keepdims=True), np.linalg.norm(c, axis=-1, keepdims=True)
+    sized = [np.where(s > 0, s, 1) for s in size]
+    closed = characteristic(A - (b / sized[0]) * (c / sized[1])) - a
+    return closed * (sized[0] * sized[1])[..., 0] + D[..., output, input, None] * a
 
 
 def coefficients_of(matrices: StateSpace) -> FloatArray:

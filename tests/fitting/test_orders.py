@@ -1,0 +1,152 @@
+"""Black boxes of rising order, stable ones, and which order it takes."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+
+@pytest.fixture(scope="module")
+def arm(measured_daisy):
+    """The flexible robot arm of DaISy, 1,024 samples."""
+    x = np.loadtxt(measured_daisy / "robot_arm.dat")
+    return fq.Record(x[:, 0], x[:, 1], 1.0)
+
+
+@pytest.fixture(scope="module")
+def measured_daisy(request):
+    folder = request.getfixturevalue("measured") / "daisy"
+    if not folder.is_dir():
+        pytest.skip(f"no measured data: {folder} is missing")
+    return folder
+
+
+def noisy_modes(n=600, noise=0.02, seed=0):
+    """Two light modes under white input."""
+    model = fq.GreyBox(
+        lambda w, v: (
+            [[0, 1, 0, 0], [-w * w, -0.02 * w, 0, 0], [0, 0, 0, 1], [0, 0, -v * v, -0.04 * v]],
+            [[0], [w * w * 0.02], [0], [v * v * 0.04]],
+            [[1, 0, 1, 0]],
+            None,
+        ),
+        [fq.Parameter("w", 0.3), fq.Parameter("v", 1.4)],
+    )
+    record = fq.simulate(model, np.random.default_rng(seed).standard_normal(n), 1.0)
+    return record.with_noise(noise * record.y.std(), seed=1000 + seed)
+
+
+@pytest.mark.parametrize("stable", [False, True])
+def test_the_cost_never_rises_with_the_order(arm, stable):
+    for record in (arm, noisy_modes()):
+        costs = []
+        for order in range(1, 8):
+            est = fq.fit(fq.OutputError(order, stable=stable), record)
+            costs.append(est.cost)
+            if stable:
+                assert np.abs(est.model.poles).max() < 1
+        assert (np.diff(costs) <= 1e-6 * np.array(costs[:-1])).all()
+
+
+def test_nor_for_an_output_that_was_decimated(plant):
+    clean = fq.simulate(plant, fq.chirp(10, 80, 3, 0.5e-3), 0.5e-3)
+    record = clean.with_noise(1.0, seed=0).decimate(2)
+    costs = [fq.fit(fq.OutputError(n), record).cost for n in (2, 3, 4, 5)]
+    assert (np.diff(costs) <= 1e-6 * np.array(costs[:-1])).all()
+
+
+def test_an_unstable_model_says_so(arm):
+    est = fq.fit(fq.OutputError(5), arm)
+    unstable = [w for w in est.warnings if w.kind == "unstable"]
+    assert bool(unstable) == bool(np.abs(est.model.poles).max() > 1)
+
+
+def test_more_starts_are_tried():
+    record = noisy_modes()
+    one, many = (fq.fit(fq.OutputError(3), record, n_starts=n) for n in (1, 8))
+    assert many.n_starts == 8
+    assert many.cost <= one.cost * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("scale", [1e-120, 1e-30, 1e15, 1e30, 1e120])
+def test_units_change_nothing(scale):
+    record = noisy_modes()
+    expected = fq.fit(fq.OutputError(4), record).fit_percent
+    for u, y in ((record.u * scale, record.y), (record.u, record.y * scale)):
+        found = fq.fit(fq.OutputError(4), fq.Record(u, y, 1.0)).fit_percent
+        assert found == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("spec", [fq.OutputError(2), fq.TransferFunction(1, 2)])
+def test_inputs_that_are_the_same_are_refused(spec):
+    record = noisy_modes()
+    twice = fq.Record(np.column_stack([record.u, 2 * record.u]), record.y, 1.0)
+    with pytest.raises(ValueError, match="inputs 1, 2 depend"):
+        fq.fit(spec, twice)
+
+
+def test_orders_beyond_the_data_are_refused():
+    with pytest.raises(ValueError, match="order=200 has 600 unknowns"):
+        fq.fit(fq.OutputError(200), noisy_modes(1000))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_right_order_is_chosen(seed):
+    table = fq.select_order(noisy_modes(1500, 0.01, seed), range(2, 7))
+    assert table.attrs["best"] == 4
+    assert table["cross_validation"].idxmin() == 2
+
+
+def test_feedthrough_and_dead_time_are_chosen_in_any_unit():
+    u = np.random.default_rng(3).standard_normal(800)
+    lag = fq.simulate(fq.first_order(b=20, a=20), u, 5e-3)
+    y = np.concatenate([np.zeros(2), lag.y[:-2]])
+    y = y + 0.02 * np.random.default_rng(4).standard_normal(800)
+    for scale in (1e-6, 1.0, 1e6):
+        record = fq.Record(u, scale * y, 5e-3)
+        found = fq.select_order(record, [1, 2], feedthrough=None, delays=range(5)).attrs
+        # behind one sample more an order with feedthrough is the same model
+        assert found["best"] == 1
+        assert found["delay"] - found["feedthrough"] == 2
+
+
+def test_an_order_that_fails_keeps_the_table():
+    table = fq.select_order(noisy_modes(60), [2, 40])
+    assert "data hold 60 real values" in table["error"].iloc[1]
+    assert table.attrs["best"] == 2
+    for wrong in ({"delays": []}, {"feedthrough": "both"}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            fq.select_order(noisy_modes(60), [2], **wrong)
+
+
+def test_a_fast_input_beside_a_slow_output(plant):
+    clean = fq.simulate(plant, fq.chirp(10, 80, 10, 0.5e-3), 0.5e-3)
+    record = clean.with_noise(0.05, seed=1).decimate(40, keep_input=True)
+    sampled, rational = fq.OutputError(3), fq.TransferFunction(2, 3)
+    assert fq.fit(sampled, record).cost < 1.001 * fq.fit(rational, record).cost
+
+
+def test_a_mode_above_nyquist_is_named():
+    mode = fq.GreyBox(
+        lambda w, z: ([[0, 1], [-w * w, -2 * z * w]], [[0], [w * w]], [[1, 0]], None),
+        [fq.Parameter("w", 2 * np.pi * 45.186), fq.Parameter("z", 0.01)],
+    )
+    record = fq.simulate(mode, fq.white_noise(4000), 1 / 400).decimate(10)
+    est = fq.fit(mode, record, hold="zoh", start={"w": 2 * np.pi * 45}, n_starts=1)
+    above = est["w"] / (2 * np.pi) > 20
+    assert any(w.kind == "above Nyquist" for w in est.warnings) == above
+
+
+def test_a_free_double_integrator_is_recognised():
+    def coupled(J1, J2, k, c):
+        A = [[0, 1, 0, 0], [-k / J1, -c / J1, k / J1, c / J1],
+             [0, 0, 0, 1], [k / J2, c / J2, -k / J2, -c / J2]]  # fmt: skip
+        return A, [[0], [1 / J1], [0], [0]], [[1.0, 0, 0, 0]], None
+
+    values = {"J1": 1e-4, "J2": 3e-3, "k": 50.0, "c": 1e-3}
+    model = fq.GreyBox(coupled, [fq.Parameter(n, v) for n, v in values.items()])
+    record = fq.simulate(model, fq.white_noise(500), 1e-4)
+    assert fq.compare(model, record).fit_percent[0] > 99.99
+    est = fq.fit(model, record, start={"k": 40.0, "J1": 1.2e-4})
+    assert est["k"] == pytest.approx(50, rel=1e-6)
+    assert est.fit_percent > 99.99
