@@ -36,7 +36,7 @@ _TOUCHES = 1e-3
 # level of a gap to a black box below which it is no chance
 _CHANCE = 1e-3
 # above that level of the gap so many starts that agree are enough; else the last number
-_AGREEMENT, _DOUBTED = ((0.2, 1), (0.05, 2)), 4
+_AGREEMENT, _DOUBTED = ((0.2, 1), (1e-3, 2)), 4
 # starts that agree without an exception where a black box explains more
 _ALIKE = 6
 # costs that agree to this belong to one minimum
