@@ -14,7 +14,7 @@ WORSE = 1e-3
 
 
 def one(case, factor=3.0):
-    """A fit from a start within the factor, beside fits from the truth and from twenty starts."""
+    """A fit from a start within the factor, beside fits from the truth and from thirty."""
     warnings.simplefilter("ignore")
     plant, record, drawn, rng = random_experiment(case)
     start = moved(plant, rng, factor)

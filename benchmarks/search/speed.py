@@ -1,7 +1,7 @@
 """Time of a default fit over that of ``leastsq``: same record, same start, one thread of BLAS.
 
-The two-mass plant of the paper, chirp 10 to 80 Hz over 0.4 of the record's Nyquist frequency where
-it is short; four ways of reading it, three starts, three levels of noise.
+The two-mass plant of the paper under its chirp, however short; four ways of reading it, three
+starts, three levels of noise.
 """
 
 import time

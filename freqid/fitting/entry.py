@@ -65,8 +65,9 @@ def fit(
             ``"steady"`` (no transient).
         start: parameter values to begin from; the model's own where not given.
         n_starts: how many starts to try: the first, then scattered ones inside the bounds or
-            within a factor of ten of the first. ``"auto"`` stops when two agree on the best
-            minimum, and after one that explains the data to their noise.
+            within a factor of ten of the first. ``"auto"`` stops after one that
+            explains the data as well as a black box of the plant's order does, and else when
+            enough of them agree.
         seed: of the scattered starts.
         domain: ``"frequency"`` or ``"time"``, the paper's output error.
 

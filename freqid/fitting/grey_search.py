@@ -17,13 +17,14 @@ from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.log_stage import log_targets
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Bound, Found, Search
-from freqid.lti import Hold, PeriodicHold
+from freqid.lti import Hold
 from freqid.models import GreyBox
 
 # lines on which the minimum is looked for, and how many times more for noise as large as the signal
@@ -55,11 +56,12 @@ def search_grey(
     if in_time:
         spectral = [r.lines() for r in at_lines]
     # a long record has more lines than it takes to find the minimum: refine on all of them last
-    lines = _lines_wanted(spectral)
+    floor = noise_floor(spectral)
+    lines = _lines_wanted(spectral, floor)
     few = thinned_to(spectral, lines)
     scout = objective if few is spectral and not in_time else Objective(structure, few)
-    found = _without_noise(scout, structure, few, spectral)
-    if found is not None and not in_time:
+    found = None if in_time else _without_noise(scout, structure, few, floor)
+    if found is not None:
         objective.n_evaluations = scout.n_evaluations
         if scout is objective:
             return found
@@ -74,8 +76,10 @@ def search_grey(
     # a hold whose period is unknown is not one that the black box has
     share = sum(e.n_lines for e in few) / sum(e.n_lines for e in spectral)
     bound = None if beside is None or structure.unknown else _bound(beside, structure, share)
-    aliased = partial(_out_of_sight, structure, [r.hold for r in at_lines])
-    search = Search(scout, targets, lambda: noise_floor(spectral), bound, rounds, aliased)
+    # who begins with a mode out of sight means it
+    hidden = partial(_hidden, structure, [r.hold for r in at_lines])
+    aliased = (lambda x: False) if hidden(start) else hidden
+    search = Search(scout, targets, floor, bound, rounds, aliased)
     found = search.run(start, options.n_starts, options.seed)
     objective.n_evaluations = scout.n_evaluations
     if in_time:
@@ -85,24 +89,23 @@ def search_grey(
     return dataclasses.replace(found, solution=_on_all(objective, scout, found))
 
 
-def _out_of_sight(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:
-    """Whether a mode lies above the Nyquist frequency of a hold, where it looks like another."""
-    periods = [h.period for h in holds if isinstance(h, PeriodicHold)]
-    if not periods or structure.unknown:
+def _hidden(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:
+    """Whether a mode lies above every hold's Nyquist frequency, where it looks like another."""
+    if structure.unknown:
         return False
     poles = structure.at(x).poles
-    return bool((np.abs(poles.imag) > np.pi / min(periods) * (1 + 1e-9)).any())
+    return all(out_of_sight(poles, hold) for hold in holds)
 
 
 def _without_noise(
     scout: Objective,
     structure: GreyStructure,
     few: Sequence[SpectralExperiment],
-    every: Sequence[SpectralExperiment],
+    floor: float,
 ) -> Found | None:
     """The minimum of data that are down to rounding, which needs no black box; None for others."""
     energy = sum(e.energy for e in few)
-    if not 0 < noise_floor(every) <= _QUIET * energy:
+    if not 0 < floor <= _QUIET * energy:
         return None
     try:
         found = Found(polish(scout, structure.start, limit=_DIRECT))
@@ -111,9 +114,9 @@ def _without_noise(
     return found if found.solution.cost <= _EXACT * energy else None
 
 
-def _lines_wanted(experiments: Sequence[SpectralExperiment]) -> int:
+def _lines_wanted(experiments: Sequence[SpectralExperiment], noise: float) -> int:
     """How many lines tell one minimum from another: more of them where noise outweighs signal."""
-    energy, noise = sum(e.energy for e in experiments), noise_floor(experiments)
+    energy = sum(e.energy for e in experiments)
     return int(_LINES * (1 + _NOISY * noise / max(energy - noise, 1e-3 * energy)))
 
 
@@ -191,8 +194,8 @@ def _bound(beside: Beside, structure: GreyStructure, share: float) -> Bound | No
     Lines that stand for others, a ``share`` of all, tell no more than themselves.
     """
     box = beside.box
-    # samples that were left out to put inputs in step cost nothing there
-    if not box.solution.converged or any(beside.shifts):
+    # a delay leaves samples out, or is one that the black box does not have
+    if not box.solution.converged or structure.model.delay_sources:
         return None
     rows = int(share * box.objective.n_rows) - box.unknowns - box.solution.point.n_initial
     return Bound(box.cost, box.unknowns - len(structure.names), rows)

@@ -38,8 +38,6 @@ _LEVEL = 0.01
 _TOUCHES = 1e-3
 # relative standard error of a parameter that the data leave open; starts that have to agree then
 _OPEN, _WANTED = 0.5, 4
-# level below which a second start has to agree
-_DOUBT = 0.05
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
@@ -132,8 +130,7 @@ class Testimony:
                 "minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
                 "the right hold"
             )
-        wanted = _WANTED if undetermined else 2 if p < _DOUBT else 1
-        if gap > _TOUCHES and self.n_agreed < wanted:
+        if gap > _TOUCHES and undetermined and self.n_agreed < _WANTED:
             return "absent", (
                 f"a black box of order {order} explains the data no better ({numbers}), but they "
                 "are too noisy for it to tell one minimum from another"

@@ -236,7 +236,8 @@ class GreyBox(Model):
             f"{p.name}={v:g}{' fixed' * p.fixed}{' tied' * (p.name in self.ties)}"
             for p, v in zip(self.parameters, self.values.values(), strict=True)
         )
-        return f"<GreyBox {self.name}: {inside}>"
+        late = f", inputs late by {self.input_delay}" if self.delay_sources else ""
+        return f"<GreyBox {self.name}: {inside}{late}>"
 
     def _repr_html_(self) -> str:
         rows = "".join(

@@ -9,7 +9,6 @@ import numpy as np
 
 from freqid.checks import Array, InputError, choice, whole
 from freqid.models.grey_box import GreyBox
-from freqid.models.matrices import without
 from freqid.models.parameter import Parameter
 
 
@@ -100,7 +99,7 @@ def drivetrain(
     if isinstance(input_delay, str):
         parameters.append(Parameter(input_delay, 0.0, "s"))
     model = GreyBox(
-        without(partial(_drivetrain, n, tuple(names)), [str(input_delay)]),
+        partial(_drivetrain, n, tuple(names)),
         parameters,
         input_delay=input_delay,
         inputs=["torque"],

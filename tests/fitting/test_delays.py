@@ -133,3 +133,15 @@ def test_a_late_input_needs_a_hold_that_is_constant():
         fq.fit(lag(Td=0.03), record, hold="foh")
     with pytest.raises(ValueError, match="domain='frequency'"):
         fq.fit(lag(Td=0.03), record, domain="time")
+
+
+@pytest.mark.parametrize("keep_input", [True, False])
+def test_a_delay_of_a_decimated_record_is_found(keep_input):
+    u = fq.chirp(0.5, 20, 8, DT)
+    fine = np.concatenate([np.zeros(340), np.repeat(u, FINE)])[: len(u) * FINE]
+    y = fq.simulate(fq.first_order(b=50, a=20), fine, DT / FINE).y[::FINE]
+    record = fq.Record(u, y, DT).slice(0.5, 7.5).decimate(2, keep_input=keep_input)
+    est = fq.fit(fq.TransferFunction(0, 1, delay="estimate"), record)
+    assert est.model.delay == pytest.approx(3.4 * DT, abs=0.05 * DT)
+    grey = fq.fit(lag(), record, start={"b": 60.0, "a": 15.0})
+    assert grey["Td"] == pytest.approx(3.4 * DT, abs=0.05 * DT)

@@ -9,6 +9,7 @@ ones. On the hard cases of ``benchmarks/black_box_starts.py`` they leave nothing
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -43,21 +44,23 @@ def first_model(
     # of very many lines a part will do: its minimum is next to that of all
     few = thinned_to(experiments, _LINES)
     lines = RationalLines(few, feedthrough)
-    best = best_of(lines, order, _begun(lines, order))
+    best = best_of(lines, _begun(lines, order))
     if best is not None and few is not experiments:
         lines = RationalLines(experiments, feedthrough)
         best = lines.minimum(best.poles)
     return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
 
 
-def best_of(lines: RationalLines, order: int, begun: Iterable[ComplexArray]) -> Fitted | None:
-    """The best minimum from several sets of poles, until one is believed."""
+def best_of(
+    lines: RationalLines, begun: Iterable[ComplexArray], every: bool = False
+) -> Fitted | None:
+    """The best minimum from several sets of poles: from ``every`` one, or until one is believed."""
     best: Fitted | None = None
     for poles in begun:
         found = lines.minimum(poles)
         if found is not None and (best is None or found.cost < best.cost):
             best = found
-        if found is not None and found is best and _believed(lines, best):
+        if not every and found is not None and found is best and _believed(lines, best):
             break
     return best
 
@@ -88,10 +91,9 @@ def nested_model(
     best: Fitted | None = None
     # of a high order only the last few: the chain from one on would take longer than it is worth
     for n in range(1 if order <= _CHAIN else order - 2, order + 1):
-        begun = [*_begun(lines, n)]
-        if n == order:
-            begun += [_random_poles(n, rng) for _ in range(more)]
-        found = best_of(lines, n, begun)
+        extra = more if n == order else 0
+        scattered = (_random_poles(n, rng) for _ in range(extra))
+        found = best_of(lines, chain(_begun(lines, n), scattered), every=extra > 0)
         if best is not None and (found is None or found.cost > best.cost):
             found = min(_one_more(lines, best, n), key=lambda f: f.cost, default=found)
         if found is None:
@@ -99,7 +101,7 @@ def nested_model(
         best = found
         if best.cost <= lines.rounding and n < order:
             # nothing is left to explain
-            best = best_of(lines, order, _begun(lines, order))
+            best = best_of(lines, _begun(lines, order))
             break
     if best is None or len(best.poles) < order:
         return identify(experiments, order, feedthrough)

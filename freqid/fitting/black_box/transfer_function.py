@@ -114,7 +114,8 @@ def _delays(
         except (InputError, np.linalg.LinAlgError):
             break
         tried.append((point, delay))
-    if tried:
+    # a single one is that of no delay, which every record can be put in step with
+    if len(tried) > 1:
         # the best one, its neighbours, and every other valley
         costs = [np.inf, *(cost for cost, _ in tried), np.inf]
         valleys = [t for i, t in enumerate(tried, 1) if t[0] <= min(costs[i - 1], costs[i + 1])]

@@ -105,9 +105,8 @@ class StopRule:
 
     n_starts: int | None
     rounding: float
-    floor: Callable[[], float]
+    floor: float
     bound: Bound | None
-    _explained: float | None = None
 
     @property
     def limit(self) -> int:
@@ -135,9 +134,7 @@ class StopRule:
         # starts of both kinds, on a leash and without
         both = found.n_starts > 4 * _ROUND
         if self.bound is None:
-            if self._explained is None:
-                self._explained = _EXPLAINED * self.floor()
-            if cost <= self._explained or found.n_stale >= _PATIENCE:
+            if cost <= _EXPLAINED * self.floor or found.n_stale >= _PATIENCE:
                 return True
             return found.n_agreed >= 3 and both
         if self.explains(cost):
@@ -152,7 +149,7 @@ class Search:
     ``aliased`` has a mode where samples cannot see it, and gives way to any other place that is
     explained as well.
 
-    ``floor`` gives, when it is asked, the cost that the data's own noise explains; ``bound`` is the
+    ``floor`` is the cost that the data's own noise explains; ``bound`` is the
     cost of a black box of the model's order on the same lines, None where there is none.
     """
 
@@ -160,7 +157,7 @@ class Search:
         self,
         objective: Objective,
         targets: Sequence[LogResponse],
-        floor: Callable[[], float],
+        floor: float,
         bound: Bound | None,
         rounds: Rounds | None = None,
         aliased: Callable[[FloatArray], bool] = lambda x: False,
@@ -217,6 +214,8 @@ class Search:
         """Ends of the places to which rounds of scattered starts lead, the likeliest first."""
         structure = cast(ScannableStructure, self.objective.structure)
         best, left, number = np.inf, rule.limit - 1, 0
+        if left < 1:
+            return
         # far off the axis modes find their own over a longer way
         targets = [t for t in (self.rounds(_BLUNT), self.rounds(0.0)) if t]
         while left > 0:
