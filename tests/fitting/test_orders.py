@@ -55,6 +55,21 @@ def test_nor_for_an_output_that_was_decimated(plant):
     assert (np.diff(costs) <= 1e-6 * np.array(costs[:-1])).all()
 
 
+@pytest.mark.parametrize("seed", [100, 101])
+@pytest.mark.parametrize("stable", [False, True])
+def test_nor_with_several_channels(seed, stable):
+    rng = np.random.default_rng(seed)
+    u = np.cumsum(rng.standard_normal((150, 2)), axis=0)
+    y = np.cumsum(rng.standard_normal((150, 2)), axis=0) + 0.5 * u[:, :1]
+    record = fq.Record(u, y, 1.0)
+    fits = [fq.fit(fq.OutputError(n, stable=stable), record) for n in range(1, 5)]
+    costs = np.array([est.cost for est in fits])
+    assert (np.diff(costs) <= 1e-6 * costs[:-1]).all()
+    more = fq.fit(fq.OutputError(2, stable=stable), record, n_starts=4)
+    assert more.n_starts == 4
+    assert more.cost <= costs[1] * (1 + 1e-9)
+
+
 def test_an_unstable_model_says_so(arm):
     est = fq.fit(fq.OutputError(5), arm)
     unstable = [w for w in est.warnings if w.kind == "unstable"]

@@ -10,7 +10,7 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
 from freqid.fitting.black_box.reference import lines_in_plane
-from freqid.fitting.black_box.refinement import first_model, nested_model
+from freqid.fitting.black_box.refinement import first_model, nested_model, scattered_model
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
@@ -91,6 +91,12 @@ def _nested(
     options = spec.feedthrough, spec.stable
     own = begun(nested_model(lines, spec.order, *options, more, seed))
     chained = all(e.single and e.one_to_one for e in lines)
+    if not chained and more:
+        rng = np.random.default_rng(seed)
+        others = [
+            begun(scattered_model(lines, spec.order, spec.feedthrough, rng)) for _ in range(more)
+        ]
+        own = min([own, *others], key=lambda t: t[1].cost)
     if chained or not 1 < spec.order <= _HIGH:
         return own
     below, less, _ = begun(nested_model(lines, spec.order - 1, *options))
@@ -132,8 +138,12 @@ def held_out_cost(est: Estimate, reading: Reading, kept: BoolArray) -> float:
     assert isinstance(chart, Chart)
     seen = reading.at_lines().with_(noise=GivenWeights(1.0 * kept))
     part = seen.lines(Plane()).in_plane(chart.plane)
-    start = first_model([part], len(chart.centre.A), chart.feedthrough)
-    chart = Chart(start, chart.feedthrough, chart.plane, chart.dt)
+    order = len(chart.centre.A)
+    if chart.stable:
+        start = nested_model([part], order, chart.feedthrough, True)
+    else:
+        start = first_model([part], order, chart.feedthrough)
+    chart = Chart(start, chart.feedthrough, chart.plane, chart.dt, stable=chart.stable)
     x = polish(Objective(chart, [part]), np.zeros(chart.size), limit=_STEPS, tolerance=1e-6).x
     lines = reading.at_lines().lines(Plane()).in_plane(chart.plane)
     evaluation = lines.at(chart.realise(x))

@@ -188,7 +188,7 @@ class RationalLines:
         basis, x = found.basis, found.x
         n = len(basis.Q) - 1
         poles = found.poles
-        A, C = _with_poles(poles)
+        A, C = with_poles(poles)
         if not self.feedthrough:
             # q_n + Σ a_k q_k = lead Π (w − λ)
             lead = basis.Q[0, 0].real / np.prod(np.diag(basis.H, -1))
@@ -236,7 +236,7 @@ def _least(R: FloatArray, damping: float = 0.0) -> FloatArray:
     return np.linalg.lstsq(M, c)[0]
 
 
-def _with_poles(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
+def with_poles(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Real A and C with these poles, each seen by the output."""
     A, C = np.zeros((len(poles), len(poles))), np.zeros((1, len(poles)))
     at = 0
@@ -249,7 +249,7 @@ def _with_poles(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _driving(poles: ComplexArray, residues: ComplexArray) -> FloatArray:
-    """Γ (n, 1) that gives the poles of ``_with_poles`` these residues."""
+    """Γ (n, 1) that gives the poles of ``with_poles`` these residues."""
     rows: list[float] = []
     for pole, residue in zip(poles, residues, strict=True):
         if pole.imag > 0:

@@ -14,7 +14,13 @@ from itertools import chain
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.fitting.black_box.rational_lines import FEW, Fitted, RationalLines, mirrored
+from freqid.fitting.black_box.rational_lines import (
+    FEW,
+    Fitted,
+    RationalLines,
+    mirrored,
+    with_poles,
+)
 from freqid.fitting.black_box.subspace import identify, inputs_of, observed
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.lti import StateSpace
@@ -109,6 +115,18 @@ def nested_model(
         lines = RationalLines(experiments, feedthrough, stable)
         best = lines.below(best.poles) or best
     return lines.state_space(best)
+
+
+def scattered_model(
+    experiments: Sequence[SpectralExperiment],
+    order: int,
+    feedthrough: bool,
+    rng: np.random.Generator,
+) -> StateSpace:
+    """A model of any number of channels with random poles, its inputs by least squares."""
+    A, _ = with_poles(_random_poles(order, rng))
+    C = rng.standard_normal((experiments[0].n_channels[0], order))
+    return inputs_of(experiments, A, C, feedthrough)
 
 
 def _one_more(lines: RationalLines, best: Fitted, order: int) -> list[Fitted]:
