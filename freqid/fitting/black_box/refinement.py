@@ -95,6 +95,11 @@ def nested_model(
     lines = RationalLines(few, feedthrough, stable)
     rng = np.random.default_rng(seed)
     best: Fitted | None = None
+    if order <= FEW and not more and not stable:
+        # few poles that explain nearly all need no others below them
+        first = best_of(lines, _begun(lines, order))
+        if first is not None and _believed(lines, first) and few is experiments:
+            return lines.state_space(first)
     # of a high order only the last few: the chain from one on would take longer than it is worth
     for n in range(1 if order <= _CHAIN else order - 2, order + 1):
         extra = more if n == order else 0
