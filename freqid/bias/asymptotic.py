@@ -174,12 +174,12 @@ def grey_asymptote(
     structure = cast(GreyStructure, minimum.structure)
     values = x * structure.scale
     # what is left of the cost is no noise: no parameter is unphysical by chance
-    kept = [w for w in est.warnings if w.kind not in ("not physical", "edge of a bound")]
+    kept = [w for w in est.signs if w.kind not in ("not physical", "edge of a bound")]
     certain = Evidence(plain.parameters, values[: plain.count], np.zeros(plain.count))
     settled_there = dataclasses.replace(
         est,
         values=values,
-        warnings=kept + findings(certain),
+        signs=kept + findings(certain),
         model=structure.at(x),
         problem=minimum,
         uncertainty=Spread(structure.scale, minimum),

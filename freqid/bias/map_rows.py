@@ -143,4 +143,4 @@ def _alone(model: GreyBox, row: Row, shared: Conditions) -> Answer:
     except (InputError, ArithmeticError, np.linalg.LinAlgError) as error:
         count = len(model.free_parameters)
         return Answer(np.full(count, np.nan), np.nan, False, str(error))
-    return Answer(est.values, est.cost, est.converged, "; ".join(est.warnings))
+    return Answer(est.values, est.cost, est.converged, "; ".join(est.signs))

@@ -83,6 +83,7 @@ def fit(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
     )
+    print(f"verdict: {estimate.verdict.grade}: {estimate.verdict.reasons[0]}")
     print(f"witness {estimate.witness.verdict}: {estimate.witness.sentence}")
     for warning in estimate.warnings:
         print(f"warning: {warning}")

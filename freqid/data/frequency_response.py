@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names, whole
 from freqid.data.band import Band, chosen
 from freqid.lti import Hold
 
@@ -35,6 +35,8 @@ class FrequencyResponse:
         input_spectrum: energy |U|² of each input at the frequencies, (inputs, K): the weight of
             the bias integral (paper, eq. 2).
         input_names, output_names: channel names.
+        reach: lines on each side of one whose noise goes together with its own, as that of local
+            models does, which share their windows.
 
     Raises ValueError for shapes that disagree, frequencies that do not increase, or values that
     are not finite.
@@ -53,6 +55,7 @@ class FrequencyResponse:
     input_spectrum: FloatArray | None
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
+    reach: int
 
     # written by hand: fields hold what was checked, which is less than what may be given
     def __init__(
@@ -66,6 +69,7 @@ class FrequencyResponse:
         input_spectrum: ArrayLike | None = None,
         input_names: Sequence[str] | None = None,
         output_names: Sequence[str] | None = None,
+        reach: int = 0,
     ) -> None:
         f = np.array(frequency, dtype=float)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
@@ -90,6 +94,7 @@ class FrequencyResponse:
             input_spectrum=_shaped("input_spectrum", input_spectrum, (m, K)),
             input_names=channel_names("input_names", input_names, m, "u"),
             output_names=channel_names("output_names", output_names, p, "y"),
+            reach=whole("reach", reach, least=0),
         )
 
     @property

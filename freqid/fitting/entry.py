@@ -13,10 +13,10 @@ from freqid.data import DataSet, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
-from freqid.fitting.hold_tests import rejected_hold
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.suspects import Inquiry
 from freqid.fitting.witness import Testimony
 from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
@@ -52,8 +52,8 @@ def fit(
         data: a Record, a FrequencyResponse, or several; each record has its own initial state.
         hold: what the input did between its samples; None is what each record remembers, a name
             means that hold at the record's own sample time, as other tools assume;
-            ``"estimate"`` makes the period of a zero-order hold one more unknown. A hold that is
-            given here and that the data reject is reported in ``est.warnings``.
+            ``"estimate"`` makes the period of a zero-order hold one more unknown. A hold that the
+            data reject is reported in ``est.warnings``.
         band: (low, high) in Hz; None takes all lines, and the cost is the output error of the
             time domain (Parseval), but for the line at zero of a plant that integrates. Where the
             input is faster than the output this is the input's band.
@@ -98,7 +98,7 @@ def fit(
             "hold='estimate' and input_delay: a longer hold is a later input, so that one of them "
             "must be known; name the hold"
         )
-    readings = [
+    readings: Sequence[Reading] = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late
         )
@@ -106,17 +106,18 @@ def fit(
     ]
     options = SearchOptions(count, seed, start, estimated)
     if any(r.noise.to_be_learnt for r in readings):
-        est = _noise_weighted(model, readings, options)
+        est, readings = _noise_weighted(model, readings, options)
     else:
         est = work(readings, options)
-    if hold is not None and not estimated and isinstance(model, GreyBox):
-        est.warnings.extend(rejected_hold(est.minimum, est.hold, est.dt))
     given = {
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
     }  # fmt: skip
     call = _call(model, len(sets), given)
-    return dataclasses.replace(est, data=sets, band=band, weights=weights, call=call)
+    inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
+    return dataclasses.replace(
+        est, data=sets, band=band, weights=weights, call=call, inquiry=inquiry
+    )
 
 
 def _noise_models(weights: object, data: object, sets: Sequence[DataSet]) -> list[NoiseModel]:
@@ -144,7 +145,9 @@ def _call(model: object, count: int, given: Mapping[str, object]) -> str:
     return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"
 
 
-def _noise_weighted(model: object, readings: Sequence[Reading], options: SearchOptions) -> Estimate:
+def _noise_weighted(
+    model: object, readings: Sequence[Reading], options: SearchOptions
+) -> tuple[Estimate, Sequence[Reading]]:
     """Fits in turn with the noise that the one before left; to the maximum of the likelihood.
 
     The noise is learnt by the data alone: what a prior makes them leave is none.
@@ -167,13 +170,14 @@ def _noise_weighted(model: object, readings: Sequence[Reading], options: SearchO
     testimony = est.testimony
     if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
         testimony = testimony.after(first.testimony)
-    return dataclasses.replace(
+    found = dataclasses.replace(
         est,
         nominal=first.nominal,
         n_starts=first.n_starts,
         n_agreed=first.n_agreed,
         testimony=testimony,
     )
+    return found, readings
 
 
 def _again(est: Estimate, options: SearchOptions) -> SearchOptions:

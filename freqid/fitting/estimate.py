@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +13,12 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, unknown
 from freqid.data import DataSet, FrequencyResponse
-from freqid.fitting import printed
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.findings import Finding
+from freqid.fitting.findings import Finding, Inquired
+from freqid.fitting.grades import Verdict, verdict
 from freqid.fitting.search.verdict import Witness
+from freqid.fitting.shown import Shown
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.profiles import profile_intervals
@@ -26,16 +26,14 @@ from freqid.lti import Hold
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
-    import control
     import pandas as pd
-    from matplotlib.axes import Axes
 
 # half-width of a 95 % interval of a normal variable, in standard deviations
 Z95 = 1.959963984540054
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Shown):
     """The result of ``fit``: parameters, how certain they are, and what speaks against them.
 
     Attributes:
@@ -54,12 +52,13 @@ class Estimate:
         hold: what the input was taken to do between its samples.
         dt: sample time of the output in s; 0 for a continuous response.
         n_starts, n_agreed: starts that were tried, and those that ended in this minimum.
-        warnings: why the result should not be trusted, in sentences (``str``) that also have
-            ``kind``, ``severity`` and ``number``.
+        signs: the ``warnings`` that the fit itself gave.
         problem: the Minimum (structure, experiments, prior), for what asks for more.
         data: the data sets that were fitted; ``band`` (Hz) and ``weights`` as they were given.
         call: the call of ``fit``, to be made again.
         testimony: what the ``witness`` is heard on.
+        inquiry: what asks the ``suspects``.
+        notes: what was done on the way, in sentences.
     """
 
     model: Any
@@ -76,7 +75,7 @@ class Estimate:
     hold: Hold
     dt: float
     n_rows: int
-    warnings: list[Finding] = field(default_factory=list)
+    signs: list[Finding] = field(default_factory=list)
     n_starts: int = 1
     n_agreed: int = 1
     problem: Minimum | None = field(default=None, repr=False)
@@ -85,6 +84,8 @@ class Estimate:
     weights: Any = None
     call: str = ""
     testimony: Callable[[], Witness] | None = field(default=None, repr=False)
+    inquiry: Inquired | None = field(default=None, repr=False)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def minimum(self) -> Minimum:
@@ -103,6 +104,43 @@ class Estimate:
         if self.testimony is None:
             return Witness("absent", "a black box of its own order is no witness")
         return self.testimony()
+
+    @cached_property
+    def warnings(self) -> list[Finding]:
+        """Why the result should not be trusted: sentences (``str``) with ``kind``, ``severity`` and
+        ``number``. The suspects are asked when this is read for the first time.
+        """
+        asked = [] if self.inquiry is None else self.inquiry.findings()
+        return [*asked, *self.signs]
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether to use the numbers: ``grade`` "trust", "doubt" or "do not use", and ``reasons``.
+
+        >>> import freqid as fq
+        >>> record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3).with_noise(0.01)
+        >>> fq.fit(fq.first_order(), record).verdict.grade
+        'trust'
+        """
+        return verdict(self)
+
+    @cached_property
+    def suspects(self) -> pd.DataFrame:
+        """What the data may hold that the model lacks, by score tests, the strongest first.
+
+        Index: suspect; columns ``statistic`` (F), ``p_value``, ``size`` in its ``unit``, ``power``,
+        the part of it that the parameters leave to be seen, and ``largest_shift``, what it would do
+        to a parameter in standard errors. Empty where nothing is left to be tested.
+
+        Source: Rao, Proc. Cambridge Philosophical Society 44, 1948; Söderström and Stoica, System
+        Identification, 1989, appendix B.
+        """
+        import pandas as pd
+
+        if self.inquiry is None:
+            columns = ["statistic", "p_value", "size", "unit", "power", "largest_shift"]
+            return pd.DataFrame(columns=columns, index=pd.Index([], name="suspect"))
+        return self.inquiry.table()
 
     @property
     def spread(self) -> Spread:
@@ -128,6 +166,7 @@ class Estimate:
         """Restore; an estimate of version 0.1.0 has lost its cost, and what it had not computed."""
         if not isinstance(state.get("problem"), Minimum):
             state["problem"] = None
+        state.setdefault("signs", state.get("warnings", []))
         if not isinstance(state["uncertainty"], Spread | np.ndarray):
             unknown = np.full((len(state["values"]),) * 2, np.nan)
             state["uncertainty"] = state.get("covariance_matrix", unknown)
@@ -205,16 +244,6 @@ class Estimate:
         variance = response_variance(*self._unknowns, frf.omega, hold)
         return dataclasses.replace(frf, variance=variance)
 
-    def to_control(self, pade: int | None = None) -> control.StateSpace:
-        """The estimated model as a ``control.StateSpace``."""
-        return self.model.to_control(pade)
-
-    def to_continuous(self, hold: Hold | str | None = None) -> control.StateSpace:
-        """A black-box model in continuous time, by inverting its hold (see ``OutputError``)."""
-        if not hasattr(self.model, "to_continuous"):
-            raise InputError("the model is in continuous time already; use to_control()")
-        return self.model.to_continuous(self.hold if hold is None else hold)
-
     def derived(self, function: Callable[[GreyBox], ArrayLike]) -> tuple[FloatArray, FloatArray]:
         """Value and standard error of ``function(model)``, a number or an array, to first order.
 
@@ -259,36 +288,3 @@ class Estimate:
             {"lower": self.values - half, "upper": self.values + half},
             index=pd.Index(list(self.names), name="parameter"),
         )
-
-    def bode(self, ax: Any = None, **options: Any) -> Any:
-        """Draw amplitude and phase of the estimate; see ``freqid.bode``."""
-        from freqid.plots import bode
-
-        return bode(self, ax=ax, **options)
-
-    def nyquist(self, ax: Axes | None = None, **options: Any) -> Axes:
-        """Draw the Nyquist curve of the estimate; see ``freqid.nyquist``."""
-        from freqid.plots import nyquist
-
-        return nyquist(self, ax=ax, **options)
-
-    def report(self, path: str | Path, title: str | None = None) -> None:
-        """Write one self-contained HTML page about the estimate, which works offline.
-
-        A sentence on whether it may be trusted, the parameters with error and bias bars, response
-        and simulation to zoom into, residual tests, warnings, and the call that made it. Raises
-        ValueError for another suffix than .html, or without the extra ``report``.
-        """
-        from freqid.pages import write_report
-
-        write_report(self, path, title)
-
-    def to_dict(self) -> dict[str, object]:
-        """Everything that a file needs, in plain numbers and strings."""
-        return printed.as_dict(self)
-
-    def __repr__(self) -> str:
-        return printed.as_text(self)
-
-    def _repr_html_(self) -> str:
-        return printed.as_html(self)

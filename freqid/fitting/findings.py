@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.lti import Hold, PeriodicHold
 from freqid.models import Parameter
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Severity = Literal["serious", "minor"]
 
@@ -47,6 +50,18 @@ class Finding(str):
 
     def __getnewargs__(self) -> tuple[str, str, Severity, float | None]:  # type: ignore[override]
         return self.kind, self[len(self.kind) + 2 :], self.severity, self.number
+
+
+class Inquired(Protocol):
+    """What asks every suspect when it is wanted."""
+
+    def table(self) -> pd.DataFrame:
+        """The suspects by name."""
+        ...
+
+    def findings(self) -> list[Finding]:
+        """Sentences on those that are no chance."""
+        ...
 
 
 @dataclass(frozen=True)

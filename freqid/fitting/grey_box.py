@@ -164,6 +164,6 @@ def _estimate(
         n_starts=found.n_starts,
         # the descent from a start itself, beside its first stage, is no start of its own
         n_agreed=min(found.n_agreed, found.n_starts),
-        warnings=findings(evidence),
+        signs=findings(evidence),
         **minimum.outcome(),
     )

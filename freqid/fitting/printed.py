@@ -19,7 +19,9 @@ def as_dict(est: Estimate) -> dict[str, object]:
         "fit_percent": est.fit_percent,
         "converged": bool(est.converged),
         "message": est.message,
+        "verdict": dataclasses.asdict(est.verdict),
         "warnings": list(est.warnings),
+        "notes": list(est.notes),
         "witness": dataclasses.asdict(est.witness),
         "hold": est.hold.name,
         "hold_period": est.hold_period,
@@ -35,17 +37,24 @@ def _witness(est: Estimate) -> list[str]:
     return [f"witness {est.witness.verdict}: {est.witness.sentence}"]
 
 
+def _said(est: Estimate) -> list[str]:
+    """The verdict, the witness, the warnings and the notes, a line each."""
+    lines = [f"verdict: {est.verdict.grade}", *_witness(est)]
+    lines += [f"warning: {w}" for w in est.warnings]
+    return [*lines, *(f"note: {n}" for n in est.notes)]
+
+
 def as_text(est: Estimate) -> str:
-    """Each parameter with its error, the witness, the warnings."""
+    """Each parameter with its error, then verdict, witness, warnings and notes."""
     lines = [f"<Estimate: {est.fit_percent:.2f} % fit, cost {est.cost:.4g}, {est.hold!r}"]
     for name, row in est.parameters.iterrows():
         lines.append(f"  {name} = {row['value']:.6g} ± {row['std']:.2g} {row['unit']}".rstrip())
-    lines += [f"  {line}" for line in (*_witness(est), *(f"warning: {w}" for w in est.warnings))]
+    lines += [f"  {line}" for line in _said(est)]
     return "\n".join(lines) + ">"
 
 
 def as_html(est: Estimate) -> str:
     """The same as a table with a list under it."""
-    notes = "".join(f"<li>{escape(w)}</li>" for w in (*_witness(est), *est.warnings))
+    notes = "".join(f"<li>{escape(w)}</li>" for w in _said(est))
     head = f"fit {est.fit_percent:.2f} %, {escape(repr(est.hold))}"
     return f"<p>{head}</p>{est.parameters.to_html(escape=True)}<ul>{notes}</ul>"

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from freqid.checks import ComplexArray, InputError
+from freqid.checks import InputError
 from freqid.data import Record
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
@@ -30,7 +30,8 @@ from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.models import DiscreteModel
+from freqid.fitting.uncertainty.noise_spectrum import evenly_spread
+from freqid.models import DiscreteModel, Model
 
 # level below which the black box explains the data so much better that it is no chance
 _LEVEL = 0.01
@@ -97,7 +98,7 @@ class Testimony:
             return Witness("absent", "the data are too few for a black box beside it", box.cost)
         if top < 1:
             return self._alike(order, box.cost, grey.cost / box.cost - 1)
-        f = self._statistic(structure, readings, box, grey) * bottom / top
+        f = excess(structure, readings, box, grey) * bottom / top
         p = float(scipy.stats.f.sf(f, top, bottom))
         numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
         gap = grey.cost / box.cost - 1
@@ -148,37 +149,35 @@ class Testimony:
         begin = structure.start if late else self.minimum.x
         return polish(Objective(structure, [r.lines() for r in readings]), begin)
 
-    def _statistic(
-        self, structure: GreyStructure, readings: Sequence[Reading], box: Reference, grey: Solution
-    ) -> float:
-        """(V − V_bb)/V_bb, weighted by what the black box leaves where nothing else is known."""
-        model = DiscreteModel(
-            box.chart.in_z(box.solution.x), box.chart.dt, readings[0].hold,
-            structure.model.inputs or (), structure.model.outputs or (),
-        )  # fmt: skip
-        weighted = []
-        for r in readings:
-            left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
-            if left is not None and _coloured(left.error):
-                weighted.append(r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples)))
-            else:
-                weighted.append(r)
-        if all(new is old for new, old in zip(weighted, readings, strict=True)):
-            return max(grey.cost / box.cost - 1, 0.0)
-        seen = Objective(structure, [r.lines() for r in weighted])
-        other = box.on(weighted)
-        return max(polish(seen, grey.x).cost / other.cost - 1, 0.0)
 
+def excess(
+    structure: GreyStructure,
+    readings: Sequence[Reading],
+    box: Reference,
+    grey: Solution,
+    by_grey: bool = False,
+) -> float:
+    """(V − V_bb)/V_bb, weighted by what the black box leaves where nothing else is known.
 
-def _coloured(error: ComplexArray) -> bool:
-    """Whether the power of errors (outputs, K) is not spread evenly over the lines.
-
-    Bartlett's test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series,
-    1981, section 6.2.5); weights that were not needed would add their own scatter.
+    ``by_grey`` weights by what the grey box leaves: a black box of a higher order has taken part of
+    the noise itself.
     """
-    power = np.abs(error) ** 2
-    K = power.shape[1]
-    share = np.cumsum(power, axis=1) / power.sum(axis=1, keepdims=True)
-    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1)
-    p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
-    return bool((p < _LEVEL / len(power)).any())
+    model: Model = DiscreteModel(
+        box.chart.in_z(box.solution.x), box.chart.dt, readings[0].hold,
+        structure.model.inputs or (), structure.model.outputs or (),
+    )  # fmt: skip
+    if by_grey:
+        model = structure.at(grey.x)
+    weighted = []
+    for r in readings:
+        left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
+        # weights that are not needed would add their own scatter
+        if left is not None and not evenly_spread(left.error):
+            weighted.append(r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples)))
+        else:
+            weighted.append(r)
+    if all(new is old for new, old in zip(weighted, readings, strict=True)):
+        return max(grey.cost / box.cost - 1, 0.0)
+    seen = Objective(structure, [r.lines() for r in weighted])
+    other = box.on(weighted)
+    return max(polish(seen, grey.x).cost / other.cost - 1, 0.0)

@@ -114,7 +114,7 @@ def _estimate(
         spectrum = (np.abs(lines.U[..., lines.wanted]) ** 2).mean(axis=0)
     else:
         local = _through(local, sets[0].n_inputs)
-    return measured(sets[0], lines.frequency[lines.wanted], *local, spectrum)
+    return measured(sets[0], lines.frequency[lines.wanted], *local, spectrum, reach=form.width - 1)
 
 
 def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> Form:

@@ -15,10 +15,12 @@ def measured(
     variance: FloatArray | None,
     coherence: FloatArray | None,
     input_spectrum: FloatArray | None,
+    reach: int = 0,
 ) -> FrequencyResponse:
     """A response of ``record``'s plant; it and what is known of it are (K, outputs, inputs).
 
-    ``frequency`` is in Hz, (K,); ``input_spectrum`` is (inputs, K).
+    ``frequency`` is in Hz, (K,); ``input_spectrum`` is (inputs, K); ``reach`` as in
+    FrequencyResponse.
     """
     return FrequencyResponse(
         frequency,
@@ -30,4 +32,5 @@ def measured(
         input_spectrum=input_spectrum,
         input_names=record.input_names,
         output_names=record.output_names,
+        reach=reach,
     )

@@ -197,7 +197,7 @@ def test_the_report_opens_offline(browser, plant, slow, tmp_path):
     try:
         browser.get((tmp_path / "report.html").as_uri())
         until(browser, "return document.querySelectorAll('.plot .main-svg').length >= 4", "plots")
-        assert "Not to be trusted" in browser.execute_script(VERDICT)
+        assert "Do not use" in browser.execute_script(VERDICT)
         shot(browser, "report")
         assert not errors(browser)
     finally:

@@ -212,7 +212,7 @@ def coefficient_estimate(
         problem=minimum,
         hold=hold,
         dt=dt,
-        warnings=findings(evidence),
+        signs=findings(evidence),
         **minimum.outcome(),
     )
 

@@ -58,8 +58,14 @@ class Reference:
     solution: Solution
 
     @classmethod
-    def of(cls, model: GreyBox, readings: Sequence[Reading], count: int | None = None) -> Reference:
-        """Of the model's order, from the data alone, on about ``count`` lines.
+    def of(
+        cls,
+        model: GreyBox,
+        readings: Sequence[Reading],
+        count: int | None = None,
+        order: int | None = None,
+    ) -> Reference:
+        """Of the model's order, or another, from the data alone, on about ``count`` lines.
 
         Raises InputError where no black box of the order stands beside the model, saying why.
         """
@@ -68,7 +74,7 @@ class Reference:
         # what is left of a delay within a sample lets the input through, too
         direct = bool(model.state_space().D.any() or model.delay_sources)
         direct = direct or readings[0].hold.reaches_next
-        order = len(model.state_space().A)
+        order = len(model.state_space().A) if order is None else order
         try:
             chart = Chart(first_model(lines, order, direct), direct, plane, dt)
             return cls._descended(Objective(chart, lines))

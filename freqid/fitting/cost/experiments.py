@@ -72,7 +72,9 @@ class SpectralExperiment:
     """DFT lines of a record, or of a frequency response, against the model's.
 
     ``lift`` inputs of one slow period stand in turn for each input of the plant; a ``discrete``
-    model's matrices are taken as they are. ``n_rows`` counts real values.
+    model's matrices are taken as they are. ``n_rows`` counts real values. The noise of a
+    ``response`` need not be alike at lines that are neighbours, and may go together within the
+    ``reach`` of some lines.
     """
 
     lines: Lines
@@ -82,6 +84,8 @@ class SpectralExperiment:
     n_rows: int
     lift: int = 1
     discrete: bool = False
+    response: bool = False
+    reach: int = 0
 
     @classmethod
     def of(
@@ -134,7 +138,8 @@ class SpectralExperiment:
         U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, K))
         scale = np.broadcast_to(np.sqrt(weights), frf.response.shape)
         lines = Lines.weighted(frf.omega, frf.omega[:, None], U, frf.response, scale)
-        return cls.of(lines, hold, None, plane=plane)
+        made = cls.of(lines, hold, None, plane=plane)
+        return dataclasses.replace(made, response=True, reach=frf.reach)
 
     def in_plane(self, plane: Plane) -> SpectralExperiment:
         """The same lines of a sampled model, in z until now, seen in another plane."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.fft
 import scipy.ndimage
+import scipy.stats
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
@@ -12,15 +14,63 @@ from freqid.lti import eliminate
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000
+# level below which power that is spread unevenly is no chance
+_LEVEL = 0.01
+# autoregressions of at most this order, and lines that each order needs
+_ORDERS, _ORDER_LINES = 8, 15
 
 
 def smoothed_power(error: ComplexArray) -> FloatArray:
-    """Local mean of |error|² over neighbouring lines, (…, K), for errors (…, K)."""
+    """Local mean of |error|² over neighbouring lines, (…, K), for errors (…, K).
+
+    A steep spectrum is made flat by an autoregression first and given its shape back after, which
+    keeps the mean over neighbours from filling its valleys and cutting its peaks (prewhitening:
+    Blackman and Tukey, The Measurement of Power Spectra, 1958).
+    """
     power = np.abs(error) ** 2
+    K = power.shape[-1]
+    shape = _autoregressive(power.reshape(-1, K)).reshape(power.shape)
+    return shape * _local_mean(power / shape)
+
+
+def _local_mean(power: FloatArray) -> FloatArray:
     K = power.shape[-1]
     width = min(2 * int(np.sqrt(K)) + 1, K)
     smooth: FloatArray = scipy.ndimage.uniform_filter1d(power, width, axis=-1, mode="reflect")
     return smooth
+
+
+def _autoregressive(power: FloatArray) -> FloatArray:
+    """Spectra of autoregressions for periodograms (channels, K), ones where none is needed.
+
+    Levinson's recursion, the order by Bayes' criterion (Stoica and Moses, Spectral Analysis of
+    Signals, 2005, sections 3.5.1 and C.8).
+    """
+    K = power.shape[1]
+    shape = np.ones(power.shape)
+    most = min(_ORDERS, K // _ORDER_LINES)
+    if most < 1:
+        return shape
+    for row, one in enumerate(power):
+        r = scipy.fft.irfft(one)[: most + 1]
+        if not r[0] > 0:
+            continue
+        a, left = np.ones(1), float(r[0])
+        best, chosen = 2 * K * np.log(left), a
+        for order in range(1, most + 1):
+            k = -float(a @ r[order:0:-1]) / left
+            a = np.append(a, 0.0) + k * np.append(0.0, a[::-1])
+            left *= 1 - k**2
+            if not left > 1e-12 * r[0]:
+                break
+            criterion = 2 * K * np.log(left) + order * np.log(2 * K)
+            if criterion < best:
+                best, chosen = criterion, a
+        if len(chosen) > 1:
+            angle = np.pi * np.arange(K) / max(K - 1, 1)
+            gain = np.abs(np.polyval(chosen[::-1], np.exp(-1j * angle))) ** 2
+            shape[row] = 1 / np.maximum(gain, 1e-300)
+    return shape
 
 
 def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
@@ -55,23 +105,59 @@ def score_covariance(
     total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
     with np.errstate(all="ignore"):
         for e in lines:
-            step = max(e.n_lines // _LINES, 1)
+            step = 1 if e.reach else max(e.n_lines // _LINES, 1)
             few = e.thinned(1 / step, evenly=True) if step > 1 else e
             evaluation = few.at(realisation)
-            r, Q, delta = _projected(evaluation)
+            r, Q, delta = projected(evaluation)
             J = evaluation.jacobian(delta)
             J = J - (J @ Q.T) @ Q
-            left = r if noise_at is realisation else _projected(few.at(noise_at))[0]
-            power = _local_power(left, few)
-            total += (J * power) @ J.T / step
+            left = r if noise_at is realisation else projected(few.at(noise_at))[0]
+            if e.response:
+                total += _of_response(J, left, few) / step
+            else:
+                total += (J * local_power(left, few)) @ J.T / step
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)
     if not np.isfinite(total).all():
         return None
+    # lines of a response have had their share of the freedom taken off one by one
+    if all(e.response for e in lines):
+        return total
     return total * rows / max(rows - unknown - len(x), 1)
 
 
-def _projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+def _of_response(J: FloatArray, residual: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """What the noise of a response makes of the gradient, (P, P).
+
+    Its size is each line's own, divided by what the fit leaves of it (MacKinnon and White's HC3, J.
+    Econometrics 29, 1985): a resonance that few lines tell has noise like none of its neighbours.
+    Within the ``reach`` of a line noise goes together as it does on average.
+    """
+    error = residual.view(complex)
+    at = J[:, ::2] + 1j * J[:, 1::2]
+    gram = J @ J.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
+    lever = np.einsum("ak,ab,bk->k", at.conj(), half, at).real / 2
+    left = error / np.maximum(1 - lever, 0.1)
+    total: FloatArray = (np.abs(left) ** 2 * at.conj() @ at.T).real / 2
+    if not e.reach:
+        return total
+    each = left.reshape(-1, e.n_lines)
+    local = np.sqrt(np.maximum(_local_mean(np.abs(each) ** 2), 1e-300))
+    unit, here = each / local, at.reshape(len(at), *each.shape) * local
+    total = (here.conj().reshape(len(at), -1) @ here.reshape(len(at), -1).T).real / 2
+    for d in range(1, min(e.reach, e.n_lines - 1) + 1):
+        # lines far apart in the window share little of it: Bartlett's taper
+        share = np.mean(unit[:, :-d] * unit[:, d:].conj())
+        pairs = (here[..., :-d].conj().reshape(len(at), -1) * share) @ here[..., d:].reshape(
+            len(at), -1
+        ).T
+        total += (pairs + pairs.conj().T).real / 2
+    return total
+
+
+def projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
     """The residual with the transient taken off, the rows that span that, and its unknowns."""
     r, T = evaluation.residual, evaluation.transient
     if T is None:
@@ -80,11 +166,35 @@ def _projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArr
     return r - (Q @ r) @ Q, Q, delta
 
 
-def _local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
+def local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
     """Local mean of the squared residual, for each of its real values."""
     each = residual.view(complex).reshape(-1, e.n_lines)
     counted = (e.lines.scale > 0).astype(float).reshape(each.shape)
-    local = smoothed_power(each) / np.maximum(smoothed_power(counted), 1e-9)
+    if counted.all():
+        local = smoothed_power(each)
+    else:
+        local = _local_mean(np.abs(each) ** 2) / np.maximum(_local_mean(counted), 1e-9)
     # half of a complex error's power is in each of its parts
     power: FloatArray = np.repeat(local.ravel() / 2, 2)
     return power
+
+
+def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:
+    """Whether the squared residual is spread evenly over the lines that count, of each channel."""
+    each = residual.view(complex).reshape(-1, e.n_lines)
+    return evenly_spread(each[:, e.lines.counted])
+
+
+def evenly_spread(error: ComplexArray) -> bool:
+    """Whether the power of errors (channels, K) is spread evenly over the lines.
+
+    Bartlett's test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series,
+    1981, section 6.2.5).
+    """
+    power = np.abs(error) ** 2
+    K = power.shape[1]
+    total = power.sum(axis=1, keepdims=True)
+    share = np.cumsum(power, axis=1) / np.where(total > 0, total, 1)
+    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1) * (total[:, 0] > 0)
+    p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
+    return bool((p >= _LEVEL / len(power)).all())

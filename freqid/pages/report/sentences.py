@@ -37,37 +37,10 @@ class Table(NamedTuple):
 
 
 def verdict(est: Estimate) -> Verdict:
-    """Whether an estimate may be trusted, in one sentence of plain words."""
-    # a sentence that somebody else has added says neither its weight nor its kind
-    serious = [w for w in est.warnings if getattr(w, "severity", "serious") == "serious"]
-    kinds = dict.fromkeys(getattr(w, "kind", w) for w in serious)
-    std = np.sqrt(np.diag(est.covariance_matrix))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.abs(std / est.values)
-    doubt = "Not to be trusted as it is."
-    if not est.converged:
-        return Verdict("Do not use these numbers.", "The search did not converge.")
-    if serious:
-        says = f"The fit says: {', '.join(kinds)}. The sentences below say what to do."
-        return Verdict(doubt, says)
-    if not np.isfinite(std).all():
-        return Verdict(doubt, "The data do not determine every parameter.")
-    if est.witness.verdict == "lacking":
-        return Verdict(doubt, f"{est.witness.sentence[0].upper()}{est.witness.sentence[1:]}.")
-    worst = int(np.nanargmax(relative)) if np.isfinite(relative).any() else 0
-    return Verdict(
-        "Nothing speaks against this estimate.",
-        f"It explains {est.fit_percent:.2f} % of what was fitted, the search converged, and "
-        f"the least certain parameter, {est.names[worst]}, is known to "
-        f"{100 * relative[worst]:.2g} %. {_heard(est)}".strip(),
-        trusted=True,
-    )
-
-
-def _heard(est: Estimate) -> str:
-    """What the witness says for the estimate, where there is one."""
-    sentence = est.witness.sentence
-    return f"{sentence[0].upper()}{sentence[1:]}." if est.witness.verdict == "complete" else ""
+    """Whether an estimate may be trusted, in plain words."""
+    found = est.verdict
+    text = " ".join(f"{reason[0].upper()}{reason[1:]}." for reason in found.reasons[:1])
+    return Verdict(found.head, text, found.trusted)
 
 
 def bias(est: Estimate) -> dict[str, float]:

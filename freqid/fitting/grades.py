@@ -1,0 +1,88 @@
+"""One verdict on an estimate: trust, doubt or do not use, with its reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from freqid.models import GreyBox
+
+if TYPE_CHECKING:
+    from freqid.fitting.estimate import Estimate
+
+Grade = Literal["trust", "doubt", "do not use"]
+
+# what makes numbers useless where it is what explains most of what is wrong
+_USELESS = frozenset(
+    {"not converged", "no signal", "feedback", "swapped", "wrong sign", "hold rejected"}
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """``grade``: ``"trust"``, ``"doubt"`` or ``"do not use"``; ``reasons``, the strongest first."""
+
+    grade: Grade
+    reasons: list[str]
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the numbers may be used as they are."""
+        return self.grade == "trust"
+
+    @property
+    def head(self) -> str:
+        """The grade as a sentence."""
+        return {
+            "trust": "Nothing speaks against this estimate.",
+            "doubt": "Not to be trusted as it is.",
+            "do not use": "Do not use these numbers.",
+        }[self.grade]
+
+    def __repr__(self) -> str:
+        return f"<Verdict {self.grade}: {'; '.join(self.reasons)}>"
+
+
+def verdict(est: Estimate) -> Verdict:
+    """What all that is known of an estimate comes to."""
+    # a sentence that somebody else has added says neither its weight nor its kind
+    serious = [w for w in est.warnings if getattr(w, "severity", "serious") == "serious"]
+    reasons = [str(w) for w in serious]
+    std = np.sqrt(np.diag(est.covariance_matrix))
+    if not est.converged and not any("not converged" in r for r in reasons):
+        reasons.insert(0, f"not converged: {est.message}")
+    if not est.converged or (serious and getattr(serious[0], "kind", "") in _USELESS):
+        return Verdict("do not use", reasons)
+    if est.witness.verdict == "lacking":
+        reasons.append(est.witness.sentence)
+    reasons += _open(est, std)
+    if reasons:
+        return Verdict("doubt", reasons)
+    return Verdict("trust", [_supported(est, std)])
+
+
+def _open(est: Estimate, std: np.ndarray) -> list[str]:
+    """What the data leave unknown, where no warning says it."""
+    if np.isfinite(std).all():
+        return []
+    names = [n for n, s in zip(est.names, std, strict=True) if not np.isfinite(s)]
+    if any(getattr(w, "kind", "") == "not identifiable" for w in est.warnings):
+        return []
+    return [f"not identifiable: the data do not determine {', '.join(names)}"]
+
+
+def _supported(est: Estimate, std: np.ndarray) -> str:
+    """What speaks for it."""
+    text = f"{est.fit_percent:.2f} % of what was fitted is explained and the search converged"
+    if isinstance(est.model, GreyBox):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            relative = np.abs(std / est.values)
+        if np.isfinite(relative).any():
+            worst = int(np.nanargmax(np.where(np.isfinite(relative), relative, np.nan)))
+            text += f"; the least certain parameter, {est.names[worst]}, is known to "
+            text += f"{100 * relative[worst]:.2g} %"
+    if est.witness.verdict == "complete":
+        text += f"; {est.witness.sentence}"
+    return text

@@ -1,0 +1,144 @@
+"""Suspects that take more than columns: unlike experiments, one more mode, a loop."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+import scipy.stats
+
+from freqid.checks import InputError
+from freqid.data import Record
+from freqid.fitting.black_box.output_error import fit_output_error
+from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.reading import Reading
+from freqid.fitting.suspects import plant
+from freqid.fitting.suspects.register import Columns
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked, Score, score
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.witness import excess
+from freqid.models import GreyBox, Model, OutputError
+
+# experiments times parameters whose separate fits are compared at the most
+_MOST = 4000
+# the highest order of a black box beside which feedback is asked
+_BOX = 8
+
+
+class Asking(Protocol):
+    """A fit that is asked about."""
+
+    @property
+    def minimum(self) -> Minimum:
+        """Where its cost is least."""
+        ...
+
+    @property
+    def model(self) -> Model:
+        """The model there."""
+        ...
+
+    @property
+    def readings(self) -> Sequence[Reading]:
+        """The data."""
+        ...
+
+
+def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
+    """Feedback, asked of a stable black box that the plant's own faults cannot disturb.
+
+    A loop turns the plant's fit to whatever explains its noise, even to an unstable plant,
+    which answers before it is asked.
+    """
+    data = [r.data for r in inquiry.readings]
+    if not all(isinstance(d, Record) and d.factor == 1 for d in data):
+        return None
+    order = min(len(inquiry.model.state_space().A) + 2, _BOX)
+    try:
+        spec = OutputError(order, True, stable=True)
+        box = fit_output_error(spec, [r.at_lines() for r in inquiry.readings])
+        beside = Scene.of(box.minimum, inquiry.readings)
+        drawn = plant.feedback(beside, box.model)
+        assert drawn is None or isinstance(drawn, Columns)
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return None
+    test = None if drawn is None else score(beside, drawn.columns, np.ones(len(beside.x)))
+    if test is None or test.p_value > limit:
+        return None
+    test = dataclasses.replace(test, largest_shift=np.inf, largest_change=np.nan)
+    return Asked("feedback", test, "", test.p_value)
+
+
+def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
+    """Experiments fitted apart, to first order: what that explains beyond the common fit."""
+    free = ~scene.held
+    P = int(free.sum())
+    if len(scene.seen) < 2 or P == 0 or len(scene.seen) * P > _MOST:
+        return []
+    gain, rank, chi = 0.0, 0, 0.0
+    steps = []
+    first = 0
+    for s in scene.seen:
+        J = s.jacobian[free]
+        size = np.linalg.norm(J, axis=1)
+        size[size == 0] = 1
+        U, sv, Vt = np.linalg.svd(J / size[:, None], full_matrices=False)
+        told = sv > 1e-7 * max(sv.max(initial=0), 1e-300)
+        Vt = Vt[told]
+        along = Vt @ s.left
+        variance = scene.variance[first : first + len(s.left)]
+        first += len(s.left)
+        chi += float(along @ np.linalg.solve((Vt * variance) @ Vt.T, along))
+        gain, rank = gain + float(along @ along), rank + len(Vt)
+        steps.append(-((U[:, told] / sv[told]) @ along) / size)
+    degrees, freedom = rank - P, scene.freedom - rank + P
+    if degrees < 1 or freedom < 1:
+        return []
+    if scene.white:
+        chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
+    variance = np.diag(inquiry.minimum.covariance)[free]
+    with np.errstate(all="ignore"):
+        shift = np.abs(np.array(steps)) / np.sqrt(variance)
+    largest = float(np.nanmax(np.where(np.isfinite(shift), shift, np.nan), initial=0.0))
+    f = chi / degrees
+    p = float(scipy.stats.f.sf(f, degrees, freedom))
+    x = scene.x[free]
+    size = float(np.max(np.abs(np.array(steps)) / np.maximum(np.abs(x), 1e-300)))
+    test = Score(f, degrees, p, size, 1.0, largest, gain)
+    return [Asked("unlike experiments", test, "relative", p)]
+
+
+def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
+    """A black box with one mode more, which may lie at any of the lines."""
+    if not isinstance(inquiry.model, GreyBox) or inquiry.model.delay_sources:
+        return []
+    if any(r.in_time for r in inquiry.readings) or inquiry.minimum.prior is not None:
+        return []
+    readings = [r.at_lines() for r in inquiry.readings]
+    order = len(inquiry.model.state_space().A) + 2
+    try:
+        box = Reference.of(inquiry.model, readings, order=order)
+    except (InputError, np.linalg.LinAlgError):
+        return []
+    objective = box.objective
+    freedom = objective.n_rows - box.unknowns - box.solution.point.n_initial
+    # the mode's own initial state is free, too
+    started = box.solution.point.n_initial - sum(len(s.free) for s in scene.seen)
+    degrees = box.unknowns - len(scene.absorbed) + started
+    if freedom < 10 or degrees < 1:
+        return []
+    if box.cost >= scene.cost:
+        return []
+    structure = inquiry.minimum.structure
+    assert isinstance(structure, GreyStructure)
+    more = excess(structure, readings, box, inquiry.minimum.solution, True)
+    f = more * freedom / degrees
+    gain = scene.cost * more / (1 + more)
+    # where the noise is coloured its shape is as uncertain as the place of the mode
+    places = sum(s.experiment.n_lines for s in scene.seen) ** (1 if scene.white else 2)
+    p = min(float(scipy.stats.f.sf(f, degrees, freedom)) * places, 1.0)
+    return [Asked("another mode", Score(f, degrees, p, np.nan, 1.0, np.nan, gain), "", p)]

@@ -1,0 +1,196 @@
+"""Every suspect asked at once: a table, and the sentences that the strongest deserve."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.fitting.findings import Finding, Severity
+from freqid.fitting.reading import Reading
+from freqid.fitting.suspects import measurement, plant
+from freqid.fitting.suspects.beyond import looped, one_more_mode, unlike
+from freqid.fitting.suspects.refits import held, late
+from freqid.fitting.suspects.register import SUSPECTS, Columns
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked, score
+from freqid.fitting.suspects.sentences import sentence, words
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.models import Model
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# tests that are answered by one fit with another hold
+_HOLDS = ("hold", "hold period")
+# part of one more mode's gain at which something simpler is believed instead
+_AS_MUCH = 0.8
+# part of a gain that is as much, and which of two is the likelier then
+_EQUAL, _LIKELY = 0.98, ("hold rejected", "delay", "feedthrough")
+# part of the strongest one's evidence from which another is said, and how many are
+_WORTH, _SAID = 0.5, 3
+# standard errors by which a suspect moves no parameter, and the part of it that harms nobody
+_SMALL, _HARMLESS = 0.3, 1e-3
+# part of the data's energy that is nothing
+_NOTHING = 1e-5
+# the files whose suspects are known
+_KNOWN = (measurement, plant)
+# level at which all suspects together speak of good data
+LEVEL = 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class Inquiry:
+    """What a fit could lack, asked when it is wanted."""
+
+    minimum: Minimum
+    model: Model
+    readings: Sequence[Reading]
+
+    @cached_property
+    def scene(self) -> Scene | None:
+        """What is left at the lines; None where that is but rounding, or where there are none."""
+        if self.minimum.exact or not self.minimum.solution.converged:
+            return None
+        try:
+            return Scene.of(self.minimum, self.readings)
+        except (InputError, np.linalg.LinAlgError, ArithmeticError):
+            return None
+
+    @cached_property
+    def asked(self) -> list[Asked]:
+        """Every suspect that the data could show, the strongest first."""
+        scene = self.scene
+        if scene is None or scene.freedom < 10:
+            return []
+        variance = np.diag(self.minimum.covariance)
+        std = np.sqrt(np.where(np.isfinite(variance), np.maximum(variance, 0), np.inf))
+        found = []
+        for name, draw in SUSPECTS.items():
+            drawn = draw(scene, self.model)
+            several = [] if drawn is None else [drawn] if isinstance(drawn, Columns) else [*drawn]
+            tried = [(c, score(scene, c.columns, std)) for c in several]
+            told = [(c, t) for c, t in tried if t is not None]
+            if told:
+                c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
+                p = 1 - (1 - t.p_value) ** c.trials if t.p_value > 1e-9 else t.p_value * c.trials
+                found.append(Asked(name, t, c.unit, min(p, 1.0), c.detail, c.trials))
+        found += unlike(self, scene)
+        found += one_more_mode(self, scene)
+        return sorted(found, key=lambda a: self._evidence(scene, a), reverse=True)
+
+    def _evidence(self, scene: Scene, a: Asked) -> float:
+        """How much better the data are explained, less what as many unknowns do by chance."""
+        left = max(scene.cost - a.test.gain, 1e-12 * scene.cost)
+        n = max(scene.freedom, 2)
+        places = 2 * np.log(a.trials)
+        return float(n * np.log(scene.cost / left) - a.test.degrees * np.log(n) - places)
+
+    @cached_property
+    def speaking(self) -> list[Asked]:
+        """Those that are no chance, the strongest first."""
+        limit = LEVEL / max(len(self.asked), 1)
+        return [a for a in self.asked if a.p_value < limit]
+
+    @cached_property
+    def named(self) -> list[Asked]:
+        """Those that speak, delay and hold fitted again, the one that explains most first.
+
+        A delay, a hold and one more mode imitate one another: an early input is no delay where
+        another hold speaks, and one more mode is believed where nothing simple explains as much.
+        """
+        scene = self.scene
+        if scene is None or not self.speaking:
+            return []
+        merged: dict[str, Asked] = {}
+        for a in self.speaking:
+            kind = "hold rejected" if a.name in _HOLDS else a.name
+            other = merged.get(kind)
+            if other is None or a.test.gain > other.test.gain:
+                merged[kind] = dataclasses.replace(a, name=kind)
+        merged = {kind: self._again(scene, a) for kind, a in merged.items()}
+        if "saturation" in merged:
+            # samples at a limit are what is left of peaks
+            merged.pop("spikes", None)
+        if "hold rejected" in merged and "delay" in merged and merged["delay"].test.size < 0:
+            del merged["delay"]
+        ranked = sorted(merged.values(), key=lambda a: self._evidence(scene, a), reverse=True)
+        # what explains as much is as likely: the order of _LIKELY decides
+        equal = [a for a in ranked if a.test.gain >= _EQUAL * ranked[0].test.gain]
+        equal = [a for a in equal if a.name in _LIKELY and ranked[0].name in _LIKELY]
+        equal.sort(key=lambda a: _LIKELY.index(a.name))
+        ranked = [*equal, *(a for a in ranked if a not in equal)]
+        if ranked[0].name == "another mode":
+            enough = _AS_MUCH * ranked[0].test.gain
+            simple = [a for a in ranked[1:] if a.test.gain >= enough]
+            ranked = [*simple, *(a for a in ranked if a not in simple)]
+        # a fault that explains what is left leaves no room for a loop
+        poles = self.model.poles
+        runaway = bool((poles.real > 0).any()) and not self.model.dt
+        alike = "unlike experiments" not in merged
+        if not alike or (ranked[0].name not in ("another mode", "feedback") and not runaway):
+            return ranked
+        loop = looped(self, scene, LEVEL / max(len(self.asked), 1))
+        return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
+
+    def _again(self, scene: Scene, a: Asked) -> Asked:
+        """The suspect after a fit with it free, where that is worth one."""
+        again = None
+        if a.name == "delay":
+            again = late(self.minimum, self.readings, a.test.size)
+        elif a.name == "hold rejected":
+            again = held(self.minimum, self.readings)
+        if again is None or again.cost >= scene.cost - a.test.gain:
+            return a
+        test = dataclasses.replace(a.test, gain=scene.cost - again.cost, size=again.size)
+        return dataclasses.replace(a, test=test, detail=again.sentence)
+
+    def findings(self) -> list[Finding]:
+        """Sentences on the strongest suspects."""
+        scene, named = self.scene, self.named
+        if scene is None or not named:
+            return []
+        strongest = self._evidence(scene, named[0])
+        near = [a for a in named if self._evidence(scene, a) >= _WORTH * strongest]
+        said = [a for a in near if not self._negligible(scene, a)][:_SAID]
+        return [self._finding(scene, a) for a in said]
+
+    def _negligible(self, scene: Scene, a: Asked) -> bool:
+        """Whether it is certain only because next to nothing else is left of the data."""
+        moves = a.test.largest_change > _HARMLESS
+        return bool(a.test.gain < _NOTHING * scene.energy and not moves)
+
+    def _finding(self, scene: Scene, a: Asked) -> Finding:
+        if a.name == "hold rejected":
+            holds = {repr(r.hold) for r in self.readings}
+            what = f"the data contradict {', '.join(sorted(holds))}"
+            what += f"; {a.detail} explains them better"
+        elif a.name == "delay" and a.detail:
+            what = a.detail
+        else:
+            what = words(a.name, a.test.size, a.unit, a.detail)
+        text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
+        small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS
+        severity: Severity = "minor" if small else "serious"
+        return Finding(a.name, text, severity, float(a.test.statistic))
+
+    def table(self) -> pd.DataFrame:
+        """The suspects by name: statistic, p_value, size, unit, power, largest_shift."""
+        import pandas as pd
+
+        columns = ["statistic", "p_value", "size", "unit", "power", "largest_shift"]
+        rows = {
+            a.name: (
+                a.test.statistic, a.p_value, a.test.size, a.unit, a.test.power,
+                a.test.largest_shift,
+            )
+            for a in self.asked
+        }  # fmt: skip
+        frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+        frame.index.name = "suspect"
+        return frame

@@ -1,0 +1,132 @@
+"""Suspects in the measurement: offset, drift, spikes, samples at a limit, unlike experiments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.fitting.suspects.register import Columns, suspect
+from freqid.fitting.suspects.scene import Scene, Seen
+from freqid.models import Model
+
+# samples at one extreme value that make it look like a limit, and the part of the range it is
+_AT_LIMIT, _NEAR = 4, 1e-9
+# relative difference of two levels that is one
+_LEVELS = 0.05
+
+
+@suspect("offset")
+def offset(scene: Scene, model: Model) -> Columns | None:
+    """A constant is added to an output."""
+    return _shapes(scene, lambda t: np.ones_like(t), "")
+
+
+@suspect("drift")
+def drift(scene: Scene, model: Model) -> Columns | None:
+    """An output drifts evenly."""
+    return _shapes(scene, lambda t: t - t.mean(), "/s")
+
+
+def _shapes(scene: Scene, shape, unit: str) -> Columns | None:  # type: ignore[no-untyped-def]
+    """The same shape on each output of each record, as unknowns of their own."""
+    if any(s.record is None for s in scene.seen):
+        return None
+    count = sum(s.n_outputs for s in scene.seen)
+    drawn, at = [], 0
+    for s in scene.seen:
+        rows = np.zeros((count, len(s.left)))
+        signal = shape(s.record.time)  # type: ignore[union-attr]
+        p = s.n_outputs
+        every = np.zeros((p, p, len(signal)))
+        every[np.arange(p), np.arange(p)] = signal
+        rows[at : at + p] = s.sampled(every)
+        at += p
+        drawn.append(rows)
+    return Columns(drawn, unit)
+
+
+@suspect("spikes")
+def spikes(scene: Scene, model: Model) -> list[Columns]:
+    """One sample of an output is far off: the largest of a matched filter over time."""
+    best: tuple[float, int, int, int] | None = None
+    count = 0
+    for number, s in enumerate(scene.seen):
+        if s.record is None:
+            return []
+        signals = _whitened(scene, number, s)
+        count += signals.size
+        o, k = map(int, np.unravel_index(np.argmax(np.abs(signals)), signals.shape))
+        if best is None or abs(signals[o, k]) > best[0]:
+            best = abs(float(signals[o, k])), number, o, k
+    if best is None:
+        return []
+    _, where, o, k = best
+    drawn = []
+    for number, s in enumerate(scene.seen):
+        p, N = s.n_outputs, s.record.n_samples  # type: ignore[union-attr]
+        pulse = np.zeros((1, p, N))
+        if number == where:
+            pulse[0, o, k] = 1
+        drawn.append(s.sampled(pulse))
+    record = scene.seen[where].record
+    assert record is not None
+    return [Columns(drawn, "", count, f"at {k * record.dt:.6g} s")]
+
+
+def _whitened(scene: Scene, number: int, s: Seen) -> FloatArray:
+    """What is left as signals (outputs, N), each line in units of the noise around it."""
+    first = sum(len(t.left) for t in scene.seen[:number])
+    noise = np.sqrt(np.maximum(scene.variance[first : first + len(s.left)], 1e-300))
+    record, lines = s.record, s.experiment.lines
+    assert record is not None
+    N = len(record.u) // record.factor
+    X = np.zeros((s.n_outputs, N // 2 + 1), complex)
+    at = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
+    # a white signal stays itself: its lines have all one variance
+    X[:, at] = (s.left / noise).view(complex).reshape(s.n_outputs, -1)
+    signals: FloatArray = np.fft.irfft(X, N, axis=-1)
+    return signals
+
+
+@suspect("saturation")
+def saturation(scene: Scene, model: Model) -> Columns | None:
+    """An output stays at one extreme value for several samples, as at a limit."""
+    drawn, found = [], False
+    for s in scene.seen:
+        if s.record is None:
+            return None
+        y = s.record.outputs[: len(s.record.u) // s.record.factor].T
+        rows = []
+        for o, signal in enumerate(y):
+            near = _NEAR * max(float(np.ptp(signal)), 1e-300)
+            for extreme, sign in ((signal.max(), 1.0), (signal.min(), -1.0)):
+                at = np.abs(signal - extreme) <= near
+                pulse = np.zeros((1, *y.shape))
+                if at.sum() >= _AT_LIMIT:
+                    found = True
+                    pulse[0, o] = sign * at
+                rows.append(s.sampled(pulse)[0])
+        drawn.append(np.array(rows))
+    return Columns(drawn) if found else None
+
+
+@suspect("amplitude")
+def amplitude(scene: Scene, model: Model) -> Columns | None:
+    """The parameters change with the level of the input, from one experiment to another."""
+    levels = [_level(s) for s in scene.seen]
+    if len(levels) < 2 or np.ptp(levels) < _LEVELS * max(levels):
+        return None
+    middle = float(np.mean(levels))
+    free = ~scene.held
+    return Columns(
+        [
+            s.jacobian[free] * (level / middle - 1)
+            for s, level in zip(scene.seen, levels, strict=True)
+        ]
+    )
+
+
+def _level(s: Seen) -> float:
+    if s.record is None:
+        return 1.0
+    return float(np.sqrt(np.mean(s.record.inputs**2)))

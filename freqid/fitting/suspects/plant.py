@@ -1,0 +1,161 @@
+"""Suspects in the plant and its input: a delay, a feedthrough, another hold, feedback."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.data import input_dt
+from freqid.fitting.suspects.register import Columns, suspect
+from freqid.fitting.suspects.scene import Scene, Seen
+from freqid.lti import BandLimited, FirstOrderHold, Hold, PeriodicHold, StateSpace, ZeroOrderHold
+from freqid.models import GreyBox, Model, SystemModel
+
+# relative step of a difference by a period, and a hold so much shorter than the sample time
+_STEP, _SHORT = 1e-4, 0.3
+# whole samples of delay that are tried
+_SAMPLES = (1, 2, 4)
+# future samples of the input that a loop would show in the residual
+_AHEAD = 6
+
+
+def _responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
+    return model.frequency_response(omega, None if model.dt else hold).response
+
+
+@suspect("delay")
+def delay(scene: Scene, model: Model) -> list[Columns]:
+    """The input acts later: −dy/dt at the samples, and what whole samples of delay would change.
+
+    To a rough input a delay of some samples is another input, which no derivative reaches.
+    """
+    if any(isinstance(d, str) for d in getattr(model, "delay_sources", ())):
+        return []
+    smooth, late = [], {q: [] for q in _SAMPLES}  # type: ignore[var-annotated]
+    for s in scene.seen:
+        omega, hold, step = s.omega_input, s.reading.hold, s.reading.sample_time
+        G = _responses(model, hold, omega)
+        if not model.dt:
+            held = isinstance(hold, PeriodicHold) and not model.late
+            slope = _slope(model, hold, omega) if held else -1j * omega * G
+            smooth.append(s.answered(slope)[None])
+        for q in _SAMPLES if s.record is not None else ():
+            moved = np.exp(-1j * omega * q * step) - 1
+            late[q].append(s.answered(moved * G)[None] / (q * step))
+    drawn = [smooth, *late.values()]
+    whole = [d for d in drawn if len(d) == len(scene.seen)]
+    return [Columns(d, "s", len(whole)) for d in whole]
+
+
+def _slope(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
+    """Response of −dy/dt at the samples; a feedthrough answers to the sample before."""
+    A, B, C, D = model.state_space()
+    zeros = np.zeros_like(D)
+    change = SystemModel(StateSpace(A, B, C @ A, C @ B), model.inputs or (), model.outputs or ())
+    G = _responses(change, hold, omega)
+    assert isinstance(hold, PeriodicHold)
+    late = (1 - np.exp(-1j * omega * hold.period)) / hold.period
+    return -(G + D[:, :, None] * late if (zeros != D).any() else G)
+
+
+@suspect("feedthrough")
+def feedthrough(scene: Scene, model: Model) -> Columns | None:
+    """The input reaches the output at once, from each input to each output that has none."""
+    D = model.state_space().D
+    pairs = np.argwhere(D == 0)
+    if not len(pairs) or _direct(scene):
+        return None
+    drawn = []
+    for s in scene.seen:
+        unit = np.zeros((len(pairs), *D.shape, len(s.omega_input)), complex)
+        unit[np.arange(len(pairs)), pairs[:, 0], pairs[:, 1]] = 1
+        drawn.append(np.array([s.answered(G) for G in unit]))
+    return Columns(drawn)
+
+
+def _direct(scene: Scene) -> bool:
+    """Whether a black box has had its feedthrough free."""
+    return bool(getattr(scene.structure, "feedthrough", False))
+
+
+@suspect("hold period")
+def hold_period(scene: Scene, model: Model) -> Columns | None:
+    """The input was held for longer, or for less, than was assumed."""
+    holds = [s.reading.hold for s in scene.seen]
+    if model.dt or not all(isinstance(h, ZeroOrderHold) for h in holds):
+        return None
+    if "hold_period" in getattr(scene.structure, "names", ()):
+        return None
+    drawn = []
+    for s, h in zip(scene.seen, holds, strict=True):
+        if _one_rate(s) and isinstance(h, PeriodicHold):
+            step = _STEP * h.period
+            up, down = (
+                _responses(model, dataclasses.replace(h, period=h.period + d), s.omega_input)
+                for d in (step, -step)
+            )
+            drawn.append(s.answered((up - down) / (2 * step))[None])
+        else:
+            drawn.append(np.zeros((1, len(s.left))))
+    return Columns(drawn, "s")
+
+
+@suspect("hold")
+def hold(scene: Scene, model: Model) -> list[Columns]:
+    """The input was held in another way: what of the residual the other response explains."""
+    if model.dt or "hold_period" in getattr(scene.structure, "names", ()):
+        return []
+    kinds: dict[str, list[FloatArray]] = {}
+    for name in ("zero-order hold", "short zero-order hold", "first-order hold", "band-limited"):
+        drawn = []
+        for s in scene.seen:
+            other = _alternative(name, s, model.late)
+            if other is None or other == s.reading.hold:
+                break
+            own = _responses(model, s.reading.hold, s.omega_input)
+            drawn.append(s.answered(_responses(model, other, s.omega_input) - own)[None])
+        if len(drawn) == len(scene.seen):
+            kinds[name] = drawn
+    return [Columns(drawn, "", len(kinds), name) for name, drawn in kinds.items()]
+
+
+def _alternative(name: str, s: Seen, late: bool) -> Hold | None:
+    dt = input_dt(s.reading.data)
+    if not dt:
+        return None
+    own = s.reading.hold
+    if name == "zero-order hold":
+        return ZeroOrderHold(dt)
+    if name == "short zero-order hold":
+        short = isinstance(own, ZeroOrderHold) or not _one_rate(s)
+        return None if short else ZeroOrderHold(_SHORT * dt)
+    if name == "first-order hold":
+        return None if late else FirstOrderHold(dt)
+    return BandLimited() if _one_rate(s) else None
+
+
+def _one_rate(s: Seen) -> bool:
+    return s.experiment.lines.aliases == 1
+
+
+@suspect("feedback")
+def feedback(scene: Scene, model: Model) -> Columns | None:
+    """The input answers to the output: the residual goes together with inputs still to come."""
+    if any(s.record is None for s in scene.seen) or (isinstance(model, GreyBox) and model.late):
+        return None
+    drawn = []
+    for s in scene.seen:
+        step = input_dt(s.reading.data)
+        ahead = np.exp(1j * s.omega_input * step)
+        shape = (model.n_outputs, model.n_inputs, len(s.omega_input))
+        rows = []
+        for o in range(shape[0]):
+            for i in range(shape[1]):
+                for k in range(1, _AHEAD + 1):
+                    G = np.zeros(shape, complex)
+                    G[o, i] = ahead**k
+                    rows.append(s.answered(G))
+        drawn.append(np.array(rows))
+    return Columns(drawn)

@@ -1,0 +1,130 @@
+"""Suspects that a score names are fitted again, as unknowns of their own: a delay, another hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data import input_dt
+from freqid.fitting.cost.nuisance import Delay, HoldPeriod
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.priors import Prior
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import minimise, polish
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.lti import BandLimited, FirstOrderHold, Hold, PeriodicHold
+
+# samples of delay, and holds as parts of the sample time, from which a fit begins
+_DELAYS = (0.3, 1.5, 3.5, 8.0)
+_PERIODS = (1.0, 0.3)
+# holds shorter than this part of the sample time are none, and longer ones no converter's
+_LEAST, _MOST = 0.02, 1.02
+# evaluations of each, of the first look from every start, and the gain that ends one
+_LIMIT, _LOOK, _TOLERANCE = 40, 12, 1e-6
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A fit with the suspect free: its ``cost``, the suspect's ``size`` (s) and its own words."""
+
+    cost: float
+    size: float
+    sentence: str
+
+
+def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit | None:
+    """With a delay of all inputs, begun also from the score's own step ``first`` (s)."""
+    structure = minimum.structure
+    if not isinstance(structure, GreyStructure) or structure.unknown:
+        return None
+    dt = readings[0].sample_time
+    freed = structure.with_unknown(Delay(0.0, dt), minimum.x)
+    lines = [r.at_lines().with_(delayed=True).lines() for r in readings]
+    objective = Objective(freed, lines, _prior(minimum, freed))
+    tried = []
+    for samples in (max(first / dt, 0.05), *_DELAYS):
+        try:
+            start = np.append(freed.start[:-1], samples)
+            tried.append(polish(objective, start, limit=_LOOK, tolerance=_TOLERANCE))
+        except InputError:
+            continue
+    if not tried:
+        return None
+    near = min(tried, key=lambda found: found.cost)
+    best = minimise(objective, near.x, limit=_LIMIT, tolerance=_TOLERANCE)
+    size = float(best.x[-1]) * dt
+    if size <= 0:
+        return None
+    return Refit(best.cost, size, f"the input acts {_time(size)} later than the model says")
+
+
+def held(minimum: Minimum, readings: Sequence[Reading]) -> Refit | None:
+    """With another hold: a zero-order hold of any length that is possible, first-order, none."""
+    structure = minimum.structure
+    dt = input_dt(readings[0].data)
+    if not isinstance(structure, GreyStructure) or structure.unknown or not dt:
+        return None
+    at_lines = [r.at_lines().with_(delayed=True) for r in readings]
+    found = [_of_any_length(minimum, structure, at_lines, dt)]
+    if all(input_dt(r.data) == dt for r in readings):
+        others: list[tuple[Hold, str]] = [
+            (FirstOrderHold(dt), "straight lines between the samples"),
+            (BandLimited(), "a band-limited or measured input"),
+        ]
+        found += [_through(minimum, structure, at_lines, hold, text) for hold, text in others]
+    told = [f for f in found if f is not None]
+    return min(told, key=lambda f: f.cost, default=None)
+
+
+def _of_any_length(
+    minimum: Minimum, structure: GreyStructure, readings: Sequence[Reading], dt: float
+) -> Refit | None:
+    freed = structure.with_unknown(HoldPeriod.of(dt), minimum.x)
+    lines = [r.lines() for r in readings]
+    if any(e.lines.aliases > 1 for e in lines) or structure.model.delay_sources:
+        return None
+    objective = Objective(freed, lines, _prior(minimum, freed))
+    hold = readings[0].hold
+    own = min(hold.period / dt, 1.0) if isinstance(hold, PeriodicHold) else 1.0
+    best: tuple[float, float] | None = None
+    for period in dict.fromkeys((own, *_PERIODS)):
+        try:
+            start = np.append(freed.start[:-1], period)
+            found = minimise(objective, start, limit=_LIMIT, tolerance=_TOLERANCE)
+        except InputError:
+            continue
+        if _LEAST < found.x[-1] < _MOST and (best is None or found.cost < best[0]):
+            best = found.cost, float(found.x[-1])
+    if best is None:
+        return None
+    return Refit(best[0], best[1] * dt, f"a zero-order hold of about {best[1] * dt:.3g} s")
+
+
+def _through(
+    minimum: Minimum, structure: GreyStructure, readings: Sequence[Reading], hold: Hold, text: str
+) -> Refit | None:
+    if all(r.hold == hold for r in readings):
+        return None
+    plain = GreyStructure(structure.model, structure.physical(minimum.x))
+    try:
+        lines = [r.with_(hold=hold).lines() for r in readings]
+        found = polish(Objective(plain, lines, _prior(minimum, plain)), plain.start, limit=_LIMIT)
+    except InputError:
+        return None
+    size = hold.period if isinstance(hold, PeriodicHold) else np.nan
+    return Refit(found.cost, size, text)
+
+
+def _prior(minimum: Minimum, structure: GreyStructure) -> Prior | None:
+    known = minimum.prior
+    if known is None:
+        return None
+    return Prior.of(structure.parameters, structure.scale, known.variance)
+
+
+def _time(seconds: float) -> str:
+    return f"{1e3 * seconds:.4g} ms" if seconds < 0.1 else f"{seconds:.4g} s"

@@ -1,0 +1,40 @@
+"""Where suspects are known: what draws the columns of one is marked with ``@suspect``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from freqid.checks import FloatArray
+from freqid.fitting.suspects.scene import Scene
+from freqid.models import Model
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Derivatives of the rows by a suspect: one array (c, rows) for each experiment.
+
+    ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
+    """
+
+    columns: Sequence[FloatArray]
+    unit: str = ""
+    trials: int = 1
+    detail: str = ""
+
+
+Drawn = Columns | Sequence[Columns] | None
+Suspect = Callable[[Scene, Model], Drawn]
+SUSPECTS: dict[str, Suspect] = {}
+
+
+def suspect(name: str) -> Callable[[Suspect], Suspect]:
+    """Mark a function as one that draws a suspect's columns: several where it has alternatives,
+    None where the data cannot show it.
+    """
+
+    def mark(function: Suspect) -> Suspect:
+        SUSPECTS[name] = function
+        return function
+
+    return mark

@@ -1,0 +1,204 @@
+"""The scene: what a fit leaves of its data at their lines, with everything that it could absorb."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError
+from freqid.data import Record
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.objective import EstimatedStructure, Objective
+from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import polish
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.uncertainty.noise_spectrum import is_white, local_power, projected
+from freqid.lti import Plane, sum_runs
+
+# singular values of the Jacobian below this part of the largest are directions left open
+_LOOSE = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One experiment at the estimate: ``left`` (rows,) of it, orthonormal rows ``free`` (q, rows)
+    that an initial state explains, and the ``jacobian`` (P, rows) without these.
+    """
+
+    reading: Reading
+    experiment: SpectralExperiment
+    left: FloatArray
+    free: FloatArray
+    jacobian: FloatArray
+
+    @property
+    def omega_input(self) -> FloatArray:
+        """Frequencies of the input in rad/s, (K·M,)."""
+        return self.experiment.lines.omega_input.ravel()
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs."""
+        return self.experiment.lines.Y.shape[0]
+
+    @property
+    def record(self) -> Record | None:
+        """The record, where it is one."""
+        data = self.reading.data
+        return data if isinstance(data, Record) else None
+
+    def answered(self, G: ComplexArray) -> FloatArray:
+        """Rows of what a response (outputs, inputs, K·M) makes of the input, (rows,)."""
+        lines = self.experiment.lines
+        y = np.einsum("pmk,mck->pck", G, lines.U)
+        rows: FloatArray = lines.rows(sum_runs(y, lines.aliases))
+        return rows
+
+    def sampled(self, signals: Array) -> FloatArray:
+        """Rows of signals of the outputs (…, outputs, N) in time, (…, rows)."""
+        lines, record = self.experiment.lines, self.record
+        assert record is not None
+        N = len(record.u) // record.factor
+        at = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
+        weighted = np.fft.rfft(signals[..., :N], axis=-1)[..., at] * lines.scale[:, 0]
+        return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-2], -1)).view(float)
+
+    def without_free(self, columns: FloatArray) -> FloatArray:
+        """Columns (c, rows) less what an initial state explains of them."""
+        return columns - (columns @ self.free.T) @ self.free
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a fit leaves at the lines of all its experiments, at its minimum ``x``."""
+
+    structure: EstimatedStructure
+    x: FloatArray
+    seen: Sequence[Seen]
+    energy: float
+    # rows of what was known before, Jacobian and residual, (rows, P + 1)
+    known: FloatArray
+    held: BoolArray
+
+    @classmethod
+    def of(cls, minimum: Minimum, readings: Sequence[Reading]) -> Scene:
+        """At the minimum on lines; InputError where there are none."""
+        structure = minimum.structure
+        chart = structure if isinstance(structure, Chart) else None
+        x, seen = minimum.x, []
+        if chart is not None and any(r.in_time for r in readings):
+            raise InputError("a black box fitted to samples leaves no lines")
+        at_lines = [r.at_lines().with_(delayed=chart is None) for r in readings]
+        if chart is None:
+            experiments = [r.lines() for r in at_lines]
+            if any(r.in_time for r in readings):
+                x = polish(Objective(structure, experiments), x).x
+        else:
+            experiments = [r.lines(Plane()).in_plane(chart.plane) for r in at_lines]
+        realisation = structure.realise(x)
+        for reading, e in zip(at_lines, experiments, strict=True):
+            evaluation = e.at(realisation)
+            left, Q, delta = projected(evaluation)
+            J = evaluation.jacobian(delta)
+            seen.append(Seen(reading, e, left, Q, J - (J @ Q.T) @ Q))
+        P = len(x)
+        known = np.zeros((0, P + 1)) if minimum.prior is None else minimum.prior.rows(x)
+        near = 1e-6 * np.maximum(np.abs(x), 1e-300)
+        held = (x - structure.lower <= near) | (structure.upper - x <= near)
+        return cls(structure, x, seen, sum(e.energy for e in experiments), known, held)
+
+    @cached_property
+    def left(self) -> FloatArray:
+        """Everything that is left, the rows of what was known before at the end."""
+        return np.concatenate([*(s.left for s in self.seen), self.known[:, -1]])
+
+    @property
+    def cost(self) -> float:
+        """Sum of its squares."""
+        return float(self.left @ self.left)
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Of all rows by the unknowns that are free to move, (P, rows)."""
+        J = np.concatenate([*(s.jacobian for s in self.seen), self.known[:, :-1].T], axis=1)
+        return J * ~self.held[:, None]
+
+    @cached_property
+    def _parts(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Left vectors, sizes of the directions that the data tell, and rows that span them."""
+        J = self.jacobian
+        size = np.linalg.norm(J, axis=1)
+        size[size == 0] = 1
+        U, s, Vt = np.linalg.svd(J / size[:, None], full_matrices=False)
+        told = s > _LOOSE * max(s.max(initial=0), 1e-300)
+        return U[:, told] / s[told] / size[:, None], s[told], Vt[told]
+
+    @property
+    def absorbed(self) -> FloatArray:
+        """Orthonormal rows of what the parameters can absorb."""
+        return self._parts[2]
+
+    def moved(self, rows: FloatArray) -> FloatArray:
+        """Change of the unknowns that takes rows (R,) on itself best."""
+        inverse, _, Vt = self._parts
+        change: FloatArray = -inverse @ (Vt @ rows)
+        return change
+
+    def relative(self, moved: FloatArray) -> float:
+        """The largest change (P,) as a part of its parameter; NaN where unknowns have no names."""
+        named = getattr(self.structure, "names", None)
+        sure = np.abs(self.x) > 0
+        if not named or not sure.any():
+            return float("nan")
+        return float(np.max(np.abs(moved[sure] / self.x[sure])))
+
+    @cached_property
+    def freedom(self) -> int:
+        """Real values less unknowns."""
+        rows = sum(s.experiment.n_rows - len(s.free) for s in self.seen) + len(self.known)
+        return rows - len(self.absorbed)
+
+    @cached_property
+    def white(self) -> bool:
+        """Whether the power that is left is spread evenly over the lines of every experiment."""
+        return self.is_white(self.left)
+
+    @cached_property
+    def variance(self) -> FloatArray:
+        """Variance of each row's noise, from the lines around it."""
+        return self.variance_of(self.left)
+
+    def _parted(self, rows: FloatArray) -> list[FloatArray]:
+        """Rows (R,) of each experiment in turn."""
+        ends = np.cumsum([len(s.left) for s in self.seen])
+        return np.split(rows, ends)[:-1]
+
+    def is_white(self, rows: FloatArray) -> bool:
+        """The same of other rows (R,)."""
+        parts = zip(self.seen, self._parted(rows), strict=True)
+        return all(is_white(part, s.experiment) for s, part in parts)
+
+    def variance_of(self, rows: FloatArray) -> FloatArray:
+        """Variance of each row's noise (R,) where these are what it leaves."""
+        every = float(rows @ rows) / max(self.freedom, 1)
+        if self.is_white(rows):
+            return np.full(len(rows), every)
+        share = len(rows) / max(self.freedom, 1)
+        parts = zip(self.seen, self._parted(rows), strict=True)
+        local = [local_power(part, s.experiment) * share for s, part in parts]
+        return np.concatenate([*local, np.full(len(self.known), every)])
+
+    def stacked(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """Columns (c, rows) of each experiment side by side, nothing beside what was known."""
+        count = len(columns[0])
+        return np.concatenate([*columns, np.zeros((count, len(self.known)))], axis=1)
+
+    def clear(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """Columns of each experiment less what initial states and parameters absorb, stacked."""
+        alone = self.stacked([s.without_free(c) for s, c in zip(self.seen, columns, strict=True)])
+        B = self.absorbed
+        return alone - (alone @ B.T) @ B

@@ -1,0 +1,46 @@
+"""What is said of a suspect that is no chance."""
+
+from __future__ import annotations
+
+from freqid.fitting.suspects.scores import Score
+
+# the cure of each
+_CURES = {
+    "delay": "give the model an input_delay, a number or a free parameter",
+    "hold rejected": "use hold='estimate', or the hold that the converter had",
+    "feedthrough": "give the model a direct term D",
+    "offset": "fit with offset='estimate', or take the offset off the record",
+    "drift": "use record.detrend(order=1), and look for what drifts",
+    "spikes": "look at the record there; fit with loss='huber', or mend the sample",
+    "saturation": "lower the excitation, or leave those samples out",
+    "feedback": "the record is of a closed loop: give it its reference, or excite it by one",
+    "unlike experiments": "fit them apart and compare; find out what has changed between them",
+    "amplitude": "the plant is not linear: identify it at the level at which it will work",
+    "another mode": "give the model one more mode, or narrow the band",
+}
+
+
+def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
+    """What was found, how certain that is, what it does to the parameters, and the cure."""
+    certain = f"F = {test.statistic:.3g} on {test.degrees} and {freedom}, p = {p:.2g}"
+    moved = ""
+    if test.largest_shift == test.largest_shift and test.largest_shift > 0:
+        moved = f"; it moves parameters by up to {test.largest_shift:.2g} standard errors"
+    return f"{what} ({certain}){moved}; {_CURES[kind]}"
+
+
+def words(name: str, size: float, unit: str, detail: str) -> str:
+    """What a suspect says of the data, in words."""
+    number = f"{size:.3g}{unit}"
+    return {
+        "delay": f"the input acts {size:.3g} s later than the model says",
+        "feedthrough": f"the input reaches an output at once, by {number}",
+        "offset": f"an output has a constant of {number} added",
+        "drift": f"an output drifts by {number}",
+        "spikes": f"one sample is off by {number} {detail}",
+        "saturation": "an output stays at one extreme value, as at a limit",
+        "feedback": "what the model leaves goes together with inputs still to come",
+        "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
+        "amplitude": "the parameters change with the level of the input",
+        "another mode": "a black box with one mode more explains the data better",
+    }[name]

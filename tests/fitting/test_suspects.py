@@ -1,0 +1,182 @@
+"""Suspects: faults that are in the data are named, and data without any are left in peace."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.signal
+import scipy.stats
+
+import freqid as fq
+
+DT, N = 0.01, 1000
+LAG = fq.first_order(b=50.0, a=20.0)
+
+
+def noise(seed, size=N, pole=0.0):
+    """White noise of variance one, or an autoregression of the first order."""
+    e = np.random.default_rng(seed).standard_normal(size + 300)
+    return scipy.signal.lfilter([np.sqrt(1 - pole**2)], [1, -pole], e)[300:]
+
+
+def recorded(y, u, seed, level=0.2, pole=0.0):
+    return fq.Record(u, y + level * noise(seed + 1000, len(y), pole), DT)
+
+
+def excited(seed):
+    return fq.white_noise(N, seed=seed)
+
+
+def healthy(seed, pole=0.0):
+    u = excited(seed)
+    return recorded(fq.simulate(LAG, u, DT).y, u, seed, pole=pole)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_false_alarms_are_those_of_the_level(pole):
+    p = {}
+    for seed in range(60):
+        for name, row in fq.fit(LAG, healthy(seed, pole)).suspects.iterrows():
+            p.setdefault(name, []).append(row["p_value"])
+    # "hold" and "spikes" are the largest of several: their p is an upper limit
+    for name in ("hold period", "offset", "drift", "feedback", "feedthrough"):
+        assert scipy.stats.kstest(p[name], "uniform").pvalue > 1e-3, name
+    assert np.mean([min(v) for v in p.values()]) > 0.003
+
+
+def test_good_data_have_no_warning_and_are_trusted():
+    grades = [fq.fit(LAG, healthy(seed)).verdict.grade for seed in range(100, 140)]
+    assert grades.count("trust") >= 37
+
+
+def late(seed):
+    u = excited(seed)
+    return recorded(fq.simulate(dataclasses.replace(LAG, input_delay=0.6 * DT), u, DT).y, u, seed)
+
+
+def late_by_samples(seed):
+    u = excited(seed)
+    return recorded(fq.simulate(dataclasses.replace(LAG, input_delay=2.5 * DT), u, DT).y, u, seed)
+
+
+def offset(seed):
+    record = healthy(seed)
+    return fq.Record(record.u, record.y + 0.1, DT)
+
+
+def drifting(seed):
+    record = healthy(seed)
+    return fq.Record(record.u, record.y + np.linspace(-0.2, 0.2, N), DT)
+
+
+def spiked(seed):
+    record = healthy(seed)
+    y = np.array(record.y)
+    y[317] += 2.0
+    return fq.Record(record.u, y, DT)
+
+
+def clipped(seed):
+    record = healthy(seed)
+    limit = np.quantile(np.abs(record.y), 0.95)
+    return fq.Record(record.u, np.clip(record.y, -limit, limit), DT)
+
+
+def with_a_mode(seed):
+    u = excited(seed)
+    mode = fq.simulate(scipy_mode(), u, DT).y
+    y = fq.simulate(LAG, u, DT).y
+    return recorded(y + 0.5 * y.std() / mode.std() * mode, u, seed)
+
+
+def scipy_mode():
+    import control
+
+    return control.tf([90.0**2], [1, 2 * 0.02 * 90, 90.0**2])
+
+
+def smoothly_driven(seed):
+    fast = np.interp(np.arange(5 * N) / 5, np.arange(N), excited(seed))
+    record = fq.simulate(LAG, fast, DT / 5).decimate(5)
+    return recorded(record.y, record.u, seed, level=0.02)
+
+
+def changed(seed):
+    u = excited(seed)
+    other = fq.simulate(LAG.with_values(a=23.0), u, DT)
+    return [healthy(seed), recorded(other.y, u, seed + 500)]
+
+
+def fed_back(seed):
+    r, v = excited(seed), 0.8 * noise(seed, pole=0.95)
+    phi, gamma = np.exp(-20 * DT), 2.5 * (1 - np.exp(-20 * DT))
+    x, u, y = 0.0, np.zeros(N), np.zeros(N)
+    for k in range(N):
+        y[k] = x + v[k]
+        u[k] = r[k] - y[k]
+        x = phi * x + gamma * u[k]
+    return fq.Record(u, y, DT)
+
+
+FAULTS = {
+    "delay": late, "offset": offset, "drift": drifting, "spikes": spiked, "saturation": clipped,
+    "another mode": with_a_mode, "hold rejected": smoothly_driven, "unlike experiments": changed,
+    "feedback": fed_back,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_fault_is_the_first_one_named(kind):
+    found = []
+    for seed in range(6):
+        est = fq.fit(LAG, FAULTS[kind](seed))
+        found.append(est.warnings[0].kind if est.warnings else "")
+    # one clipped sample may look like a spike
+    assert found.count(kind) >= (4 if kind == "saturation" else 5), found
+
+
+def test_a_delay_of_whole_samples_is_found_under_a_rough_input():
+    for seed in range(4):
+        est = fq.fit(LAG, late_by_samples(seed))
+        assert est.warnings[0].kind == "delay"
+        late = float(est.warnings[0].split("acts ")[1].split(" ms")[0])
+        assert late == pytest.approx(25, abs=1)
+        assert est.verdict.grade != "trust"
+
+
+def test_the_size_is_in_the_suspects_own_unit():
+    row = fq.fit(LAG, offset(3)).suspects.loc["offset"]
+    assert row["size"] == pytest.approx(0.1, abs=0.03)
+    row = fq.fit(LAG, drifting(3)).suspects.loc["drift"]
+    assert row["unit"] == "/s"
+    assert row["size"] == pytest.approx(0.4 / (N * DT), rel=0.25)
+
+
+def test_what_the_parameters_absorb_has_no_power():
+    # a hold of half the length turns the phase of a lag as its pole does
+    table = fq.fit(LAG, healthy(0)).suspects
+    assert set(table.columns) == {
+        "statistic", "p_value", "size", "unit", "power", "largest_shift"
+    }  # fmt: skip
+    assert ((table["power"] >= 0) & (table["power"] <= 1 + 1e-9)).all()
+
+
+def test_the_verdict_is_one_and_the_same_everywhere(tmp_path):
+    est = fq.fit(LAG, late_by_samples(1))
+    assert est.verdict.grade in ("doubt", "do not use")
+    assert est.verdict.reasons[0] == est.warnings[0]
+    assert est.to_dict()["verdict"]["grade"] == est.verdict.grade
+    assert f"verdict: {est.verdict.grade}" in repr(est)
+    assert est.verdict.head.rstrip(".") in _page(est, tmp_path)
+
+
+def _page(est, folder):
+    est.report(folder / "est.html")
+    return (folder / "est.html").read_text()
+
+
+def test_nothing_is_left_to_ask_of_data_without_noise():
+    u = excited(0)
+    est = fq.fit(LAG, fq.simulate(LAG, u, DT))
+    assert est.suspects.empty
+    assert est.verdict.grade == "trust"
