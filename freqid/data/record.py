@@ -174,8 +174,8 @@ class Record:
         u, y, reference = self.u, self.y, self.reference
         if antialias and factor > 1:
             u = low_pass(u, factor * self.factor)
-            y = low_pass(y, factor)
-            reference = None if reference is None else low_pass(reference, factor)
+            y = low_pass(y, factor, self.factor)
+            reference = None if reference is None else low_pass(reference, factor, self.factor)
         return replace(
             self,
             u=u if keep_input else u[::factor],

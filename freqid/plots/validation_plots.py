@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from freqid.data import FrequencyResponse
+from freqid.plots.bode_nyquist import bode
 from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
 
 if TYPE_CHECKING:
@@ -18,6 +21,9 @@ if TYPE_CHECKING:
 def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
     """Measured and simulated above their difference, two axes for each output. Returns the axes."""
     record = comparison.record
+    if isinstance(record, FrequencyResponse):
+        shown = dataclasses.replace(record, response=comparison.simulated, variance=None)
+        return bode(record, shown, labels=["measured", "model"], ax=ax)
     count = record.n_outputs
     simulated = comparison.simulated.reshape(len(comparison.simulated), -1)
     residuals = comparison.residuals.reshape(simulated.shape)

@@ -8,31 +8,44 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, choice
-from freqid.data import Band, Record, as_band, chosen
-from freqid.fitting import line_errors
-from freqid.lti import Hold
+from freqid.checks import Array, FloatArray, InputError, choice
+from freqid.data import (
+    Band,
+    DataSet,
+    FrequencyResponse,
+    Record,
+    as_band,
+    chosen,
+    input_dt,
+)
+from freqid.fitting import Estimate, line_errors
+from freqid.lti import Hold, PeriodicHold, as_hold
 from freqid.models import ModelLike, as_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+# an output that varies by less than this part of its size is constant
+_CONSTANT = 1e-12
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A model beside a record.
+    """A model beside a record, or a response.
 
     ``measured`` (N, outputs) is the record's output, or its part in the band; ``simulated`` and
     ``residuals`` = measured − simulated are shaped like ``record.y``; ``fit_percent`` (outputs,)
-    is 100·(1 − ‖residual‖/‖y − mean‖), the normalised root mean square.
+    is 100·(1 − ‖residual‖/‖y − mean‖), the normalised root mean square. Of a response all three
+    are (outputs, inputs, K), and ``fit_percent`` is 100·(1 − ‖residual‖/‖response‖).
     """
 
-    record: Record
-    measured: FloatArray
-    simulated: FloatArray
-    residuals: FloatArray
+    record: DataSet
+    measured: Array
+    simulated: Array
+    residuals: Array
     fit_percent: FloatArray
-    hold: Hold
+    hold: Hold | None
 
     def plot(self, ax: Sequence[Axes] | None = None) -> Any:
         """Measured and simulated outputs above their difference; returns the axes."""
@@ -50,7 +63,7 @@ class Comparison:
 
 def compare(
     model: ModelLike,
-    record: Record,
+    record: DataSet,
     *,
     hold: Hold | str | None = None,
     initial_state: str = "estimate",
@@ -58,42 +71,98 @@ def compare(
 ) -> Comparison:
     """Simulate a model with a record's input, and set the two side by side.
 
+    A FrequencyResponse is compared with the model's own, through the same hold.
+
     Args:
         model: an Estimate, a GreyBox, a rational model or a control system.
-        hold: what the input does; None is what the record remembers, whatever the fit assumed. A
-            discrete black box simulates at the hold that it was fitted with.
+        hold: what the input does; None is what the fit assumed of its data, and else what the
+            record remembers. A discrete black box simulates at the hold that it was fitted with.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
             input to be periodic.
         band: in Hz; only what lies inside it is compared, of both. None compares everything.
 
-    Raises ValueError for channels that do not match, or a band that the record does not have.
+    Raises ValueError for channels that do not match, a band that the record does not have, or an
+    output that is constant there, of which nothing is to be explained.
 
     >>> import freqid as fq
     >>> record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3)
     >>> bool(fq.compare(fq.first_order(), record).fit_percent[0] > 99.999)
     True
     """
+    if isinstance(record, FrequencyResponse):
+        return _with_response(model, record, hold, band)
     if not isinstance(record, Record):
-        raise InputError(f"record={type(record).__name__} is not a Record; compare them one by one")
+        raise InputError(
+            f"record={type(record).__name__} is neither a Record nor a FrequencyResponse; compare "
+            "them one by one"
+        )
     limits = as_band(band, record.nyquist)
     choice("initial_state", initial_state, ("estimate", "steady"))
-    given, hold = as_model(model), own_hold(model, hold)
+    given, hold = as_model(model), own_hold(model, hold, record)
     residual = -line_errors(given, record, hold, None, initial_state).in_time()
     y = record.outputs[: len(residual)]
     if limits is not None:
         y, residual = part_inside(y, record.dt, limits), part_inside(residual, record.dt, limits)
     centred = np.linalg.norm(y - y.mean(axis=0), axis=0)
     left = np.linalg.norm(residual, axis=0)
-    percent = 100 * (1 - left / np.where(centred > 0, centred, np.inf))
+    size = np.linalg.norm(record.outputs[: len(residual)], axis=0)
+    for name, varies, whole in zip(record.output_names, centred, size, strict=True):
+        if varies <= _CONSTANT * whole or varies == 0:
+            raise InputError(
+                f"output {name!r} is constant{'' if limits is None else f' in band={limits}'}: "
+                "there is nothing to explain; check the channel or the band"
+            )
+    percent = 100 * (1 - left / centred)
     shape = (len(residual),) if record.y.ndim == 1 else residual.shape
     used = record.hold if hold is None or isinstance(hold, str) else hold
     simulated = (y - residual).reshape(shape)
     return Comparison(record, y, simulated, residual.reshape(shape), percent, used)
 
 
-def own_hold(model: ModelLike, hold: Hold | str | None) -> Hold | str | None:
-    """The hold asked for, or the one that a sampled model has inside."""
-    return as_model(model).own_hold if hold is None else hold
+def _with_response(
+    model: ModelLike,
+    frf: FrequencyResponse,
+    hold: Hold | str | None,
+    band: tuple[float, float] | None,
+) -> Comparison:
+    """The model's response beside a measured one, each output in per cent."""
+    if band is not None:
+        frf = frf.select(band)
+    given, found = as_model(model), own_hold(model, hold, frf)
+    if isinstance(found, str):
+        found = as_hold(found, frf.dt or 1.0, frf.hold)
+    if found is None:
+        found = frf.hold
+    G = given.frequency_response(frf.omega, found).response
+    if G.shape != frf.response.shape:
+        raise InputError(
+            f"response has (outputs, inputs) {frf.response.shape[:2]} and the model {G.shape[:2]}"
+        )
+    left = frf.response - G
+    size = np.linalg.norm(frf.response, axis=(1, 2))
+    percent = 100 * (1 - np.linalg.norm(left, axis=(1, 2)) / np.where(size > 0, size, np.nan))
+    return Comparison(frf, frf.response, G, left, percent, found)
+
+
+def own_hold(model: ModelLike, hold: Hold | str | None, data: DataSet) -> Hold | str | None:
+    """The hold asked for; else the one inside a sampled model, else the one that a fit assumed.
+
+    A fit that took what its record remembers says so of another record, too; one that assumed a
+    hold at its own sample time assumes it at the other's.
+    """
+    inside = as_model(model).own_hold
+    if hold is not None or inside is not None:
+        return hold if hold is not None else inside
+    if not isinstance(model, Estimate) or not model.data:
+        return None
+    fitted = model.data[0]
+    remembered = fitted.hold
+    if model.hold == remembered or remembered is None or "hold_period" in model.names:
+        return model.hold if "hold_period" in model.names else None
+    step = input_dt(fitted)
+    if isinstance(model.hold, PeriodicHold) and step and abs(model.hold.period / step - 1) < 1e-9:
+        return type(model.hold)(input_dt(data) or model.hold.period)
+    return model.hold
 
 
 def part_inside(x: FloatArray, dt: float, band: Band) -> FloatArray:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.stats
 
 from freqid.checks import FloatArray, InputError, whole
-from freqid.data import Band, Record, as_band
+from freqid.data import Band, DataSet, FrequencyResponse, Record, as_band
 from freqid.fitting import Estimate, line_errors
 from freqid.lti import Hold
 from freqid.models import ModelLike, as_model
-from freqid.validation.comparison import own_hold, part_inside
+from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,11 +20,16 @@ if TYPE_CHECKING:
 # lags of the correlations, and the level at which a test is failed
 _LAGS = 25
 _LEVEL = 0.01
+# samples for each lag from which on chi-square holds, and how much wider it is in fewer
+_LONG, _WIDER = 40, 2.3
+# lines of a window in which a coherence is taken, and the part of the strongest window's input
+# below which one is not driven
+_WINDOW, _DRIVEN = 12, 1e-6
 
 
 def residual_test(
     model: ModelLike,
-    record: Record,
+    record: DataSet,
     *,
     lags: int = _LAGS,
     hold: Hold | str | None = None,
@@ -32,12 +37,15 @@ def residual_test(
 ) -> pd.DataFrame:
     """Whiteness of what a model leaves, and its independence of the input.
 
-    Rows: ``whiteness`` of each output (Ljung and Box's statistic of the autocorrelations) and
+    Rows: ``whiteness`` of each output (Ljung and Box's statistic),
     ``independence`` of each output of each input (the cross-correlations in units of their standard
-    error, which the residual's own colour makes wider). Columns: test, output, input, statistic,
-    limit (99 %), p_value and passed. ``attrs["correlations"]`` holds the correlations themselves
-    with their limits, which ``plot_residuals`` draws. With ``band`` (Hz) only its lines inside
-    are tested. Raises ValueError for fewer samples than four times the ``lags``.
+    error, which the residual's own colour makes wider) and ``coherence`` of the two (what the input
+    explains of the residual in windows of a few lines). Columns: test, output, input, statistic,
+    limit (99 %), p_value and passed. Of a FrequencyResponse with a variance: ``size`` of what is
+    left in units of that, and ``whiteness`` from line to line. ``attrs["correlations"]`` holds the
+    correlations themselves with their limits, which ``plot_residuals`` draws. With ``band`` (Hz)
+    only its lines inside are tested. Raises ValueError for fewer samples than four times the
+    ``lags``.
 
     Source: Ljung, System Identification, 1999, section 16.6; with a band, whiteness is Bartlett's
     test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series, 1981, 6.2.5).
@@ -50,10 +58,14 @@ def residual_test(
     import pandas as pd
 
     lags = whole("lags", lags)
+    if isinstance(record, FrequencyResponse):
+        return _of_response(compare(model, record, hold=hold, band=band))
+    if not isinstance(record, Record):
+        raise InputError(f"record={type(record).__name__} is neither a Record nor a response")
     if record.n_samples < 4 * lags:
         raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
     limits = as_band(band, record.nyquist)
-    hold = own_hold(model, hold)
+    hold = own_hold(model, hold, record)
     e = -line_errors(as_model(model), record, hold).in_time()
     u = record.inputs[:: record.factor][: len(e)]
     N = len(e)
@@ -73,10 +85,9 @@ def residual_test(
             rows.append(_row("whiteness", output, "", statistic, most, p))
         auto = _correlation(e[:, o], e[:, o], lags)
         white = auto[lags + 1 :]
-        q = N * (N + 2) * float(np.sum(white**2 / (N - np.arange(1, lags + 1))))
-        limit = float(scipy.stats.chi2.ppf(1 - _LEVEL, lags))
         if limits is None:
-            p = float(scipy.stats.chi2.sf(q, lags))
+            q, null = _portmanteau(white, N)
+            p, limit = float(null.sf(q)), float(null.isf(_LEVEL))
             rows.append(_row("whiteness", output, "", q, limit, p))
             curves.append(("whiteness", output, "", white, quantile / np.sqrt(N)))
         for i, name in enumerate(record.input_names):
@@ -92,11 +103,84 @@ def residual_test(
             most = float(scipy.stats.norm.ppf(1 - (1 - (1 - _LEVEL) ** (1 / count)) / 2))
             rows.append(_row("independence", output, name, z, most, p))
             curves.append(("independence", output, name, cross, most * spread))
+            told = _coherence(e[:, o], u[:, i], record.dt, limits)
+            if told is not None:
+                rows.append(_row("coherence", output, name, *told))
     table = pd.DataFrame(rows)
     table.attrs["correlations"] = [
         {"test": t, "output": o, "input": i, "values": v.tolist(), "limit": float(lim)}
         for t, o, i, v, lim in curves
     ]
+    return table
+
+
+def _portmanteau(r: FloatArray, N: int) -> tuple[float, Any]:
+    """Ljung and Box's statistic of autocorrelations r(1) … r(m), and its distribution where white.
+
+    In short records the sum scatters more than chi-square does, by a part that grows with m/N: a
+    gamma distribution of the same mean, its variance found by simulation.
+    """
+    m = len(r)
+    q = N * (N + 2) * float(np.sum(r**2 / (N - np.arange(1, m + 1))))
+    if _LONG * m <= N:
+        return q, scipy.stats.chi2(m)
+    wider = 1 + _WIDER * m / N
+    return q, scipy.stats.gamma(m / 2 / wider, scale=2 * wider)
+
+
+def _coherence(
+    e: FloatArray, u: FloatArray, dt: float, band: Band | None
+) -> tuple[float, float, float] | None:
+    """Statistic, limit and p of what the input explains of the residual, window by window.
+
+    In a window of L lines the coherence γ² of unrelated signals has P(γ² > c) = (1 − c)^(L − 1)
+    (Carter, Proc. IEEE 75, 1987), so that −2 (L − 1) Σ ln(1 − γ²) is chi-square with two degrees
+    of freedom a window.
+    """
+    f = np.fft.rfftfreq(len(e), dt)
+    keep = f > 0 if band is None else band.inside(f) & (f > 0)
+    E, U = np.fft.rfft(e)[keep], np.fft.rfft(u)[keep]
+    count = len(E) // _WINDOW
+    if count < 1:
+        return None
+    E, U = (X[: count * _WINDOW].reshape(count, _WINDOW) for X in (E, U))
+    power = (np.abs(U) ** 2).sum(axis=1)
+    driven = power > _DRIVEN * power.max()
+    E, U, power = E[driven], U[driven], power[driven]
+    own = (np.abs(E) ** 2).sum(axis=1) * power
+    share = np.abs((E * U.conj()).sum(axis=1)) ** 2 / np.where(own > 0, own, np.inf)
+    q = float(-2 * (_WINDOW - 1) * np.log1p(-np.minimum(share, 1 - 1e-12)).sum())
+    null = scipy.stats.chi2(2 * len(E))
+    return q, float(null.isf(_LEVEL)), float(null.sf(q))
+
+
+def _of_response(c: Comparison) -> pd.DataFrame:
+    """What is left of a response, in units of its own standard error, line by line."""
+    import pandas as pd
+
+    frf = c.record
+    assert isinstance(frf, FrequencyResponse)
+    if frf.variance is None:
+        raise InputError("record is a response without variance: there is no noise to test against")
+    rows = []
+    left = c.residuals / np.sqrt(frf.variance)
+    for o, output in enumerate(frf.output_names):
+        for i, name in enumerate(frf.input_names):
+            each = left[o, i]
+            K = len(each)
+            # a complex error of variance one has a square of one, exponentially distributed
+            q, null = 2 * float(np.sum(np.abs(each) ** 2)), scipy.stats.chi2(2 * K)
+            rows.append(_row("size", output, name, q, float(null.isf(_LEVEL)), float(null.sf(q))))
+            if frf.reach or K < 4:
+                continue
+            along = np.sum(each[1:] * each[:-1].conj()).real
+            z = float(np.sqrt(2 * (K - 1)) * along / max(np.sum(np.abs(each) ** 2), 1e-300))
+            null = scipy.stats.norm()
+            rows.append(
+                _row("whiteness", output, name, z, float(null.isf(_LEVEL)), float(null.sf(z)))
+            )
+    table = pd.DataFrame(rows)
+    table.attrs["correlations"] = []
     return table
 
 

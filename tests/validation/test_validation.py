@@ -1,5 +1,7 @@
 """Noise weights, error bars and validation against simulation and closed forms."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -131,12 +133,83 @@ def test_compare_is_the_simulation(plant, fast):
     assert "%" in axes[0].get_legend().get_texts()[1].get_text()
 
 
-def test_compare_uses_the_records_own_hold(plant, slow):
-    """The biased model is judged as the robot would judge it, not as it was fitted."""
+def test_compare_simulates_with_the_hold_of_the_fit_unless_told(plant, slow, fast):
     wrong = fq.fit(plant, slow, hold="zoh", band=BAND)
     right = fq.fit(plant, slow, band=BAND)
     assert fq.compare(right, slow).fit_percent[0] > 95
-    assert fq.compare(wrong, slow).fit_percent[0] < 70
+    # judged as the robot would judge it, and as it was fitted
+    assert fq.compare(wrong, slow, hold=slow.hold).fit_percent[0] < 70
+    assert fq.compare(wrong, slow).hold == fq.ZeroOrderHold(slow.dt)
+    assert fq.compare(wrong, slow, band=BAND).fit_percent[0] > 70
+    # what was assumed is a hold at the record's own sample time, whatever that is
+    assert fq.compare(wrong, fast).hold == fq.ZeroOrderHold(fast.dt)
+    assert fq.compare(right, slow).hold == fast.hold
+
+
+def test_an_input_without_a_hold_is_compared_so(rng):
+    plant = fq.first_order(b=50, a=20)
+    u = rng.standard_normal(2000)
+    record = fq.simulate(plant, u, 0.01, hold="bl")
+    as_read = fq.Record(record.u, record.y, 0.01)
+    right, wrong = fq.fit(plant, as_read, hold="bl"), fq.fit(plant, as_read)
+    assert fq.compare(right, as_read).fit_percent[0] > 99
+    assert fq.compare(wrong, as_read).fit_percent[0] < 90
+
+
+def test_what_cannot_be_compared_is_refused(plant, slow):
+    with pytest.raises(ValueError, match=r"band=\(9, 1\)"):
+        fq.compare(plant, slow, band=(9, 1))
+    flat = fq.Record(slow.u, 0 * slow.y + 3.0, slow.dt)
+    with pytest.raises(ValueError, match="is constant"):
+        fq.compare(plant, flat)
+    with pytest.raises(ValueError, match="holds no"):
+        fq.compare(plant, slow, band=(1.0001, 1.0002))
+
+
+def test_a_response_is_compared_and_tested(plant, short):
+    frf = fq.etfe(short, band=BAND)
+    assert fq.compare(plant, frf).fit_percent[0] > 90
+    true = plant.frequency_response(frf.omega, short.hold).response
+    e = np.random.default_rng(0).standard_normal((2, *true.shape)) * 0.01
+    noisy = dataclasses.replace(frf, response=true + e[0] + 1j * e[1], variance=2e-4 + 0 * e[0])
+    assert fq.residual_test(plant, noisy)["passed"].all()
+    other = plant.with_values(k=1.05 * plant["k"])
+    table = fq.residual_test(other, noisy).set_index("test")
+    assert not table.loc["size", "passed"]
+    assert fq.compare(other, noisy).fit_percent[0] < fq.compare(plant, noisy).fit_percent[0]
+    with pytest.raises(ValueError, match="without variance"):
+        fq.residual_test(plant, frf)
+
+
+def test_whiteness_keeps_its_size_in_short_records():
+    model, rejected = fq.first_order(b=0.0, a=20.0), 0
+    for seed in range(1500):
+        rng = np.random.default_rng(seed)
+        record = fq.Record(rng.standard_normal(110), rng.standard_normal(110), 0.01)
+        rejected += not fq.residual_test(model, record)["passed"].iloc[0]
+    # 15 expected; more than 30 once in ten thousand
+    assert 3 <= rejected <= 30
+
+
+def test_coherence_finds_what_a_few_lags_do_not():
+    """A weak, sharp mode rings over far more samples than lags are looked at."""
+    import control
+
+    lag = fq.first_order(b=50, a=20)
+    mode = control.tf([0.15 * 60**2], [1, 2 * 0.001 * 60, 60**2])
+    u = fq.white_noise(8000, seed=2)
+    both = fq.simulate(lag, u, 0.01).y + 0.05 * fq.simulate(mode, u, 0.01).y
+    record = fq.Record(u, both, 0.01).with_noise(0.05, seed=3)
+    table = fq.residual_test(lag, record).set_index("test")
+    assert table.loc["coherence", "p_value"] < 1e-4
+    clean = fq.simulate(lag, u, 0.01).with_noise(0.05, seed=3)
+    assert fq.residual_test(lag, clean).set_index("test").loc["coherence", "p_value"] > 1e-3
+
+
+def test_antialias_filters_a_faster_input_and_its_output_alike(plant, fast):
+    quick = fast.decimate(5, keep_input=True).decimate(4, keep_input=True, antialias=True)
+    est = fq.fit(plant, quick, band=(10, 35))
+    assert max(abs(est[n] / plant[n] - 1) for n in ("Jm", "k", "Ja", "fm", "d")) < 2e-3
 
 
 def test_residual_tests_pass_for_the_truth_and_fail_for_less(plant, short):
