@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from functools import partial
-
-import numpy as np
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Literal
 
 from freqid.checks import InputError, choice, whole
-from freqid.data import DataSet, as_data_sets
+from freqid.data import DataSet, Record, as_data_sets
 from freqid.fitting import black_box, grey_box
+from freqid.fitting.closed_loop import through_reference
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
+from freqid.fitting.noise_rounds import again, noise_weighted
 from freqid.fitting.reading import Domain, InitialState, Reading
-from freqid.fitting.residuals import errors_of
+from freqid.fitting.robust import robust_fit
 from freqid.fitting.suspects import Inquiry
-from freqid.fitting.witness import Testimony
 from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
 
 # the kinds of model that fit takes are known by the files that fit them
 _KNOWN = (grey_box, black_box)
-# fits with the noise of the one before, and the part of a standard error that ends them
-_NOISE_ROUNDS = 4
-_STANDS = 0.01
 
 
 @in_one_blas_thread
@@ -41,6 +38,10 @@ def fit(
     n_starts: int | str = "auto",
     seed: int = 0,
     domain: Domain = "frequency",
+    reference: Literal["auto"] | bool = "auto",
+    offset: Literal["estimate"] | None = None,
+    loss: Literal["linear", "huber"] = "linear",
+    progress: bool = False,
 ) -> Estimate:
     """Estimate a model's free parameters by weighted least squares on the lines of a band.
 
@@ -70,6 +71,12 @@ def fit(
             enough of them agree.
         seed: of the scattered starts.
         domain: ``"frequency"`` or ``"time"``, the paper's output error.
+        reference: ``"auto"`` fits a record that has a reference through it, as one of a closed loop
+            must be, weighted by the noise unless ``weights`` says otherwise; ``True`` asks for a
+            reference; ``False`` fits the input as it is.
+        offset: ``"estimate"`` makes a constant of each output of each record an unknown.
+        loss: ``"huber"`` lets samples that are far off count less, as spikes should.
+        progress: show on the screen that a long fit is at work.
 
     Returns an Estimate. Raises ValueError for arguments that do not fit the data or the model.
 
@@ -86,7 +93,12 @@ def fit(
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
     whole("seed", seed, least=0)
-    work = partial(fitter_of(model), model)
+    fitter_of(model)
+    choice("loss", loss, ("linear", "huber"))
+    if offset is not None:
+        choice("offset", offset, ("estimate",))
+    if not isinstance(reference, bool):
+        choice("reference", reference, ("auto",))
     sets = as_data_sets(data)
     estimated = isinstance(hold, str) and hold == "estimate"
     skip_zero = isinstance(model, GreyBox) and model.integrates
@@ -98,26 +110,131 @@ def fit(
             "hold='estimate' and input_delay: a longer hold is a later input, so that one of them "
             "must be known; name the hold"
         )
+    models = _noise_models(weights, data, sets)
+    seen, models, notes = _through_references(model, sets, models, reference, weights is None)
     readings: Sequence[Reading] = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late
         )
-        for d, noise in zip(sets, _noise_models(weights, data, sets), strict=True)
+        for d, noise in zip(seen, models, strict=True)
     ]
+    if offset is not None:
+        readings = [_with_offset(r) for r in readings]
     options = SearchOptions(count, seed, start, estimated)
-    if any(r.noise.to_be_learnt for r in readings):
-        est, readings = _noise_weighted(model, readings, options)
-    else:
-        est = work(readings, options)
+    with _shown(progress):
+        est, readings = _fitted(model, readings, options, loss)
+    if offset is not None:
+        notes += _offsets(est, readings)
     given = {
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
+        "reference": reference, "offset": offset, "loss": loss,
     }  # fmt: skip
     call = _call(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
     return dataclasses.replace(
-        est, data=sets, band=band, weights=weights, call=call, inquiry=inquiry
-    )
+        est, data=sets, band=band, weights=weights, call=call, inquiry=inquiry,
+        notes=[*notes, *est.notes],
+    )  # fmt: skip
+
+
+def _fitted(
+    model: object, readings: Sequence[Reading], options: SearchOptions, loss: str
+) -> tuple[Estimate, Sequence[Reading]]:
+    """The estimate, and the readings with the noise, or the cut errors, that it was found with."""
+
+    def work(some: Sequence[Reading], near: Estimate | None) -> tuple[Estimate, Sequence[Reading]]:
+        own = options if near is None else again(near, options)
+        if any(r.noise.to_be_learnt for r in some):
+            return noise_weighted(model, some, own)
+        return fitter_of(model)(model, some, own), some
+
+    if loss == "linear":
+        return work(readings, None)
+    return robust_fit(lambda some, near: work(some, near)[0], readings)
+
+
+def _through_references(
+    model: object,
+    sets: Sequence[DataSet],
+    models: list[NoiseModel],
+    reference: object,
+    plain: bool,
+) -> tuple[list[DataSet], list[NoiseModel], list[str]]:
+    """The data, those with a reference as it explains them, their noise, and notes on both."""
+    has = [isinstance(d, Record) and d.reference is not None for d in sets]
+    if reference is True and not all(has):
+        raise InputError(
+            "reference=True, but a record has none; give it to Record(..., reference=...) or "
+            "read(..., reference='column')"
+        )
+    seen, noise = list(sets), list(models)
+    notes: list[str] = []
+    if reference is False:
+        return seen, noise, notes
+    for i, d in enumerate(sets):
+        if not has[i] or not isinstance(d, Record):
+            continue
+        if d.factor > 1:
+            if reference is True:
+                raise InputError(
+                    "reference=True needs an input sampled like the output; decimate the input"
+                )
+            notes.append("the input is faster than the reference, which is not used")
+            continue
+        seen[i], note = through_reference(d, _order(model))
+        notes.append(note)
+        if plain:
+            noise[i] = as_noise_model("noise", seen[i])
+    return seen, noise, notes
+
+
+def _order(model: object) -> int:
+    """States of what is fitted."""
+    if isinstance(model, GreyBox):
+        return len(model.state_space().A)
+    return int(getattr(model, "order", getattr(model, "poles", 1)))
+
+
+def _with_offset(reading: Reading) -> Reading:
+    if not isinstance(reading.data, Record) or reading.in_time or reading.skip_zero:
+        raise InputError(
+            "offset='estimate' needs records, domain='frequency', no initial state at rest, and a "
+            "plant without an integrator, whose line at zero tells nothing"
+        )
+    if reading.band is not None and reading.band.low > 0:
+        raise InputError(
+            f"offset='estimate': band={reading.band} leaves out the line at zero, where an offset "
+            "is; take all lines, or leave the offset out: it does no harm there"
+        )
+    return reading.with_(offset=True)
+
+
+def _offsets(est: Estimate, readings: Sequence[Reading]) -> list[str]:
+    """The offsets that were found, in sentences."""
+    notes = []
+    for number, (r, free) in enumerate(zip(readings, est.minimum.point.initial, strict=True), 1):
+        assert isinstance(r.data, Record)
+        assert free is not None
+        names = r.data.output_names
+        sizes = [f"{n} {x:.4g}" for n, x in zip(names, free[-len(names) :], strict=True)]
+        where = f" in experiment {number}" if len(readings) > 1 else ""
+        notes.append(f"offset estimated{where}: {', '.join(sizes)}")
+    return notes
+
+
+@contextmanager
+def _shown(progress: bool) -> Iterator[None]:
+    """A line on the screen for as long as the work goes on."""
+    if not progress:
+        yield
+        return
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, transient=True) as bar:
+        bar.add_task("fitting", total=None)
+        yield
 
 
 def _noise_models(weights: object, data: object, sets: Sequence[DataSet]) -> list[NoiseModel]:
@@ -131,7 +248,10 @@ def _noise_models(weights: object, data: object, sets: Sequence[DataSet]) -> lis
 
 def _call(model: object, count: int, given: Mapping[str, object]) -> str:
     """The call of ``fit`` as a user would type it, arguments at their defaults left out."""
-    usual = {"initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency"}
+    usual = {
+        "initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency",
+        "reference": "auto", "loss": "linear",
+    }  # fmt: skip
     shown = []
     for name, value in given.items():
         if value is None or (name in usual and isinstance(value, type(usual[name]))
@@ -143,53 +263,3 @@ def _call(model: object, count: int, given: Mapping[str, object]) -> str:
         shown.append(f"{name}={text}")
     data = "data" if count == 1 else f"[{count} data sets]"
     return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"
-
-
-def _noise_weighted(
-    model: object, readings: Sequence[Reading], options: SearchOptions
-) -> tuple[Estimate, Sequence[Reading]]:
-    """Fits in turn with the noise that the one before left; to the maximum of the likelihood.
-
-    The noise is learnt by the data alone: what a prior makes them leave is none.
-    """
-    if any(r.in_time for r in readings):
-        raise InputError("weights='noise' needs domain='frequency' and no initial state at rest")
-    known = isinstance(model, GreyBox) and any(p.prior for p in model.parameters)
-    alone = model.with_prior(**dict.fromkeys(model.values)) if known else model  # type: ignore[attr-defined]
-    work = partial(fitter_of(alone), alone)
-    first = est = work(readings, options)
-    for _ in range(_NOISE_ROUNDS):
-        readings = [_learnt(est, r, options.estimated_hold) for r in readings]
-        before, again = est, _again(est, options)
-        est = work(readings, again)
-        std = np.sqrt(np.diag(est.covariance_matrix))
-        if (np.abs(est.values - before.values) <= _STANDS * std).all():
-            break
-    if known:
-        est = fitter_of(model)(model, readings, _again(est, options))
-    testimony = est.testimony
-    if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
-        testimony = testimony.after(first.testimony)
-    found = dataclasses.replace(
-        est,
-        nominal=first.nominal,
-        n_starts=first.n_starts,
-        n_agreed=first.n_agreed,
-        testimony=testimony,
-    )
-    return found, readings
-
-
-def _again(est: Estimate, options: SearchOptions) -> SearchOptions:
-    """A fit that begins from an estimate; a black box begins by itself."""
-    near = {n: est[n] for n in getattr(est.model, "values", {})}
-    return dataclasses.replace(options, n_starts=1, start=near or None, refit=True)
-
-
-def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:
-    """The reading with the noise that an estimate leaves of it, where that is to be learnt."""
-    if not reading.noise.to_be_learnt:
-        return reading
-    seen = reading.with_(hold=est.hold) if estimated_hold else reading
-    left = errors_of(est.model, seen)
-    return reading.with_(noise=reading.noise.learnt(left.error, left.n_samples))

@@ -31,7 +31,8 @@ class Reading:
     """A data set, the hold that is assumed for it, its band, its noise and its initial state.
 
     ``skip_zero`` leaves out the line at zero, where a plant that integrates answers with anything
-    at all; ``delayed`` keeps a fast input as its alias frequencies, which a delay merely turns.
+    at all; ``delayed`` keeps a fast input as its alias frequencies, which a delay merely turns;
+    ``offset`` adds a constant of unknown size to each output.
     """
 
     data: DataSet
@@ -42,6 +43,7 @@ class Reading:
     domain: Domain = "frequency"
     skip_zero: bool = False
     delayed: bool = False
+    offset: bool = False
 
     @classmethod
     def of(
@@ -127,7 +129,8 @@ class Reading:
             s = s.without_zero()
         weights = self.noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
-        return SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
+        made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
+        return made.with_offsets(s.n_samples) if self.offset else made
 
     def _samples(self, plane: Plane | None) -> TimeExperiment:
         assert isinstance(self.data, Record)

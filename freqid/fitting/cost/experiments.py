@@ -12,7 +12,6 @@ Inverse Problems 19, 2003).
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,21 +19,18 @@ from typing import Protocol
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
+from freqid.checks import FloatArray, IntArray
 from freqid.data import FrequencyResponse
-from freqid.fitting.cost.delays import unknown_inputs
+from freqid.fitting.cost.evaluation import SpectralEvaluation
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf import Spectra
 from freqid.lti import (
-    BandLimited,
     Hold,
     PeriodicHold,
     Plane,
     Realisation,
     on_circle,
     points,
-    sum_runs,
-    transition,
 )
 
 
@@ -74,7 +70,8 @@ class SpectralExperiment:
     ``lift`` inputs of one slow period stand in turn for each input of the plant; a ``discrete``
     model's matrices are taken as they are. ``n_rows`` counts real values. The noise of a
     ``response`` need not be alike at lines that are neighbours, and may go together within the
-    ``reach`` of some lines.
+    ``reach`` of some lines. ``added`` (q, rows) are shapes of unknown size in the output, offsets
+    of the sensor, which are eliminated with the initial state.
     """
 
     lines: Lines
@@ -86,6 +83,7 @@ class SpectralExperiment:
     discrete: bool = False
     response: bool = False
     reach: int = 0
+    added: FloatArray | None = None
 
     @classmethod
     def of(
@@ -141,6 +139,17 @@ class SpectralExperiment:
         made = cls.of(lines, hold, None, plane=plane)
         return dataclasses.replace(made, response=True, reach=frf.reach)
 
+    def with_offsets(self, n_samples: int) -> SpectralExperiment:
+        """The same where a constant of unknown size is added to each output's samples."""
+        zero = self.lines.omega == 0
+        if not zero.any():
+            return self
+        p, channels, K = self.lines.Y.shape
+        unit = np.zeros((p, p, channels, K), complex)
+        unit[np.arange(p), np.arange(p)] = n_samples * self.lines.scale * zero
+        rows = unit.reshape(p, -1).view(float)
+        return dataclasses.replace(self, added=rows)
+
     def in_plane(self, plane: Plane) -> SpectralExperiment:
         """The same lines of a sampled model, in z until now, seen in another plane."""
         return dataclasses.replace(
@@ -195,11 +204,19 @@ class SpectralExperiment:
             lines=self.lines.some(kept, more),
             points=self.points.some(runs(kept, aliases), np.repeat(more, aliases)),
             transient=self.transient and self.transient.some(kept, more),
+            added=self._some_added(kept, more),
         )
+
+    def _some_added(self, kept: IntArray, more: FloatArray) -> FloatArray | None:
+        if self.added is None:
+            return None
+        each = self.added.view(complex).reshape(len(self.added), -1, self.n_lines)
+        some = np.ascontiguousarray((each[..., kept] * more).reshape(len(self.added), -1))
+        return some.view(float)
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
-        return _SpectralEvaluation(self, realisation)
+        return SpectralEvaluation(self, realisation)
 
 
 def thinned_to(
@@ -208,89 +225,3 @@ def thinned_to(
     """About ``count`` lines of all experiments together; the same ones where they are fewer."""
     part = count / max(sum(e.n_lines for e in experiments), 1)
     return [e.thinned(part) for e in experiments] if part <= 0.5 else experiments
-
-
-class _SpectralEvaluation:
-    def __init__(self, experiment: SpectralExperiment, realisation: Realisation) -> None:
-        e, basis = experiment, realisation.basis
-        self.experiment, self.basis, self.delay = e, basis, realisation.delay
-        self.U, self.U_state = e.lines.U, e.points.U
-        # a sampled model's matrices are what they are, whatever made them
-        hold = BandLimited() if e.discrete else e.hold
-        omega = e.lines.omega_input.ravel()
-        self.unknown: ComplexArray | None = None
-        if self.delay is not None:
-            self.plant, late, shifts = realisation.delayed(hold, omega, e.points.z)
-            self.z, self.moving, self.delay = e.points.z, None, realisation.delays
-            self.U, self.U_state = self.U * late[:, None], self.U_state * late[:, None]
-            if e.transient is not None:
-                unit = np.repeat(e.transient.factor / e.transient.z, e.lines.aliases)
-                unit = unit / e.lines.aliases
-                self.unknown = unknown_inputs(self.z, unit, shifts, e.n_rows)
-        else:
-            self.plant, self.z, self.moving = realisation.seen_through(
-                hold, e.lift, omega, e.points.z
-            )
-        self.inverse = self.plant.resolvent(self.z)
-        self.x = self._states(self.U_state)
-        y = sum_runs(self.plant.output(self.x, self.U), e.lines.aliases)
-        self.residual = e.lines.rows(y - e.lines.Y)
-        self.transient: FloatArray | None = None
-        self._w: ComplexArray | None = None
-        # a plant without states has no free motion
-        if e.transient is not None and basis.to_basis.size:
-            self.shared = e.transient.shared and realisation.period is None
-            same = self.shared or e.discrete
-            self.free = self.plant if same else transition(basis, e.transient.dt)
-            self.free_inverse = self.inverse if self.shared else None
-            self._w = self.free.output_rows(e.transient.z, self.free_inverse)
-            # (outputs, states, K) to one column for each physical state
-            seen = sum_runs(self._w * e.transient.factor, e.transient.aliases)
-            columns = np.moveaxis(basis.to_basis.T @ seen, 0, 1)
-            self.transient = e.lines.rows(columns[:, :, None, :])
-            if self.unknown is not None:
-                self._x_unknown = self._states(self.unknown)
-                y = self.plant.output(self._x_unknown, self.unknown)
-                late_rows = e.lines.rows(sum_runs(y, e.lines.aliases).swapaxes(0, 1)[:, :, None])
-                self.transient = np.concatenate([self.transient, late_rows])
-
-    def _states(self, U: ComplexArray) -> ComplexArray:
-        return self.plant.solve(self.z, self.plant.drive(self.z, U), self.inverse)
-
-    def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        rows, t = self.experiment.lines.rows, self.experiment.transient
-        if initial is None or self._w is None or t is None:
-            return rows(self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x))
-        if self.unknown is not None:
-            known = len(initial) - self.unknown.shape[1]
-            return self._with_past(initial[known:]).jacobian(initial[:known])
-        delta = (self.basis.to_basis @ initial)[:, None, None]
-        x_free = self.free.solve(t.z, delta * t.factor, self.free_inverse)
-        if self.shared:
-            return rows(self._forced_change(self._w, self.x + x_free))
-        forced = self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x)
-        return rows(forced + self.free.sensitivity(t.z, self._w, x_free, None, t.aliases))
-
-    def _forced_change(self, w: ComplexArray, x: ComplexArray) -> ComplexArray:
-        e, aliases = self.experiment, self.experiment.lines.aliases
-        dy = self.plant.sensitivity(
-            self.z, w, x, self.U_state, aliases, direct=self.U, moving=self.moving
-        )
-        if self.delay is None or isinstance(e.hold, PeriodicHold):
-            return dy
-        for i, t in enumerate(self.delay):
-            if t.parameter is not None:
-                turned = np.zeros_like(self.U)
-                turned[i] = -1j * e.lines.omega_input.ravel() * t.scale * self.U[i]
-                change = self.plant.output(self._states(turned), turned)
-                dy[t.parameter] += sum_runs(change, aliases)
-        return dy
-
-    def _with_past(self, samples: FloatArray) -> _SpectralEvaluation:
-        """The same with the samples that were not recorded in its input."""
-        assert self.unknown is not None
-        other = copy.copy(self)
-        more = np.einsum("mck,c->mk", self.unknown, samples)[:, None]
-        other.unknown, other.U, other.U_state = None, self.U + more, self.U_state + more
-        other.x = self.x + np.einsum("nck,c->nk", self._x_unknown, samples)[:, None]
-        return other

@@ -33,6 +33,8 @@ class Minimum:
     solution: Solution
     # where the data alone are least, which a prior has moved from
     alone: FloatArray | None = None
+    # how much wider errors that were cut have made the scatter, in variance
+    inflation: float = 1.0
 
     @property
     def structure(self) -> EstimatedStructure:
@@ -119,10 +121,10 @@ class Minimum:
         H = self.determined.inverse
         score = None if self.exact else score_covariance(self.objective, self.x, self.alone)
         if score is None:
-            return self.determined.scatter(self.noise_variance * H)
+            return self.determined.scatter(self.inflation * self.noise_variance * H)
         if self.prior is not None:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
-        return self.determined.scatter(H @ score @ H)
+        return self.determined.scatter(self.inflation * H @ score @ H)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,134 @@
+"""reference=, offset=, loss= and progress= of fit: each cures what it is for, and says so."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+DT = 0.01
+LAG = fq.first_order(b=50.0, a=20.0)
+
+
+def coloured(seed, size, pole):
+    e = np.random.default_rng(seed).standard_normal(size + 500)
+    return scipy.signal.lfilter([np.sqrt(1 - pole**2)], [1, -pole], e)[500:]
+
+
+def in_a_loop(seed, size=4000, feedback=3.0, level=1.5):
+    """A lag under u(k) = r(k) − K y(k), with slow noise on its output."""
+    r = np.random.default_rng(seed).standard_normal(size)
+    v = level * coloured(seed + 50, size, 0.95)
+    phi = np.exp(-20 * DT)
+    gamma = 2.5 * (1 - phi)
+    x, u, y = 0.0, np.zeros(size), np.zeros(size)
+    for k in range(size):
+        y[k] = x + v[k]
+        u[k] = r[k] - feedback * y[k] / 3
+        x = phi * x + gamma * u[k]
+    return fq.Record(u, y, DT, reference=r)
+
+
+def test_a_record_with_a_reference_is_fitted_through_it():
+    gains, through, inside = [], [], []
+    for seed in range(12):
+        record = in_a_loop(seed)
+        est = fq.fit(LAG, record)
+        assert "through the reference" in est.notes[0]
+        row = est.parameters.loc["b"]
+        through.append(est["b"])
+        inside.append(row["lower"] <= 50 <= row["upper"])
+        gains.append(fq.fit(LAG, record, reference=False)["b"])
+    assert abs(np.median(through) - 50) < 3
+    # a direct fit is drawn towards the inverse of the controller
+    assert abs(np.median(gains) - 50) > 8
+    assert sum(inside) >= 9
+
+
+def test_a_direct_fit_in_a_loop_says_so():
+    est = fq.fit(LAG, in_a_loop(3), reference=False)
+    assert not est.notes
+    assert any(w.kind == "feedback" for w in est.warnings)
+    assert est.verdict.grade == "do not use"
+
+
+def test_without_a_reference_none_can_be_asked_for():
+    record = fq.simulate(LAG, fq.white_noise(500), DT)
+    with pytest.raises(ValueError, match="reference=True, but a record has none"):
+        fq.fit(LAG, record, reference=True)
+    with pytest.raises(ValueError, match="reference"):
+        fq.fit(LAG, record, reference="always")
+
+
+@pytest.mark.parametrize("model", [LAG, fq.OutputError(1), fq.TransferFunction(0, 1)])
+def test_an_offset_is_an_unknown(model):
+    clean = fq.simulate(LAG, fq.white_noise(800, seed=1) + 0.3, DT)
+    shifted = fq.Record(clean.u, clean.y + 0.5, DT).slice(1, 7)
+    est = fq.fit(model, shifted, offset="estimate")
+    pole = est.modes()["frequency"][0] * 2 * np.pi
+    assert pole == pytest.approx(20, rel=1e-7)
+    assert "0.5" in est.notes[0]
+    wrong = fq.fit(model, shifted.with_noise(0.05))
+    assert abs(wrong.modes()["frequency"][0] * 2 * np.pi - 20) > 0.1
+
+
+def test_the_offset_of_each_record_and_its_error_bars():
+    hits = []
+    for seed in range(60):
+        records = []
+        for i, size in enumerate((0.5, -2.0)):
+            clean = fq.simulate(LAG, fq.white_noise(300, seed=10 * seed + i) + 0.5, DT)
+            records.append(fq.Record(clean.u, clean.y + size, DT).with_noise(0.1, seed=seed + i))
+        est = fq.fit(LAG, records, offset="estimate")
+        table = est.parameters
+        hits.append((table["lower"] <= [50, 20]) & (table["upper"] >= [50, 20]))
+    assert len(est.notes) == 2
+    # 57 expected; fewer than 51 once in a thousand
+    assert (np.sum(hits, axis=0) >= 51).all()
+
+
+def test_an_offset_needs_the_line_at_zero(plant, slow):
+    with pytest.raises(ValueError, match="line at zero"):
+        fq.fit(LAG, fq.simulate(LAG, fq.white_noise(500), DT), offset="estimate", band=(1, 40))
+    with pytest.raises(ValueError, match="offset"):
+        fq.fit(LAG, fq.simulate(LAG, fq.white_noise(500), DT), offset="known")
+
+
+def spiked(seed, share=0.03):
+    record = fq.simulate(LAG, fq.white_noise(1000, seed=seed), DT).with_noise(0.05, seed=seed)
+    rng = np.random.default_rng(seed + 9)
+    y = np.array(record.y)
+    hit = rng.random(1000) < share
+    y[hit] += 5 * rng.standard_normal(hit.sum())
+    return fq.Record(record.u, y, DT)
+
+
+def test_hubers_loss_forgives_spikes():
+    squares, robust, inside = [], [], []
+    for seed in range(40):
+        record = spiked(seed)
+        est = fq.fit(LAG, record, loss="huber")
+        table = est.parameters
+        robust.append(table["value"] / [50, 20] - 1)
+        squares.append(fq.fit(LAG, record).values / [50, 20] - 1)
+        inside.append((table["lower"] <= [50, 20]) & (table["upper"] >= [50, 20]))
+    assert "Huber" in est.notes[0]
+    assert (np.std(robust, axis=0) < 0.25 * np.std(squares, axis=0)).all()
+    assert (np.sum(inside, axis=0) >= 34).all()
+
+
+def test_hubers_loss_costs_little_where_nothing_is_wrong():
+    record = fq.simulate(LAG, fq.white_noise(2000, seed=4), DT).with_noise(0.1, seed=4)
+    plain, robust = fq.fit(LAG, record), fq.fit(LAG, record, loss="huber")
+    ratio = robust.parameters["std"] / plain.parameters["std"]
+    # 1/0.964 in variance for a cut at 1.5 standard deviations
+    assert ratio.to_numpy() == pytest.approx([1.02, 1.02], abs=0.04)
+    with pytest.raises(ValueError, match="needs all lines"):
+        fq.fit(LAG, record, loss="huber", band=(1, 20))
+    with pytest.raises(ValueError, match="loss"):
+        fq.fit(LAG, record, loss="cauchy")
+
+
+def test_progress_is_shown_and_changes_nothing(capsys):
+    record = fq.simulate(LAG, fq.white_noise(300), DT).with_noise(0.1)
+    assert np.array_equal(fq.fit(LAG, record, progress=True).values, fq.fit(LAG, record).values)
