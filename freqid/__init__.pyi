@@ -21,6 +21,7 @@ from .bias import (
 )
 from .data import (
     FrequencyResponse as FrequencyResponse,
+    PeriodicResponse as PeriodicResponse,
     Record as Record,
     check_record as check_record,
     read as read,
@@ -50,6 +51,7 @@ from .frf import (
     hv as hv,
     local_polynomial as local_polynomial,
     local_rational as local_rational,
+    periodic as periodic,
 )
 from .lti import (
     BandLimited as BandLimited,

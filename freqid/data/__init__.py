@@ -15,6 +15,7 @@ from freqid.data.data_set import (
 from freqid.data.files import read, whole_file, write
 from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.quality import check_record
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of

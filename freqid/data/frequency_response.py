@@ -85,8 +85,8 @@ class FrequencyResponse:
             raise InputError(f"dt={dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape
         self.__dict__.update(
-            frequency=_frozen(f),
-            response=_frozen(G),
+            frequency=frozen(f),
+            response=frozen(G),
             dt=dt,
             hold=hold,
             variance=_shaped("variance", variance, G.shape),
@@ -198,7 +198,7 @@ class FrequencyResponse:
         p, m, K = self.response.shape
         f = self.frequency
         kind = f"dt={self.dt:g} s" if self.dt else "continuous"
-        return f"<FrequencyResponse {p}x{m}: {K} lines, {f[0]:g}-{f[-1]:g} Hz, {kind}>"
+        return f"<{type(self).__name__} {p}x{m}: {K} lines, {f[0]:g}-{f[-1]:g} Hz, {kind}>"
 
     def _repr_html_(self) -> str:
         return f"<p>{escape(repr(self)[1:-1])}</p>" + self.to_frame().head(8).to_html(index=False)
@@ -211,9 +211,9 @@ def _shaped(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> Floa
     array = np.array(values, dtype=float)
     if array.size != np.prod(shape):
         raise InputError(f"{name} has shape {array.shape}; expected {shape}")
-    return _frozen(array.reshape(shape))
+    return frozen(array.reshape(shape))
 
 
-def _frozen(array: Array) -> Array:
+def frozen(array: Array) -> Array:
     array.flags.writeable = False
     return array

@@ -10,10 +10,20 @@ from typing import Literal
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import Band, DataSet, FrequencyResponse, Record, as_band, channel_counts, input_dt
+from freqid.data import (
+    Band,
+    DataSet,
+    FrequencyResponse,
+    PeriodicResponse,
+    Record,
+    as_band,
+    channel_counts,
+    input_dt,
+)
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
-from freqid.fitting.noise_models import BiasIntegral, NoiseModel
+from freqid.fitting.noise_models import BiasIntegral, GivenWeights, NoiseModel, ResponseNoise
 from freqid.frf import spectra
 from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold, as_hold
 
@@ -82,8 +92,16 @@ class Reading:
             self.domain == "time" or self.initial_state == "zero"
         )
 
+    @property
+    def own_cost(self) -> bool:
+        """Whether the cost is another than that of lines: of samples, or of noise on both ends."""
+        periodic = isinstance(self.data, PeriodicResponse)
+        return self.in_time or (periodic and not isinstance(self.noise, GivenWeights))
+
     def at_lines(self) -> Reading:
         """The same data at their lines, the initial state free where it was at rest."""
+        if self.own_cost and isinstance(self.data, PeriodicResponse):
+            return dataclasses.replace(self, data=self.data.plain(), noise=ResponseNoise())
         state: InitialState = "steady" if self.initial_state == "steady" else "estimate"
         return dataclasses.replace(self, domain="frequency", initial_state=state)
 
@@ -101,6 +119,9 @@ class Reading:
         """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
         if self.in_time:
             return self._samples(plane)
+        if self.own_cost and isinstance(self.data, PeriodicResponse):
+            data = self.data if self.band is None else self.data.select(self.band)
+            return PeriodicExperiment(data, self.hold, plane is not None)
         return self.lines(plane)
 
     def lines(self, plane: Plane | None = None) -> SpectralExperiment:

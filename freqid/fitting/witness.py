@@ -144,7 +144,7 @@ class Testimony:
     def _grey(self, structure: GreyStructure, readings: Sequence[Reading]) -> Solution:
         """The estimate's minimum on the lines, without what was known before."""
         late = structure is not self.minimum.structure
-        if self.minimum.prior is None and not late and not any(r.in_time for r in self.readings):
+        if self.minimum.prior is None and not late and not any(r.own_cost for r in self.readings):
             return self.minimum.solution
         begin = structure.start if late else self.minimum.x
         return polish(Objective(structure, [r.lines() for r in readings]), begin)

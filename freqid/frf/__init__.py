@@ -4,7 +4,8 @@ It may import what stands below it: checks, lti, data, excitation and models.
 """
 
 from freqid.frf.averaged import h1, h2, hv
+from freqid.frf.distortions import distortion
 from freqid.frf.empirical import etfe
 from freqid.frf.local_models import local_polynomial, local_rational
-from freqid.frf.periodic import distortion
+from freqid.frf.means import periodic
 from freqid.frf.spectra import Spectra, spectra

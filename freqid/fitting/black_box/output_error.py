@@ -54,7 +54,7 @@ def fit_output_error(
     more, seed = (options.n_starts or 1, options.seed) if options else (1, 0)
     told_apart(lines)
     chart, solution, objective = _nested(spec, lines, plane, dt, more - 1, seed)
-    if first.in_time:
+    if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
         at = chart.in_z(solution.x)

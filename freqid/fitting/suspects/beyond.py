@@ -116,7 +116,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     """A black box with one mode more, which may lie at any of the lines."""
     if not isinstance(inquiry.model, GreyBox) or inquiry.model.delay_sources:
         return []
-    if any(r.in_time for r in inquiry.readings) or inquiry.minimum.prior is not None:
+    if any(r.own_cost for r in inquiry.readings) or inquiry.minimum.prior is not None:
         return []
     readings = [r.at_lines() for r in inquiry.readings]
     order = len(inquiry.model.state_space().A) + 2

@@ -90,12 +90,12 @@ class Scene:
         structure = minimum.structure
         chart = structure if isinstance(structure, Chart) else None
         x, seen = minimum.x, []
-        if chart is not None and any(r.in_time for r in readings):
+        if chart is not None and any(r.own_cost for r in readings):
             raise InputError("a black box fitted to samples leaves no lines")
         at_lines = [r.at_lines().with_(delayed=chart is None) for r in readings]
         if chart is None:
             experiments = [r.lines() for r in at_lines]
-            if any(r.in_time for r in readings):
+            if any(r.own_cost for r in readings):
                 x = polish(Objective(structure, experiments), x).x
         else:
             experiments = [r.lines(Plane()).in_plane(chart.plane) for r in at_lines]

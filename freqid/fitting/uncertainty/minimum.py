@@ -121,7 +121,10 @@ class Minimum:
         H = self.determined.inverse
         score = None if self.exact else score_covariance(self.objective, self.x, self.alone)
         if score is None:
-            return self.determined.scatter(self.inflation * self.noise_variance * H)
+            wider = [getattr(e, "inflation", 1.0) for e in self.experiments]
+            return self.determined.scatter(
+                self.inflation * float(np.mean(wider)) * self.noise_variance * H
+            )
         if self.prior is not None:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
         return self.determined.scatter(self.inflation * H @ score @ H)

@@ -1,0 +1,81 @@
+"""PeriodicResponse: the response of periodic data, with what its noise does to both of its ends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import ComplexArray, InputError, whole
+from freqid.data.frequency_response import FrequencyResponse, frozen
+
+
+class PeriodicResponse(FrequencyResponse):
+    """A FrequencyResponse that also keeps the means it was made of.
+
+    Attributes:
+        inputs, outputs: mean spectra at the excited lines, (inputs, E, K) and (outputs, E, K), of E
+            experiments.
+        noise: covariance of these means, outputs first, (E, K, outputs + inputs, the same).
+        freedom: degrees of freedom of that.
+
+    The other arguments are as in ``FrequencyResponse``. A ``fit`` to it is the sample maximum likelihood (Pintelon and Schoukens, System Identification,
+    2012, section 9.11). Made by ``periodic``.
+    """
+
+    inputs: ComplexArray
+    outputs: ComplexArray
+    noise: ComplexArray
+    freedom: int
+
+    def __init__(
+        self,
+        frequency: Any,
+        response: Any,
+        dt: float = 0.0,
+        hold: Any = None,
+        variance: Any = None,
+        coherence: Any = None,
+        input_spectrum: Any = None,
+        input_names: Any = None,
+        output_names: Any = None,
+        reach: int = 0,
+        inputs: Any = None,
+        outputs: Any = None,
+        noise: Any = None,
+        freedom: int = 0,
+    ) -> None:
+        super().__init__(
+            frequency, response, dt, hold, variance, coherence, input_spectrum, input_names,
+            output_names, reach,
+        )  # fmt: skip
+        p, m, K = self.response.shape
+        U, Y = np.array(inputs, dtype=complex), np.array(outputs, dtype=complex)
+        C = np.array(noise, dtype=complex)
+        E = U.shape[1] if U.ndim == 3 else 0
+        for name, given, shape in (
+            ("inputs", U, (m, E, K)), ("outputs", Y, (p, E, K)), ("noise", C, (E, K, p + m, p + m)),
+        ):  # fmt: skip
+            if given.shape != shape:
+                raise InputError(f"{name} has shape {given.shape}; expected {shape}")
+            if not np.isfinite(given).all():
+                raise InputError(f"{name} must be finite")
+        self.__dict__.update(
+            inputs=frozen(U), outputs=frozen(Y), noise=frozen(C),
+            freedom=whole("freedom", freedom),
+        )  # fmt: skip
+
+    def select(self, limits: tuple[float, float]) -> PeriodicResponse:
+        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
+        kept = self.plain().select(limits)
+        at = np.isin(self.frequency, kept.frequency)
+        more: dict[str, Any] = {
+            "inputs": self.inputs[..., at], "outputs": self.outputs[..., at],
+            "noise": self.noise[:, at], "freedom": self.freedom,
+        }  # fmt: skip
+        return PeriodicResponse(**kept.__dict__, **more)
+
+    def plain(self) -> FrequencyResponse:
+        """The response alone, its means and their noise left out."""
+        own = ("inputs", "outputs", "noise", "freedom")
+        return FrequencyResponse(**{k: v for k, v in self.__dict__.items() if k not in own})

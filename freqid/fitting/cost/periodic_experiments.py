@@ -1,0 +1,109 @@
+"""Periodic data as residuals: the sample maximum likelihood with noise on both ends.
+
+V(θ) = Σ_k eᴴ C⁻¹ e with e = Y − G U and C = C_Y + G C_U Gᴴ − 2 herm(G C_UY), the means' own sample
+covariance (Pintelon and Schoukens, System Identification, 2012, section 9.11). C moves with θ; the
+Jacobian L⁻¹ (de − ½ dC C⁻¹ e), C = L Lᴴ, has the gradient of V exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.data import PeriodicResponse
+from freqid.fitting.cost.experiments import Evaluation
+from freqid.lti import (
+    BandLimited,
+    Hold,
+    Realisation,
+    on_circle,
+    response_and_derivatives,
+    sampled_response,
+)
+
+# so small a part of the largest variance is no variance
+_FLOOR = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicExperiment:
+    """Means over periods against a model; ``discrete`` matrices are taken as they are."""
+
+    data: PeriodicResponse
+    hold: Hold
+    discrete: bool = False
+
+    @property
+    def n_rows(self) -> int:
+        """Real values."""
+        return 2 * self.data.outputs.size
+
+    @property
+    def inflation(self) -> float:
+        """How much more the estimate scatters than its weights say: they are estimates, too."""
+        freedom = self.data.freedom
+        return (freedom - 1) / (freedom - 2) if freedom > 2 else np.inf
+
+    @property
+    def energy(self) -> float:
+        """The cost of a model that is zero."""
+        p, m, K = self.data.response.shape
+        rows = _Evaluation(self, np.zeros((p, m, K), complex), None).residual
+        return float(rows @ rows)
+
+    def at(self, realisation: Realisation) -> Evaluation:
+        """Evaluate at one trial point."""
+        omega = self.data.omega
+        if self.discrete:
+            plant = realisation.basis.through(BandLimited())
+            G, dG = response_and_derivatives(plant, on_circle(omega * self.data.dt))
+        else:
+            G, dG = sampled_response(realisation, omega, self.hold)
+        return _Evaluation(self, G, dG)
+
+
+class _Evaluation:
+    transient: FloatArray | None = None
+
+    def __init__(
+        self, experiment: PeriodicExperiment, G: ComplexArray, dG: ComplexArray | None
+    ) -> None:
+        data, p = experiment.data, len(G)
+        self.G = np.moveaxis(G, -1, 0)  # (K, p, m)
+        self.dG = None if dG is None else np.moveaxis(dG, -1, 1)  # (P, K, p, m)
+        self.U, Y = (np.moveaxis(X, 0, -1) for X in (data.inputs, data.outputs))  # (E, K, ch)
+        C = data.noise
+        self.C_U, self.C_UY = C[..., p:, p:], C[..., p:, :p]
+        Gh = self.G.conj().swapaxes(-1, -2)
+        cross = self.G @ self.C_UY
+        total = C[..., :p, :p] + self.G @ self.C_U @ Gh - cross - cross.conj().swapaxes(-1, -2)
+        total = (total + total.conj().swapaxes(-1, -2)) / 2
+        size = np.einsum("ekaa->eka", total).real
+        floor = _FLOOR * max(float(size.max(initial=0)), 1e-300)
+        L = np.linalg.cholesky(total + floor * np.eye(p))
+        self.inverse = np.linalg.inv(L)  # (E, K, p, p)
+        self.error = np.einsum("kpm,ekm->ekp", self.G, self.U) - Y
+        self.residual = self._rows(np.einsum("ekab,ekb->eka", self.inverse, self.error))
+
+    def _rows(self, values: ComplexArray) -> FloatArray:
+        """(…, E, K, p) as real rows."""
+        return np.ascontiguousarray(values.reshape(*values.shape[:-3], -1)).view(float)
+
+    def jacobian(self, initial: FloatArray | None) -> FloatArray:
+        """Derivative of the residual by each parameter, (P, rows)."""
+        assert self.dG is not None
+        weighted = np.einsum("ekba,ekb->eka", self.inverse.conj(), self._scaled())
+        rows = []
+        for dG in self.dG:
+            change = np.einsum("kpm,ekm->ekp", dG, self.U)
+            half = dG @ self.C_U @ self.G.conj().swapaxes(-1, -2) - dG @ self.C_UY
+            dC = half + half.conj().swapaxes(-1, -2)
+            moved = change - 0.5 * np.einsum("ekab,ekb->eka", dC, weighted)
+            rows.append(self._rows(np.einsum("ekab,ekb->eka", self.inverse, moved)))
+        return np.array(rows)
+
+    def _scaled(self) -> ComplexArray:
+        scaled: ComplexArray = np.einsum("ekab,ekb->eka", self.inverse, self.error)
+        return scaled

@@ -1,0 +1,199 @@
+"""Periodic data with noise on both ends: means over the periods, and the covariance of these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.fft
+import scipy.ndimage
+
+from freqid.checks import ComplexArray, FloatArray, InputError, steps, whole
+from freqid.data import (
+    PeriodicResponse,
+    Record,
+    Reference,
+    as_band,
+    as_records,
+    chosen,
+    references_of,
+)
+
+# part of the strongest line's amplitude below which a line is not excited
+_SILENT = 1e-3
+# a lag at which a signal repeats itself so well is a period
+_REPEATS = 0.9
+# degrees of freedom that a covariance should have; lines around one are taken for it until it does
+_FREEDOM = 14
+# amplitude of a line in standard errors of its noise from which it is excited for certain
+_CERTAIN = 4.0
+
+
+def periodic(
+    records: Record | Sequence[Record],
+    period: float | None = None,
+    reference: Reference | None = None,
+    *,
+    skip: int = 0,
+    band: tuple[float, float] | None = None,
+) -> PeriodicResponse:
+    """Response of periodic data with noise on inputs and outputs, in open or closed loop.
+
+    Means over the periods are taken before any ratio, so that noise on the input leaves no bias but
+    that of its mean, and the full covariance of inputs and outputs goes with them: ``fit`` makes
+    the sample maximum likelihood of it, which has none.
+
+    Args:
+        records: experiments of whole periods, each with an excitation of its own; as many as inputs
+            or more.
+        period: in s, a whole number of samples; None finds it in the reference, or in the input.
+        reference: the excitation, where a loop or noise hides it, as in ``h1``: it tells the
+            period and the excited lines. None takes the records' own where all have one.
+        skip: periods left out at the start, while the transient dies.
+        band: in Hz, None for all excited lines.
+
+    Returns a PeriodicResponse (outputs, inputs, K) at the excited lines with variance, ``inputs``,
+    ``outputs`` (channels, experiments, K) and their ``noise``. Raises ValueError for fewer than two
+    periods, a period that is not one, or fewer experiments than inputs.
+
+    Source: Pintelon and Schoukens, System Identification, 2012, sections 2.5, 2.7 and 9.11.
+
+    >>> import freqid as fq
+    >>> u = fq.multisine((1, 50), 1, 1e-3, periods=9)
+    >>> record = fq.simulate(fq.first_order(), u, 1e-3, hold="bl").with_noise(0.01)
+    >>> periodic(record, period=1.0, skip=1)
+    <PeriodicResponse 1x1: 50 lines, 1-50 Hz, dt=0.001 s>
+    """
+    sets = as_records(records)
+    first = sets[0]
+    if first.factor > 1:
+        raise InputError("records have an input faster than the output; decimate the input first")
+    if reference is None and all(r.reference is not None for r in sets):
+        reference = True
+    signals = references_of(sets, reference)
+    n = _samples(sets, signals, period)
+    skip = whole("skip", skip, least=0)
+    counts = [r.n_samples // n - skip for r in sets]
+    if min(counts) < 2:
+        raise InputError(
+            f"records hold {min(counts) + skip} periods of {n * first.dt:g} s, {skip} of them "
+            "skipped; two are needed to tell the noise"
+        )
+    if len(sets) < first.n_inputs:
+        raise InputError(
+            f"{len(sets)} experiments for {first.n_inputs} inputs; as many are needed, each with "
+            "an excitation of its own"
+        )
+    P = min(counts)
+    Z = np.stack([_spectra(r, n, skip, P) for r in sets])  # (E, P, channels, lines)
+    f = np.arange(Z.shape[-1]) / (n * first.dt)
+    inside = chosen(f, as_band(band, first.nyquist), positive=True)
+    # the line at Nyquist has no phase
+    inside &= 2 * np.arange(len(f)) < n
+    excited = inside & _excited(sets, signals, Z, n, skip, P)
+    if not excited.any():
+        raise InputError(f"input has no energy in band={band}; widen it")
+    mean, noise, freedom = _means(Z[..., excited], first.n_outputs)
+    return _packed(first, f[excited], mean, noise, freedom)
+
+
+def _samples(
+    sets: Sequence[Record], signals: Sequence[FloatArray] | None, period: float | None
+) -> int:
+    """Samples of a period, given or found; ValueError where there is none."""
+    first = sets[0]
+    if period is not None:
+        return steps("period", period, first.dt, least=2)
+    x = (first.inputs if signals is None else signals[0])[:, 0]
+    x = x - x.mean()
+    N = len(x)
+    size = scipy.fft.next_fast_len(2 * N)
+    r = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, size)) ** 2, size)[: N // 2 + 1]
+    # energies of the two parts that a lag compares
+    energy = np.cumsum(x**2)
+    lags = np.arange(1, len(r))
+    early, late = energy[N - 1 - lags], energy[-1] - energy[lags - 1]
+    alike = np.concatenate([[1.0], r[1:] / np.sqrt(np.maximum(early * late, 1e-300))])
+    # beyond the first fall, so that a smooth signal is no period of one sample
+    fallen = np.flatnonzero(alike < 0.5)
+    found = np.flatnonzero(alike > _REPEATS)
+    found = found[found > (fallen[0] if len(fallen) else len(r))]
+    if not len(found):
+        raise InputError("the excitation does not repeat itself; give period= in s")
+    near = found[found <= found[0] * 1.05 + 2]
+    return int(near[np.argmax(alike[near])])
+
+
+def _spectra(record: Record, n: int, skip: int, periods: int) -> ComplexArray:
+    """DFT of each period (P, outputs + inputs, lines), scaled to amplitudes."""
+    both = np.column_stack([record.outputs, record.inputs])
+    kept = both[skip * n : (skip + periods) * n].reshape(periods, n, -1)
+    return np.moveaxis(scipy.fft.rfft(kept, axis=1), 1, -1) * 2 / n
+
+
+def _excited(
+    sets: Sequence[Record],
+    signals: Sequence[FloatArray] | None,
+    Z: ComplexArray,
+    n: int,
+    skip: int,
+    P: int,
+) -> FloatArray:
+    """Which lines the excitation drives, (lines,)."""
+    if signals is not None:
+        kept = [s[skip * n : (skip + P) * n].reshape(P, n, -1).mean(axis=0) for s in signals]
+        power = sum((np.abs(scipy.fft.rfft(k, axis=0)) ** 2).sum(axis=1) for k in kept)
+        level = np.sqrt(np.asarray(power))
+        return level > _SILENT * level.max()
+    U = Z[:, :, sets[0].n_outputs :]
+    level = np.abs(U.mean(axis=1)).max(axis=(0, 1))
+    # few periods tell the noise of one line badly: those beside it have as much
+    around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, _FREEDOM + 1, axis=-1)
+    noise = np.sqrt(around.max(axis=(0, 1)))
+    # a line that noise alone could have made is none
+    return (level > _SILENT * level.max()) & (level > _CERTAIN * noise)
+
+
+def _means(Z: ComplexArray, p: int) -> tuple[ComplexArray, ComplexArray, int]:
+    """Means (E, channels, K), their covariance (E, K, channels, channels) and its freedom.
+
+    With few periods lines beside one lend it their noise, which is as smooth as theirs.
+    """
+    P, K = Z.shape[1], Z.shape[-1]
+    mean = Z.mean(axis=1)
+    left = Z - mean[:, None]
+    C = np.einsum("epak,epbk->ekab", left, left.conj()) / (P - 1) / P
+    width = min(-(-_FREEDOM // (P - 1)), K) | 1
+    if width > 1:
+        width = min(width, K if K % 2 else K - 1)
+        C = scipy.ndimage.uniform_filter1d(C.real, width, axis=1, mode="reflect") + (
+            1j * scipy.ndimage.uniform_filter1d(C.imag, width, axis=1, mode="reflect")
+        )
+    return mean, C, (P - 1) * max(width, 1)
+
+
+def _packed(
+    first: Record, f: FloatArray, mean: ComplexArray, C: ComplexArray, freedom: int
+) -> PeriodicResponse:
+    p = first.n_outputs
+    Y, U = np.moveaxis(mean[:, :p], 0, 1), np.moveaxis(mean[:, p:], 0, 1)  # (channels, E, K)
+    Uk, Yk = np.moveaxis(U, -1, 0), np.moveaxis(Y, -1, 0)
+    size = np.linalg.svd(Uk, compute_uv=False)
+    if (size[:, -1] <= 1e-9 * size[:, 0]).any():
+        raise InputError(
+            "the inputs of the experiments depend on one another, so that their effects cannot be "
+            "told apart; use an excitation of its own in each"
+        )
+    back = np.linalg.pinv(Uk)  # (K, E, m)
+    G = Yk @ back
+    # δG = (δY − G δU) U⁺ to first order
+    both = np.concatenate([np.broadcast_to(np.eye(p), (len(f), p, p)), -G], axis=2)
+    each = np.einsum("kac,ekcd,kad->eka", both, C, both.conj()).real  # (E, K, p)
+    variance = np.einsum("eka,kem->kam", each, np.abs(back) ** 2)
+    return PeriodicResponse(
+        f, np.moveaxis(G, 0, -1), dt=first.dt, hold=first.hold,
+        variance=np.moveaxis(variance, 0, -1),
+        input_spectrum=(np.abs(U) ** 2).mean(axis=1),
+        input_names=first.input_names, output_names=first.output_names,
+        inputs=U, outputs=Y, noise=C, freedom=freedom,
+    )  # fmt: skip

@@ -1,0 +1,148 @@
+"""Periodic data with noise on both ends: means, their covariance, and the fit to them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+DT = 2e-3
+LAG = fq.first_order(b=100.0, a=60.0)
+PERIOD = fq.multisine((1, 60), 1, DT, 1, seed=1)
+
+
+def measured(seed, periods, level=0.1, plant=LAG):
+    """A lag behind a multisine, noise at 20 dB on both ends, partly common to them."""
+    u = np.tile(PERIOD, periods + 1)
+    y = fq.simulate(plant, u, DT, hold="bl").y
+    rng = np.random.default_rng(seed)
+    own, common = rng.standard_normal((2, len(u))), rng.standard_normal(len(u))
+    noisy = [
+        x + level * x.std() * (0.8 * e + 0.6 * common) for x, e in zip((u, y), own, strict=True)
+    ]
+    return fq.Record(*noisy, DT, hold="bl")
+
+
+@pytest.mark.parametrize("periods", [4, 8])
+def test_noise_on_the_input_leaves_no_bias_and_honest_error_bars(periods):
+    off, score, costs = [], [], []
+    for seed in range(120):
+        est = fq.fit(LAG, fq.periodic(measured(seed, periods), 1.0, skip=1))
+        table = est.parameters
+        off.append(table["value"] / [100, 60] - 1)
+        score.append((table["value"] - [100, 60]) / table["std"])
+        costs.append(est.cost / (2 * 60 - 2))
+    mean, spread = np.mean(off, axis=0), np.std(off, axis=0) / np.sqrt(len(off))
+    assert (np.abs(mean) < np.maximum(6e-4, 3.5 * spread)).all()
+    assert np.std(score, axis=0) == pytest.approx([1, 1], abs=0.2)
+    freedom = fq.periodic(measured(0, periods), 1.0, skip=1).freedom
+    # variances that are estimates themselves raise the cost by ν/(ν − 1)
+    assert np.mean(costs) == pytest.approx(0.5 * freedom / (freedom - 1), rel=0.04)
+
+
+def test_h1_of_the_same_data_is_biased():
+    gains = []
+    for seed in range(20):
+        record = measured(seed, 8, level=0.3)
+        h1 = fq.h1(record.slice(1), 500, window="boxcar", band=(1, 60))
+        both = [fq.fit(LAG, frf)["b"] / 100 for frf in (h1, fq.periodic(record, 1.0, skip=1))]
+        gains.append(both)
+    assert np.mean(gains, axis=0)[0] < 0.985
+    assert abs(np.mean(gains, axis=0)[1] - 1) < 0.01
+
+
+def test_the_jacobian_is_that_of_the_cost():
+    from freqid.fitting.cost.objective import Objective
+    from freqid.fitting.cost.structures import GreyStructure
+    from freqid.fitting.reading import Reading
+
+    structure = GreyStructure(LAG)
+    objective = Objective(structure, [Reading.of(fq.periodic(measured(1, 4), 1.0)).experiment()])
+    x = np.array([1.1, 0.85])
+    for k in range(2):
+        step = np.zeros(2)
+        step[k] = 1e-6
+        ends = [objective.point(x + s * step).cost for s in (1, -1)]
+        point = objective.point(x)
+        gradient = 2 * point.jacobian[:, k] @ point.residual
+        assert gradient == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5)
+
+
+def two_by_two():
+    def matrices(a, b, c, k):
+        return [[-a, c], [0.0, -b]], [[k, 0.0], [0.3 * k, 80.0]], np.eye(2), np.zeros((2, 2))
+
+    names = {"a": 40.0, "b": 90.0, "c": 20.0, "k": 60.0}
+    return fq.GreyBox(matrices, [fq.Parameter(n, v) for n, v in names.items()])
+
+
+def test_two_inputs_in_as_many_experiments():
+    model, off = two_by_two(), []
+    rng = np.random.default_rng(5)
+    for _seed in range(10):
+        records = []
+        for e in range(2):
+            each = [fq.multisine((1, 60), 1, DT, 1, "random", seed=4 * e + i) for i in range(2)]
+            u = np.tile(np.column_stack(each), (7, 1))
+            y = fq.simulate(model, u, DT, hold="bl").y
+            u = u + 0.1 * u.std() * rng.standard_normal(u.shape)
+            y = y + 0.1 * y.std(axis=0) * rng.standard_normal(y.shape)
+            records.append(fq.Record(u, y, DT, hold="bl"))
+        frf = fq.periodic(records, 1.0, skip=1)
+        assert frf.response.shape == (2, 2, 60)
+        est = fq.fit(model, frf)
+        off.append((est.values / [40, 90, 20, 60] - 1) / (est.parameters["std"] / est.values))
+    assert np.abs(np.mean(off, axis=0)).max() < 1.5
+    assert np.std(off) < 1.6
+    with pytest.raises(ValueError, match="1 experiments for 2 inputs"):
+        fq.periodic(records[0], 1.0)
+
+
+def in_a_loop(seed, periods=9):
+    """The lag under u = r − y with slow noise in the loop."""
+    r = np.tile(PERIOD, periods)
+    rng = np.random.default_rng(seed)
+    v = 0.0
+    phi = np.exp(-60 * DT)
+    gamma = 100 / 60 * (1 - phi)
+    x, u, y = 0.0, np.zeros(len(r)), np.zeros(len(r))
+    for k in range(len(r)):
+        v = 0.95 * v + 0.1 * rng.standard_normal()
+        y[k] = x + v
+        u[k] = r[k] - y[k]
+        x = phi * x + gamma * u[k]
+    return fq.Record(u, y, DT, reference=r)
+
+
+def test_a_loop_does_no_harm():
+    values = [fq.fit(LAG, fq.periodic(in_a_loop(s), 1.0, skip=1)).values for s in range(30)]
+    spread = np.std(values, axis=0) / np.sqrt(30)
+    assert (np.abs(np.mean(values, axis=0) - [100, 60]) < 3.5 * spread + 0.3).all()
+
+
+def test_the_period_is_found():
+    record = measured(3, 6)
+    assert fq.periodic(record).frequency[0] == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="does not repeat"):
+        fq.periodic(fq.simulate(LAG, fq.white_noise(3000), DT))
+
+
+def test_what_has_no_noise_to_tell_is_refused():
+    with pytest.raises(ValueError, match="two are needed"):
+        fq.periodic(measured(0, 1).slice(0, 1.0), 1.0)
+    with pytest.raises(ValueError, match="period"):
+        fq.periodic(measured(0, 3), 0.0015)
+    frf = fq.periodic(measured(0, 4), 1.0)
+    with pytest.raises(ValueError, match="noise has shape"):
+        fq.PeriodicResponse(**{**frf.__dict__, "noise": frf.noise[:, :3]})
+
+
+def test_black_boxes_and_bands_take_it_too():
+    frf = fq.periodic(measured(2, 8), 1.0, skip=1)
+    assert fq.fit(fq.TransferFunction(0, 1), frf).model.poles.real == pytest.approx([-60], rel=0.05)
+    held = dataclasses.replace(frf.plain(), hold=fq.ZeroOrderHold(DT))
+    assert fq.fit(fq.OutputError(1), held).converged
+    part = fq.fit(LAG, frf, band=(5, 40))
+    assert part["a"] == pytest.approx(60, rel=0.05)
+    assert fq.fit(LAG, frf, weights="noise")["a"] == fq.fit(LAG, frf)["a"]
