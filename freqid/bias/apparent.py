@@ -20,7 +20,16 @@ from numpy.typing import ArrayLike
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
 from freqid.data import FrequencyResponse, fold, low_pass_gain, merged_lines, unfold
 from freqid.excitation import InputSpectrum, power_gain
-from freqid.lti import Hold, PeriodicHold, StateSpace, ZeroOrderHold, basis_of, points, transfer
+from freqid.lti import (
+    Hold,
+    PeriodicHold,
+    StateSpace,
+    ZeroOrderHold,
+    basis_of,
+    known_hold,
+    points,
+    transfer,
+)
 from freqid.models import Model, ModelLike, as_model
 
 
@@ -44,11 +53,7 @@ class Sampling:
         """From the sample time ``dt`` (s) that is kept; ValueError where the rates do not fit."""
         positive("dt", dt, "s")
         hold = ZeroOrderHold(base_dt or dt) if true_hold is None else true_hold
-        if not isinstance(hold, Hold):
-            raise InputError(
-                f"true_hold={true_hold!r} is not a hold; give ZeroOrderHold(period), "
-                "FirstOrderHold(period) or BandLimited()"
-            )
+        known_hold("true_hold", hold)
         if base_dt is None:
             base_dt = hold.period if isinstance(hold, PeriodicHold) else dt
         ratio = dt / positive("base_dt", base_dt, "s")

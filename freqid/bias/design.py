@@ -16,7 +16,7 @@ from freqid.checks import FloatArray, InputError, choice, positive, whole
 from freqid.data import Band
 from freqid.excitation import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
 from freqid.fitting import GreyStructure
-from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, sampled_response
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold, sampled_response
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ def experiment_design(
     choice("criterion", criterion, ("worst", "rms"))
     counts = [whole("factors", f) for f in factors]
     hold = ZeroOrderHold(base_dt) if true_hold is None else true_hold
+    known_hold("true_hold", hold)
     grid = (
         _bands(plant, base_dt)
         if bands is None

@@ -17,7 +17,7 @@ from freqid.bias.map_store import MapStore
 from freqid.bias.progress import Bar
 from freqid.checks import Array, InputError, whole
 from freqid.excitation import ChirpSpectrum, InputSpectrum
-from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
@@ -139,6 +139,7 @@ def _asked(
         if base_dt is None:
             raise InputError("base_dt is missing; give the sample time of the input in s")
         true_hold = ZeroOrderHold(base_dt)
+    known_hold("true_hold", true_hold)
     if base_dt is None:
         if not isinstance(true_hold, PeriodicHold):
             raise InputError(

@@ -76,6 +76,21 @@ def low_pass(x: FloatArray, factor: int, faster: int = 1) -> FloatArray:
     return filtered
 
 
+def power_above(x: FloatArray, factor: int) -> float:
+    """Part of the power of signals (N,) or (N, channels) above the Nyquist limit of every
+    ``factor``-th sample; of the signal of which it is the largest.
+    """
+    if factor == 1:
+        return 0.0
+    flat = x.reshape(len(x), -1)
+    # a window, so that a record's ends do not look like high frequencies
+    window = scipy.signal.get_window("hann", len(x))[:, None]
+    power = np.abs(np.fft.rfft((flat - flat.mean(axis=0)) * window, axis=0)) ** 2
+    above = power[len(power) // factor + 1 :].sum(axis=0)
+    total = power.sum(axis=0)
+    return float(np.max(above / np.where(total > 0, total, np.inf)))
+
+
 def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:
     """What ``low_pass`` multiplies a sinusoid at ``frequency`` (Hz) by, sampled at ``dt`` (s)."""
     f = np.asarray(frequency, dtype=float)

@@ -19,8 +19,9 @@ class PeriodicResponse(FrequencyResponse):
         noise: covariance of these means, outputs first, (E, K, outputs + inputs, the same).
         freedom: degrees of freedom of that.
 
-    The other arguments are as in ``FrequencyResponse``. A ``fit`` to it is the sample maximum likelihood (Pintelon and Schoukens, System Identification,
-    2012, section 9.11). Made by ``periodic``.
+    The other arguments are as in ``FrequencyResponse``. A ``fit`` to it is the sample maximum
+    likelihood (Pintelon and Schoukens, System Identification, 2012, section 9.11). Made by
+    ``periodic``.
     """
 
     inputs: ComplexArray

@@ -20,7 +20,7 @@ from freqid.checks import (
     unknown,
     whole,
 )
-from freqid.data.folding import low_pass
+from freqid.data.folding import low_pass, power_above
 from freqid.data.frames import record_of, samples_frame
 from freqid.data.sampling import check_rates, less_trend, sample_at
 from freqid.lti import Hold, ZeroOrderHold, as_hold
@@ -45,6 +45,7 @@ class Record:
         units: unit of each channel by name.
         reference: the signal that was commanded, in closed loop; sampled like the output.
         notes: what was done to the samples before, in sentences.
+        aliased: part of the input's power that decimation has folded into lower frequencies.
 
     Raises ValueError for NaN samples, lengths that do not agree, or a sample time that is not
     positive. The arrays are copied and read-only.
@@ -64,6 +65,7 @@ class Record:
     units: Mapping[str, str]
     reference: FloatArray | None
     notes: Sequence[str]
+    aliased: float
 
     # written by hand: fields hold what was checked, which is less than what may be given
     def __init__(
@@ -78,6 +80,7 @@ class Record:
         units: Mapping[str, str] | None = None,
         reference: ArrayLike | None = None,
         notes: Sequence[str] = (),
+        aliased: float = 0.0,
     ) -> None:
         dt = positive("dt", dt, "s")
         step = dt if input_dt is None else positive("input_dt", input_dt, "s")
@@ -100,6 +103,7 @@ class Record:
         self.__dict__.update(
             u=fast, y=slow, dt=dt, hold=between, input_dt=step, input_names=u_names,
             output_names=y_names, units=dict(units or {}), reference=commanded, notes=notes,
+            aliased=float(aliased),
         )  # fmt: skip
 
     @property
@@ -157,27 +161,26 @@ class Record:
 
         ``keep_input=True`` keeps the whole input beside the slower output, which loses nothing
         (the lifted model). ``antialias=True`` first runs the same zero-phase low-pass filter over
-        input and output, so that the relation between them is unchanged: an eighth-order
-        Chebyshev filter, as in ``scipy.signal.decimate``. Raises ValueError for a factor that is
-        not a positive whole number or leaves fewer than two output samples.
+        input and output, so that the relation between them is unchanged: an eighth-order Chebyshev
+        filter. Raises ValueError for a factor that leaves fewer than two output samples.
 
         >>> Record(np.arange(8.0), np.arange(8.0), dt=0.1).decimate(4).y
         array([0., 4.])
         """
         factor = whole("factor", factor)
-        left = -(-self.n_samples // factor)
-        if left < 2:
+        if (left := -(-self.n_samples // factor)) < 2:
             raise InputError(
-                f"factor={factor} leaves {left} of {self.n_samples} output samples; "
-                "use a smaller factor or a longer record"
+                f"factor={factor} leaves {left} of {self.n_samples} output samples; take less"
             )
         u, y, reference = self.u, self.y, self.reference
         if antialias and factor > 1:
             u = low_pass(u, factor * self.factor)
             y = low_pass(y, factor, self.factor)
             reference = None if reference is None else low_pass(reference, factor, self.factor)
+        folded = self.aliased if keep_input else max(self.aliased, power_above(u, factor))
         return replace(
             self,
+            aliased=folded,
             u=u if keep_input else u[::factor],
             y=y[::factor],
             dt=self.dt * factor,

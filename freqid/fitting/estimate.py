@@ -132,15 +132,11 @@ class Estimate(Shown):
         the part of it that the parameters leave to be seen, and ``largest_shift``, what it would do
         to a parameter in standard errors. Empty where nothing is left to be tested.
 
-        Source: Rao, Proc. Cambridge Philosophical Society 44, 1948; Söderström and Stoica, System
-        Identification, 1989, appendix B.
+        Source: Söderström and Stoica, System Identification, 1989, appendix B.
         """
         import pandas as pd
 
-        if self.inquiry is None:
-            columns = ["statistic", "p_value", "size", "unit", "power", "largest_shift"]
-            return pd.DataFrame(columns=columns, index=pd.Index([], name="suspect"))
-        return self.inquiry.table()
+        return pd.DataFrame() if self.inquiry is None else self.inquiry.table()
 
     @property
     def spread(self) -> Spread:
@@ -199,17 +195,29 @@ class Estimate(Shown):
         import pandas as pd
 
         std = np.sqrt(np.diag(self.covariance_matrix))
+        lower, upper = self._limits(std)
         return pd.DataFrame(
             {
                 "value": self.values,
                 "std": std,
-                "lower": self.values - Z95 * std,
-                "upper": self.values + Z95 * std,
+                "lower": lower,
+                "upper": upper,
                 "nominal": self.nominal,
                 "unit": list(self.units),
             },
             index=pd.Index(list(self.names), name="parameter"),
         )
+
+    def _limits(self, std: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Ends of 95 % intervals, inside the bounds."""
+        lower, upper = self.values - Z95 * std, self.values + Z95 * std
+        if (
+            self.problem is None
+            or not isinstance(self.model, GreyBox)
+            or self.spread.given is not None
+        ):
+            return lower, upper
+        return self.minimum.inside_bounds(self.spread.change, std, lower, upper)
 
     @cached_property
     def covariance(self) -> pd.DataFrame:

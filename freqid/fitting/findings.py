@@ -27,6 +27,10 @@ _AT_BOUND = 1e-6
 _CERTAIN = 2.0
 # an estimated hold of so large a part of the sample time says nothing of decimation
 _FULL = 0.75
+# and one of so small a part is none: no converter is run so much faster than its log
+_NONE = 0.02
+# part of the input's power that may be folded without harm
+_FOLDED = 0.002
 
 
 class Finding(str):
@@ -71,7 +75,8 @@ class Evidence:
     ``values`` and ``std`` (P,) of ``parameters``; ``loose`` are sentences on what the data leave
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
     ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
-    a black box whose motions grow, ``out_of_sight`` modes (Hz) above the Nyquist frequency.
+    a black box whose motions grow, ``out_of_sight`` modes (Hz) above the Nyquist frequency;
+    ``aliased`` is the part of the input's power that decimation has folded.
     """
 
     parameters: Sequence[Parameter]
@@ -85,6 +90,7 @@ class Evidence:
     n_unknowns: int = 0
     growing: Sequence[complex] = ()
     out_of_sight: Sequence[float] = ()
+    aliased: float = 0.0
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -173,6 +179,19 @@ def above_nyquist(e: Evidence) -> Iterator[Finding]:
         )
 
 
+@sign
+def aliased(e: Evidence) -> Iterator[Finding]:
+    """Decimation has folded so much of the input that the error bars do not cover it."""
+    if e.aliased > _FOLDED:
+        yield Finding(
+            "aliased",
+            f"{100 * e.aliased:.2g} % of the input's power lay above the Nyquist limit when the "
+            "record was decimated, and is folded into what is fitted; use "
+            "decimate(factor, keep_input=True), or antialias=True",
+            number=e.aliased,
+        )
+
+
 def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:
     """Frequencies (Hz) of continuous poles above the Nyquist frequency of a hold."""
     if not isinstance(hold, PeriodicHold):
@@ -187,6 +206,14 @@ def decimated(e: Evidence) -> Iterator[Finding]:
     if e.hold_period is None:
         return
     period, std = e.hold_period
+    if period < _NONE * e.dt:
+        yield Finding(
+            "no hold",
+            f"a hold of {period:.3g} s is none at a sample time of {e.dt:.4g} s: the input is "
+            "band-limited, or was measured and not commanded; use hold='bl'",
+            number=period,
+        )
+        return
     if np.isfinite(std) and e.dt - period >= 3 * std and period <= _FULL * e.dt:
         yield Finding(
             "decimated",

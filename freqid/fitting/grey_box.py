@@ -46,7 +46,7 @@ def fit_grey_box(
     alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
     minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
-    est = _estimate(structure, minimum, found, readings[0])
+    est = _estimate(structure, minimum, found, readings)
     return dataclasses.replace(est, testimony=Testimony(minimum, tuple(readings), found.n_agreed))
 
 
@@ -129,8 +129,9 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
 
 
 def _estimate(
-    structure: GreyStructure, minimum: Minimum, found: Found, reading: Reading
+    structure: GreyStructure, minimum: Minimum, found: Found, readings: Sequence[Reading]
 ) -> Estimate:
+    reading = readings[0]
     values, count = minimum.x * structure.scale, structure.count
     spread = Spread(structure.scale, minimum)
     std = np.sqrt(np.diag(spread.covariance))
@@ -150,6 +151,7 @@ def _estimate(
         minimum.objective.n_rows,
         len(values),
         out_of_sight=out_of_sight(structure.at(minimum.x).poles, hold),
+        aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
     )
     return Estimate(
         model=structure.at(minimum.x),

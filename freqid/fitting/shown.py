@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import control
     from matplotlib.axes import Axes
 
+    from freqid.data import Record
+
 
 class Shown:
     """The part of an Estimate that shows it, or hands it to others."""
@@ -42,16 +44,19 @@ class Shown:
 
         return nyquist(self, ax=ax, **options)
 
-    def report(self, path: str | Path, title: str | None = None) -> None:
+    def report(
+        self, path: str | Path, title: str | None = None, *, validation: Record | None = None
+    ) -> None:
         """Write one self-contained HTML page about the estimate, which works offline.
 
         A sentence on whether it may be trusted, the parameters with error and bias bars, response
-        and simulation to zoom into, residual tests, warnings, and the call that made it. Raises
-        ValueError for another suffix than .html, or without the extra ``report``.
+        and simulation to zoom into, residual tests, warnings, and the call that made it. Another
+        record as ``validation`` is simulated, too, and has a say in the verdict. Raises ValueError
+        for another suffix than .html, or without the extra ``report``.
         """
         from freqid.pages import write_report
 
-        write_report(self, path, title)  # type: ignore[arg-type]
+        write_report(self, path, title, validation)  # type: ignore[arg-type]
 
     def to_dict(self) -> dict[str, object]:
         """Everything that a file needs, in plain numbers and strings."""

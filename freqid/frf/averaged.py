@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.signal
-from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, whole
+from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import (
     FrequencyResponse,
     Record,
@@ -20,15 +20,7 @@ from freqid.data import (
     references_of,
 )
 from freqid.frf.measured import measured
-
-# segments of a single record where none are asked for
-_SEGMENTS = 8
-# windows that suit whole periods, which nothing need overlap
-_WHOLE = ("boxcar", "rectangular")
-
-# what scipy.signal.csd takes under these names
-Window = str | tuple[str | float, ...] | ArrayLike
-Detrend = str | bool | Callable[[FloatArray], FloatArray]
+from freqid.frf.segments import Averaging, Detrend, Window, independent
 
 
 def h1(
@@ -66,7 +58,7 @@ def h1(
     >>> bool(np.median(h1(record, 500).coherence) > 0.99)
     True
     """
-    s = _spectral(records, _Averaging(segment, band, window, overlap, detrend), reference)
+    s = _spectral(records, Averaging(segment, band, window, overlap, detrend), reference)
     if s.reference is not None:
         return _joint(s)
     return _response(s, s.yu @ np.linalg.inv(s.uu))
@@ -85,14 +77,15 @@ def h2(
 
     It needs as many outputs as inputs.
     """
-    s = _spectral(records, _Averaging(segment, band, window, overlap, detrend))
+    s = _spectral(records, Averaging(segment, band, window, overlap, detrend))
     if s.yu.shape[-1] != s.yu.shape[-2]:
         raise InputError(
             f"records have {s.yu.shape[-1]} inputs and {s.yu.shape[-2]} outputs; h2 needs as many "
             "outputs as inputs: use h1"
         )
     uy = s.yu.conj().swapaxes(-1, -2)
-    return _response(s, s.yy @ np.linalg.inv(uy))
+    G = s.yy @ np.linalg.inv(uy)
+    return _scaled(_response(s, G), s, G, np.ones(G.shape))
 
 
 def hv(
@@ -110,7 +103,7 @@ def hv(
 
     Source: Rocklin, Crowley and Vold, Proc. 3rd International Modal Analysis Conference, 1985.
     """
-    s = _spectral(records, _Averaging(segment, band, window, overlap, detrend))
+    s = _spectral(records, Averaging(segment, band, window, overlap, detrend))
     m, p = s.uu.shape[-1], s.yy.shape[-1]
     G = np.empty((len(s.frequency), p, m), complex)
     for o in range(p):
@@ -123,35 +116,25 @@ def hv(
         # the direction with the least power holds nothing but noise
         least = np.linalg.eigh(joint / (size[:, :, None] * size[:, None, :]))[1][:, :, 0] / size
         G[:, o] = (-least[:, :m] / least[:, m:]).conj()
-    return _response(s, G)
+    coherence = _explained(s.yu, np.linalg.inv(s.uu)) / np.maximum(_powers(s.yy), 1e-300)
+    # its amplitude scatters as the powers do, its phase as that of the cross-spectrum
+    share = (1 + np.clip(coherence, 0, 1)[:, :, None]) / 2
+    return _scaled(_response(s, G), s, G, np.broadcast_to(share, G.shape))
 
 
-@dataclass(frozen=True)
-class _Averaging:
-    """How records are cut, weighted and averaged: the arguments that all estimates share."""
+def _scaled(
+    frf: FrequencyResponse, s: _Spectral, G: ComplexArray, share: FloatArray
+) -> FrequencyResponse:
+    """A response whose variance, that of H1, is one of another estimate of like relative error.
 
-    segment: int | None
-    band: tuple[float, float] | None
-    window: Window
-    overlap: float | None
-    detrend: Detrend
-
-    def cut(self, sets: Sequence[Record]) -> tuple[int, int]:
-        """Samples of a segment, and to the next; ValueError where they do not fit."""
-        shortest = min(r.n_samples for r in sets)
-        default = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
-        length = whole("segment", default if self.segment is None else self.segment, least=2)
-        if length > shortest:
-            raise InputError(
-                f"segment={length} is longer than the shortest record, {shortest} samples"
-            )
-        half = 0.0 if isinstance(self.window, str) and self.window in _WHOLE else 0.5
-        overlap = half if self.overlap is None else self.overlap
-        if not 0 <= overlap < 1:
-            raise InputError(
-                f"overlap={overlap!r} must be a part of the segment, from 0 to below 1"
-            )
-        return length, length - int(length * overlap)
+    |δG/G|² of H2 is (1 − γ²)/γ² over the averages, as that of H1, and G itself is larger by 1/γ²
+    (Bendat and Piersol, Random Data, 2010, section 9.2.2).
+    """
+    if frf.variance is None:
+        return frf
+    H1 = np.abs(s.yu @ np.linalg.inv(s.uu)) ** 2
+    factor = share * np.abs(G) ** 2 / np.maximum(H1, 1e-300)
+    return dataclasses.replace(frf, variance=frf.variance * np.moveaxis(factor, 0, -1))
 
 
 @dataclass(frozen=True)
@@ -168,7 +151,7 @@ class _Spectral:
 
 
 def _spectral(
-    records: Record | Sequence[Record], averaging: _Averaging, reference: Reference | None = None
+    records: Record | Sequence[Record], averaging: Averaging, reference: Reference | None = None
 ) -> _Spectral:
     sets = as_records(records)
     first, m = sets[0], sets[0].n_inputs
@@ -193,7 +176,7 @@ def _spectral(
         count += n
     keep = chosen(f, as_band(averaging.band, first.nyquist), positive=True)
     mean = {pair: S[keep] / count for pair, S in total.items()}
-    averages = _independent(averaging.window, length, step, count)
+    averages = independent(averaging.window, length, step, count)
     if count < m:
         raise InputError(
             f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
@@ -236,18 +219,6 @@ def _excited(uu: ComplexArray, first: Record) -> None:
             "the inputs move together in every segment, so that their effects cannot be told "
             "apart; use as many different experiments as inputs"
         )
-
-
-def _independent(window: Window, length: int, step: int, count: int) -> float:
-    """How many independent averages overlapping segments are worth (Welch, 1967)."""
-    given = isinstance(window, (list, np.ndarray))
-    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
-    total, lag = 1.0, step
-    while lag < length and count > 1:
-        shared = (w[lag:] @ w[:-lag] / (w @ w)) ** 2
-        total += 2 * shared * max(1 - (lag // step) / count, 0)
-        lag += step
-    return count / total
 
 
 def _response(s: _Spectral, G: ComplexArray) -> FrequencyResponse:

@@ -12,6 +12,7 @@ from freqid.lti.holds import (
     Sampled,
     ZeroOrderHold,
     as_hold,
+    known_hold,
 )
 from freqid.lti.polynomials import PolynomialBasis
 from freqid.lti.projection import eliminate, triangle, triangle_of

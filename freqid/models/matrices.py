@@ -17,6 +17,8 @@ Jacobian = Callable[..., Mapping[str, Sequence[object]]]
 
 # small enough that its square vanishes beside any matrix entry
 _COMPLEX_STEP = 1e-100
+# a user's derivative is off from differences by no more than this part
+_AGREES = 1e-3
 
 
 def without(function: Matrices, names: Sequence[str]) -> Matrices:
@@ -57,6 +59,7 @@ class MatrixFunction:
         self.matrices, self.ties, self.nominal = matrices, ties, nominal
         self.vectorized, self.jacobian = vectorized, jacobian
         self._carries: dict[tuple[str, ...], bool] = {}
+        self._believed: set[tuple[str, ...]] = set()
 
     def at(self, values: Mapping[str, float]) -> StateSpace:
         """Dense, finite matrices of agreeing shapes; ValueError where there are none."""
@@ -92,6 +95,7 @@ class MatrixFunction:
         resolved = self.ties.resolve(values)
         at = _shaped(self.matrices(**resolved), resolved)
         if self.jacobian is not None:
+            self._check_jacobian(names)
             return Linearisation(at, self._by_jacobian(at, values, names))
         exact = self.takes_complex(names)
         return Linearisation(at, self._differentiate(at, values, names, exact))
@@ -114,6 +118,25 @@ class MatrixFunction:
                 for part, d in zip(total, by[other], strict=True):
                     part[i] += slope * np.asarray(0.0 if d is None else d, dtype=float)
         return StateSpace(*total)
+
+    def _check_jacobian(self, names: Sequence[str]) -> None:
+        """ValueError for a user's derivatives that differences of the matrices contradict."""
+        key = tuple(names)
+        if key in self._believed:
+            return
+        at = self.at(self.nominal)
+        given = self._by_jacobian(at, self.nominal, names)
+        rough = self._differentiate(at, self.nominal, names, by_complex_step=False)
+        for letter, a, b in zip("ABCD", given, rough, strict=True):
+            size = np.maximum(np.abs(b), np.abs(a)).max(axis=(1, 2), initial=0)
+            off = np.abs(a - b).max(axis=(1, 2), initial=0) > _AGREES * size
+            if off.any():
+                name = names[int(np.argmax(off))]
+                raise InputError(
+                    f"jacobian: the derivative of {letter} by {name!r} is not that of the "
+                    "matrices; mend it, or leave jacobian out: derivatives are exact without one"
+                )
+        self._believed.add(key)
 
     def linearise_many(
         self, values: Mapping[str, float], points: FloatArray, names: Sequence[str]

@@ -9,19 +9,22 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.stats
 
 from freqid.checks import InputError
 from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
 from freqid.fitting.suspects.beyond import looped, one_more_mode, unlike
+from freqid.fitting.suspects.halves import between_halves
 from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, score
 from freqid.fitting.suspects.sentences import sentence, words
+from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.models import Model
+from freqid.models import GreyBox, Model
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,6 +39,10 @@ _EQUAL, _LIKELY = 0.98, ("hold rejected", "delay", "feedthrough")
 _WORTH, _SAID = 0.5, 3
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
+# level at which an input is heard at all, and the part of the output left that means trouble
+_HEARD, _MOST_LEFT = 1e-3, 0.3
+# relative change of a black box's modes between halves of the data that is none
+_HOLDS_GOOD = 0.01
 # part of the data's energy that is nothing
 _NOTHING = 1e-5
 # the files whose suspects are known
@@ -74,7 +81,7 @@ class Inquiry:
         for name, draw in SUSPECTS.items():
             drawn = draw(scene, self.model)
             several = [] if drawn is None else [drawn] if isinstance(drawn, Columns) else [*drawn]
-            tried = [(c, score(scene, c.columns, std)) for c in several]
+            tried = [(c, score(scene, c.columns, std, c.beside)) for c in several]
             told = [(c, t) for c, t in tried if t is not None]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
@@ -117,8 +124,12 @@ class Inquiry:
         if "saturation" in merged:
             # samples at a limit are what is left of peaks
             merged.pop("spikes", None)
-        if "hold rejected" in merged and "delay" in merged and merged["delay"].test.size < 0:
+        # an early input is no delay where another hold, or the freedom of a black box, explains it
+        early = "delay" in merged and merged["delay"].test.size < 0
+        if early and ("hold rejected" in merged or not isinstance(self.model, GreyBox)):
             del merged["delay"]
+        if not merged:
+            return []
         ranked = sorted(merged.values(), key=lambda a: self._evidence(scene, a), reverse=True)
         # what explains as much is as likely: the order of _LIKELY decides
         equal = [a for a in ranked if a.test.gain >= _EQUAL * ranked[0].test.gain]
@@ -153,12 +164,52 @@ class Inquiry:
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects."""
         scene, named = self.scene, self.named
-        if scene is None or not named:
+        if scene is None:
+            return []
+        silent = self._silent(scene)
+        if silent:
+            return silent
+        if self._in_trouble(scene):
+            round_about = turned(self.minimum, self.model, self.readings)
+            if round_about:
+                return round_about
+        if not named:
             return []
         strongest = self._evidence(scene, named[0])
         near = [a for a in named if self._evidence(scene, a) >= _WORTH * strongest]
         said = [a for a in near if not self._negligible(scene, a)][:_SAID]
-        return [self._finding(scene, a) for a in said]
+        found = [self._finding(scene, a) for a in said]
+        if isinstance(self.model, GreyBox) or not said or said[0].name in _LIKELY:
+            return found
+        # the unknowns of a black box have no standard errors that mean anything: its modes have
+        moved = between_halves(self.model, self.readings)
+        if not moved < _HOLDS_GOOD:
+            return found
+        text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
+        return [
+            Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number) for f in found
+        ]
+
+    def _silent(self, scene: Scene) -> list[Finding]:
+        """Whether the input explains no more of the output than chance."""
+        told = len(scene.absorbed)
+        rest = sum(float(s.at_rest @ s.at_rest) for s in scene.seen)
+        f = (rest - scene.cost) / max(told, 1) / (scene.cost / max(scene.freedom, 1))
+        p = float(scipy.stats.f.sf(max(f, 0.0), max(told, 1), max(scene.freedom, 1)))
+        if p < _HEARD or len(scene.known):
+            return []
+        text = (
+            f"the input explains no more of the output than chance (F = {f:.3g} on {told} and "
+            f"{scene.freedom}, p = {p:.2g}): check that the channels belong together"
+        )
+        return [Finding("no signal", text, number=float(f))]
+
+    def _in_trouble(self, scene: Scene) -> bool:
+        """Whether values make no sense, or most of the output is left."""
+        unphysical = isinstance(self.model, GreyBox) and any(
+            not p.physical[0] <= p.value <= p.physical[1] for p in self.model.free_parameters
+        )
+        return unphysical or (bool(self.named) and scene.cost > _MOST_LEFT * scene.energy)
 
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""

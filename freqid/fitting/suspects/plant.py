@@ -18,7 +18,7 @@ _STEP, _SHORT = 1e-4, 0.3
 # whole samples of delay that are tried
 _SAMPLES = (1, 2, 4)
 # future samples of the input that a loop would show in the residual
-_AHEAD = 6
+_AHEAD, _BEFORE = 6, 12
 
 
 def _responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
@@ -142,20 +142,26 @@ def _one_rate(s: Seen) -> bool:
 
 @suspect("feedback")
 def feedback(scene: Scene, model: Model) -> Columns | None:
-    """The input answers to the output: the residual goes together with inputs still to come."""
+    """The input answers to the output: the residual goes together with inputs still to come.
+
+    Past inputs are free beside them: to a predictable input, a sweep or a multisine, what the plant
+    lacks would else look like the future.
+    """
     if any(s.record is None for s in scene.seen) or (isinstance(model, GreyBox) and model.late):
         return None
-    drawn = []
-    for s in scene.seen:
-        step = input_dt(s.reading.data)
-        ahead = np.exp(1j * s.omega_input * step)
-        shape = (model.n_outputs, model.n_inputs, len(s.omega_input))
-        rows = []
-        for o in range(shape[0]):
-            for i in range(shape[1]):
-                for k in range(1, _AHEAD + 1):
-                    G = np.zeros(shape, complex)
-                    G[o, i] = ahead**k
-                    rows.append(s.answered(G))
-        drawn.append(np.array(rows))
-    return Columns(drawn)
+    ahead = [_shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
+    past = [_shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
+    return Columns(ahead, beside=past)
+
+
+def _shifted(s: Seen, model: Model, samples: range) -> FloatArray:
+    """Rows of each input, so many samples early, at each output."""
+    ahead = np.exp(1j * s.omega_input * input_dt(s.reading.data))
+    shape = (model.n_outputs, model.n_inputs, len(s.omega_input))
+    rows = []
+    for o, i in np.ndindex(*shape[:2]):
+        for k in samples:
+            G = np.zeros(shape, complex)
+            G[o, i] = ahead ** float(k)
+            rows.append(s.answered(G))
+    return np.array(rows)

@@ -15,12 +15,14 @@ class Columns:
     """Derivatives of the rows by a suspect: one array (c, rows) for each experiment.
 
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
+    ``beside`` are columns that are free, too, and explain nothing of it.
     """
 
     columns: Sequence[FloatArray]
     unit: str = ""
     trials: int = 1
     detail: str = ""
+    beside: Sequence[FloatArray] | None = None
 
 
 Drawn = Columns | Sequence[Columns] | None

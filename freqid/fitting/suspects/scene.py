@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,6 +35,13 @@ class Seen:
     left: FloatArray
     free: FloatArray
     jacobian: FloatArray
+
+    @property
+    def at_rest(self) -> FloatArray:
+        """The data less what an initial state alone explains of them, (rows,)."""
+        lines = self.experiment.lines
+        rows = lines.rows(lines.Y)
+        return rows - (rows @ self.free.T) @ self.free
 
     @property
     def omega_input(self) -> FloatArray:
@@ -111,10 +119,22 @@ class Scene:
         held = (x - structure.lower <= near) | (structure.upper - x <= near)
         return cls(structure, x, seen, sum(e.energy for e in experiments), known, held)
 
+    # rows of columns that are free beside the parameters
+    more: FloatArray | None = None
+
+    def with_free(self, columns: Sequence[FloatArray]) -> Scene:
+        """The same where columns (c, rows) of each experiment are free, too."""
+        clear = self.clear(columns)
+        size = np.linalg.norm(clear, axis=1)
+        kept = clear[size > 0] / size[size > 0, None]
+        _, s, Vt = np.linalg.svd(kept, full_matrices=False)
+        return dataclasses.replace(self, more=Vt[s > _LOOSE * max(s.max(initial=0), 1e-300)])
+
     @cached_property
     def left(self) -> FloatArray:
         """Everything that is left, the rows of what was known before at the end."""
-        return np.concatenate([*(s.left for s in self.seen), self.known[:, -1]])
+        rows = np.concatenate([*(s.left for s in self.seen), self.known[:, -1]])
+        return rows if self.more is None else rows - (self.more @ rows) @ self.more
 
     @property
     def cost(self) -> float:
@@ -140,7 +160,8 @@ class Scene:
     @property
     def absorbed(self) -> FloatArray:
         """Orthonormal rows of what the parameters can absorb."""
-        return self._parts[2]
+        own = self._parts[2]
+        return own if self.more is None else np.concatenate([own, self.more])
 
     def moved(self, rows: FloatArray) -> FloatArray:
         """Change of the unknowns that takes rows (R,) on itself best."""

@@ -54,11 +54,18 @@ class Asked:
     trials: int = 1
 
 
-def score(scene: Scene, columns: Sequence[FloatArray], std: FloatArray) -> Score | None:
+def score(
+    scene: Scene,
+    columns: Sequence[FloatArray],
+    std: FloatArray,
+    beside: Sequence[FloatArray] | None = None,
+) -> Score | None:
     """The test of columns (c, rows) of each experiment; None where the parameters absorb them.
 
-    ``std`` (P,) are the standard errors of the unknowns.
+    ``std`` (P,) are the standard errors of the unknowns; ``beside`` are columns that are free, too.
     """
+    if beside is not None:
+        scene = scene.with_free(beside)
     raw = scene.stacked(columns)
     size = np.linalg.norm(raw, axis=1)
     if not np.isfinite(size).all() or not (size > 0).any():

@@ -24,7 +24,7 @@ def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
     """What was found, how certain that is, what it does to the parameters, and the cure."""
     certain = f"F = {test.statistic:.3g} on {test.degrees} and {freedom}, p = {p:.2g}"
     moved = ""
-    if test.largest_shift == test.largest_shift and test.largest_shift > 0:
+    if 0 < test.largest_shift < float("inf"):
         moved = f"; it moves parameters by up to {test.largest_shift:.2g} standard errors"
     return f"{what} ({certain}){moved}; {_CURES[kind]}"
 

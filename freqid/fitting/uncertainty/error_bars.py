@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # relative step of a difference
 _STEP = 1e-6
+# a pole of this part of the fastest one's size is at zero, up to rounding
+_INTEGRATES = 1e-10
 
 
 def derived(
@@ -42,13 +44,15 @@ def derived(
 def modes(structure: EstimatedStructure, x: FloatArray, spread: Spread) -> pd.DataFrame:
     """Natural frequency (Hz) and damping ratio of each mode, with standard errors.
 
-    Real poles have a damping ratio of 1 (−1 where they are unstable).
+    Real poles have a damping ratio of 1 (−1 where they are unstable), which is no estimate and has
+    no error, and a ``time_constant`` (s); one at zero has neither frequency nor damping.
     """
     import pandas as pd
 
     poles, change = structure.poles(x)
     covariance = spread.known(np.nan)
     rows = []
+    fastest = float(np.abs(poles).max(initial=0))
     for k in np.argsort(np.abs(poles)):
         pole, d = poles[k], change[k]
         if pole.imag < 0:
@@ -58,12 +62,18 @@ def modes(structure: EstimatedStructure, x: FloatArray, spread: Spread) -> pd.Da
         # d|λ| = Re(λ* dλ)/|λ|, dζ = −Re(dλ)/|λ| + Re(λ) d|λ|/|λ|²
         dsize = (pole.conj() * d).real / size if size > 0 else np.zeros(len(d))
         ddamping = -d.real / size + pole.real * dsize / size**2 if size > 0 else np.zeros(len(d))
+        # rounding may leave a variance of nothing below zero
+        size_var, damping_var = (float(max(d @ covariance @ d, 0)) for d in (dsize, ddamping))
+        real = pole.imag == 0 or size <= _INTEGRATES * fastest
+        known = size > _INTEGRATES * fastest
         rows.append(
             {
-                "frequency": size / (2 * np.pi),
-                "frequency_std": np.sqrt(dsize @ covariance @ dsize) / (2 * np.pi),
-                "damping": damping,
-                "damping_std": np.sqrt(ddamping @ covariance @ ddamping),
+                "frequency": size / (2 * np.pi) if known else 0.0,
+                "frequency_std": np.sqrt(size_var) / (2 * np.pi),
+                "damping": damping if known else np.nan,
+                "damping_std": np.nan if real else np.sqrt(damping_var),
+                "time_constant": -1 / pole.real if real and known else np.nan,
+                "time_constant_std": np.sqrt(size_var) / size**2 if real and known else np.nan,
             }
         )
     return pd.DataFrame(rows)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
+import scipy.stats
 
 from freqid.checks import FloatArray
 from freqid.fitting.cost.experiments import Experiment
@@ -19,6 +20,8 @@ from freqid.fitting.uncertainty.noise_spectrum import score_covariance
 
 # a cost of this part of the data's energy is nothing but rounding
 _ROUNDING = 1e-18
+# a value so near to a bound, as a part of its size, is at it
+_AT_BOUND = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +131,37 @@ class Minimum:
         if self.prior is not None:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
         return self.determined.scatter(self.inflation * H @ score @ H)
+
+    def inside_bounds(
+        self, scale: FloatArray, std: FloatArray, lower: FloatArray, upper: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Ends of 95 % intervals (P,) cut at the bounds; of what is at one, from there on.
+
+        That end is the quantile of the normal variable that the data alone would give, of which
+        only what lies inside the bound is possible.
+        """
+        low, high = self.structure.lower * scale, self.structure.upper * scale
+        value, size = self.x * scale, np.maximum(np.abs(self.x * scale), std)
+        lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
+        if not (np.isfinite(low).any() or np.isfinite(high).any()):
+            return lower, upper
+        beyond = value - self.determined.inverse @ (self.point.jacobian.T @ self.point.residual) * (
+            scale
+        )
+        for i, at in enumerate(value):
+            if not np.isfinite(std[i]) or std[i] == 0:
+                continue
+            for bound, sign in ((low[i], 1.0), (high[i], -1.0)):
+                if np.isfinite(bound) and abs(at - bound) <= _AT_BOUND * size[i]:
+                    outside = sign * (beyond[i] - bound) / std[i]
+                    tail = scipy.stats.norm.sf(-outside)
+                    reach = scipy.stats.norm.isf(0.05 * tail) + outside
+                    end = bound + sign * std[i] * float(max(reach, 0.0))
+                    if sign > 0:
+                        lower[i], upper[i] = bound, min(end, high[i])
+                    else:
+                        lower[i], upper[i] = max(end, low[i]), bound
+        return lower, upper
 
 
 @dataclass(frozen=True, eq=False)

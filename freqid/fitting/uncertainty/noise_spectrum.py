@@ -10,6 +10,7 @@ import scipy.stats
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.lti import eliminate
 
 # lines of an experiment that are enough for a covariance
@@ -95,6 +96,8 @@ def score_covariance(
     the data alone are least: what they leave there is noise, what a prior makes them leave is not.
     """
     lines = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+    if all(isinstance(e, TimeExperiment) for e in objective.experiments):
+        return _of_samples(objective, x, alone)
     if len(lines) < len(objective.experiments):
         return None
     try:
@@ -123,6 +126,41 @@ def score_covariance(
     # lines of a response have had their share of the freedom taken off one by one
     if all(e.response for e in lines):
         return total
+    return total * rows / max(rows - unknown - len(x), 1)
+
+
+def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -> FloatArray | None:
+    """The same of experiments in time, whose lines are those of the samples' own DFT."""
+    try:
+        realisation = objective.structure.realise(x)
+        noise_at = realisation if alone is None else objective.structure.realise(alone)
+    except Exception:  # the user's function may raise anything
+        return None
+    total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
+    for e in objective.experiments:
+        assert isinstance(e, TimeExperiment)
+        if e.lines is not None:
+            return None
+        evaluation = e.at(realisation)
+        left, Q, delta = projected(evaluation)
+        J = evaluation.jacobian(delta)
+        J = J - (J @ Q.T) @ Q
+        if noise_at is not realisation:
+            left = projected(e.at(noise_at))[0]
+        p = len(e.y)
+        R, JF = (scipy.fft.rfft(a.reshape(*a.shape[:-1], p, -1), norm="ortho") for a in (left, J))
+        N = e.y.shape[1]
+        twice = np.full(R.shape[-1], 2.0)
+        twice[0] = 1.0
+        if N % 2 == 0:
+            twice[-1] = 1.0
+        # J'Σ J over all samples is that over the lines, each but the ends standing for two
+        seen = (JF * (smoothed_power(R) * twice)).reshape(len(x), -1)
+        total += (seen @ JF.reshape(len(x), -1).conj().T).real
+        rows += e.n_rows
+        unknown += 0 if delta is None else len(delta)
+    if not np.isfinite(total).all():
+        return None
     return total * rows / max(rows - unknown - len(x), 1)
 
 

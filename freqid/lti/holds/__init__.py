@@ -8,7 +8,7 @@ import pkgutil
 
 from freqid.lti.holds.band_limited import BandLimited
 from freqid.lti.holds.first_order_hold import FirstOrderHold
-from freqid.lti.holds.hold import Hold, ModalSampled, PeriodicHold, Sampled, as_hold
+from freqid.lti.holds.hold import Hold, ModalSampled, PeriodicHold, Sampled, as_hold, known_hold
 from freqid.lti.holds.phi import phi_functions
 from freqid.lti.holds.zero_order_hold import ZeroOrderHold
 
@@ -25,5 +25,6 @@ __all__ = [
     "Sampled",
     "ZeroOrderHold",
     "as_hold",
+    "known_hold",
     "phi_functions",
 ]

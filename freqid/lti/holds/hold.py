@@ -165,6 +165,16 @@ def _checked(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
     return A, B
 
 
+def known_hold(name: str, value: object) -> Hold:
+    """The hold that an argument is; ValueError for anything else, a name without period too."""
+    if not isinstance(value, Hold):
+        raise InputError(
+            f"{name}={value!r} is not a hold; give ZeroOrderHold(period), FirstOrderHold(period) "
+            "or BandLimited()"
+        )
+    return value
+
+
 def as_hold(hold: Hold | str | None, dt: float, remembered: Hold | None = None) -> Hold:
     """The hold an argument means: a Hold itself, a name at ``dt`` (s), None the remembered one.
 

@@ -30,9 +30,12 @@ class Figure(NamedTuple):
     layout: Part
 
 
-def figures(est: Estimate) -> list[Figure]:
-    """Response of data and model, then measured and simulated outputs, as far as there are any."""
-    return [*_responses(est), *_residuals(est)]
+def figures(est: Estimate, validation: Record | None = None) -> list[Figure]:
+    """Response of data and model, then measured and simulated outputs, as far as there are any;
+    those of another record for validation at the end.
+    """
+    own = [*_responses(est), *_residuals(est, records(est)[0] if records(est) else None)]
+    return [*own, *_residuals(est, validation, "Validation on another record, ")]
 
 
 def _figure(
@@ -99,11 +102,12 @@ def _measured(est: Estimate) -> FrequencyResponse | None:
         return None
 
 
-def _residuals(est: Estimate) -> list[Figure]:
-    """Measured and simulated outputs of the first record."""
-    if not records(est):
+def _residuals(
+    est: Estimate, record: Record | None, title: str = "Measured and simulated, "
+) -> list[Figure]:
+    """Measured and simulated outputs of a record."""
+    if record is None:
         return []
-    record = records(est)[0]
     try:
         c = compare(est, record, band=est.band)
     except InputError:
@@ -114,7 +118,7 @@ def _residuals(est: Estimate) -> list[Figure]:
     drawn = []
     for o, name in enumerate(record.output_names):
         y, s = c.measured[::step, o], simulated[::step, o]
-        note = f"{c.fit_percent[o]:.2f} % (NRMSE), simulated with the record's own hold"
+        note = f"{c.fit_percent[o]:.2f} % (NRMSE), simulated with {c.hold!r}"
         note += f", {est.band[0]:g} to {est.band[1]:g} Hz" if est.band else ""
         note += f"; every {step}th sample is drawn." if step > 1 else "."
         data = [trace(t, y, "measured", _BLACK), trace(t, s, "simulated", _ORANGE),
@@ -124,7 +128,7 @@ def _residuals(est: Estimate) -> list[Figure]:
             "yaxis": {"domain": [0.36, 1], "title": {"text": escape(str(name))}},
             "yaxis2": {"domain": [0, 0.28], "title": {"text": "difference"}},
         }
-        drawn.append(_figure(f"Measured and simulated, {name}", note, data, 460, 1.1, axes))
+        drawn.append(_figure(f"{title}{name}", note, data, 460, 1.1, axes))
     return drawn
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from freqid.checks import InputError
-from freqid.data import whole_file
+from freqid.data import Record, whole_file
 from freqid.fitting import Estimate
 from freqid.pages.report.figures import figures
 from freqid.pages.report.sentences import bias, data, parameters, tests, verdict, versions
 
 
-def write_report(est: Estimate, path: str | Path, title: str | None = None) -> None:
+def write_report(
+    est: Estimate, path: str | Path, title: str | None = None, validation: Record | None = None
+) -> None:
     """Write the page; see ``Estimate.report``."""
     try:
         import jinja2
@@ -27,10 +29,11 @@ def write_report(est: Estimate, path: str | Path, title: str | None = None) -> N
         trim_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    drawn, away = figures(est), bias(est)
+    drawn, away = figures(est, validation), bias(est)
+    found = verdict(est, validation)
     page = environment.get_template("report.html.j2").render(
         title=title or f"Estimate of {getattr(est.model, 'name', type(est.model).__name__)}",
-        verdict=verdict(est),
+        verdict=found,
         warnings=list(est.warnings),
         parameters=parameters(est, away),
         bias_note="The bias is what the assumed hold adds: the estimate less that under the hold "

@@ -10,14 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.fitting import Estimate
+from freqid.data import Record
+from freqid.fitting import Estimate, Verdict as Graded
 from freqid.lti import ZeroOrderHold
 from freqid.models import GreyBox
 from freqid.pages.report.figures import records
-from freqid.validation import hold_bias, residual_test
+from freqid.validation import compare, hold_bias, residual_test
 
 # rows of the parameter table, and experiments, that a page can carry
 _ROWS, _EXPERIMENTS = 500, 50
+# what another record leaves may be so many times as much as the own does, or this many per cent
+_WORSE, _LEAST = 1.0, 5.0
 
 
 class Verdict(NamedTuple):
@@ -36,11 +39,28 @@ class Table(NamedTuple):
     left_out: int
 
 
-def verdict(est: Estimate) -> Verdict:
-    """Whether an estimate may be trusted, in plain words."""
+def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
+    """Whether an estimate may be trusted, in plain words; another record has its say."""
     found = est.verdict
+    if validation is not None:
+        found = _validated(est, found, validation)
     text = " ".join(f"{reason[0].upper()}{reason[1:]}." for reason in found.reasons[:1])
     return Verdict(found.head, text, found.trusted)
+
+
+def _validated(est: Estimate, found: Graded, record: Record) -> Graded:
+    """The verdict with what another record says of the model."""
+    worst = float(compare(est, record, band=est.band).fit_percent.min())
+    known = records(est)
+    own = float(compare(est, known[0], band=est.band).fit_percent.min()) if known else 100.0
+    if worst > own - _WORSE * max(100 - own, _LEAST):
+        said = f"another record is explained to {worst:.4g} %"
+        return Graded(found.grade, [*found.reasons, said])
+    said = (
+        f"validation: another record is explained to {worst:.4g} % where what was fitted is to "
+        f"{own:.4g} %; the model does not hold there"
+    )
+    return Graded("do not use" if worst < 0 else "doubt", [said, *found.reasons])
 
 
 def bias(est: Estimate) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""Studies of error bars, faults and verdicts."""

@@ -1,0 +1,62 @@
+"""How records are cut into segments, weighted and averaged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.signal
+from numpy.typing import ArrayLike
+
+from freqid.checks import FloatArray, InputError, whole
+from freqid.data import Record
+
+# segments of a single record where none are asked for
+_SEGMENTS = 8
+# windows that suit whole periods, which nothing need overlap
+_WHOLE = ("boxcar", "rectangular")
+
+# what scipy.signal.csd takes under these names
+Window = str | tuple[str | float, ...] | ArrayLike
+Detrend = str | bool | Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Averaging:
+    """How records are cut, weighted and averaged: the arguments that all estimates share."""
+
+    segment: int | None
+    band: tuple[float, float] | None
+    window: Window
+    overlap: float | None
+    detrend: Detrend
+
+    def cut(self, sets: Sequence[Record]) -> tuple[int, int]:
+        """Samples of a segment, and to the next; ValueError where they do not fit."""
+        shortest = min(r.n_samples for r in sets)
+        default = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
+        length = whole("segment", default if self.segment is None else self.segment, least=2)
+        if length > shortest:
+            raise InputError(
+                f"segment={length} is longer than the shortest record, {shortest} samples"
+            )
+        half = 0.0 if isinstance(self.window, str) and self.window in _WHOLE else 0.5
+        overlap = half if self.overlap is None else self.overlap
+        if not 0 <= overlap < 1:
+            raise InputError(
+                f"overlap={overlap!r} must be a part of the segment, from 0 to below 1"
+            )
+        return length, length - int(length * overlap)
+
+
+def independent(window: Window, length: int, step: int, count: int) -> float:
+    """How many independent averages overlapping segments are worth (Welch, 1967)."""
+    given = isinstance(window, (list, np.ndarray))
+    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
+    total, lag = 1.0, step
+    while lag < length and count > 1:
+        shared = (w[lag:] @ w[:-lag] / (w @ w)) ** 2
+        total += 2 * shared * max(1 - (lag // step) / count, 0)
+        lag += step
+    return count / total
