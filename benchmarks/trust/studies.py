@@ -47,8 +47,10 @@ def _periodic(case):
 def coverage_rows(table):
     """Rows for the printed table."""
     for cell, part in table.groupby("cell", sort=False):
-        yield f"95 % intervals, {cell}, {len(part)} runs", f"{100 * part['held'].mean():.1f} %", (
-            "93 to 97 %"
+        yield (
+            f"95 % intervals, {cell}, {len(part)} runs",
+            f"{100 * part['held'].mean():.1f} %",
+            ("93 to 97 %"),
         )
 
 

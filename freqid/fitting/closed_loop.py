@@ -9,60 +9,94 @@ Van den Hof and Schrama, Automatica 29, 1993; Forssell and Ljung, Automatica 35,
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import InputError
 from freqid.data import Record
-from freqid.fitting.black_box.output_error import fit_output_error
+from freqid.fitting.black_box.reference import lines_in_plane
+from freqid.fitting.black_box.refinement import nested_model
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.search.descent import Solution, polish
 from freqid.lti import ZeroOrderHold
-from freqid.models import OutputError
+from freqid.models import DiscreteModel
 
-# states of plant, controller and delays that a loop may have beyond the plant's own
-_BEYOND = 4
+# states of controller and delays that a loop may have beyond the plant's own
+_BEYOND = (0, 1, 2, 4)
+# lines on which the orders are compared, evaluations of each, and the gain that ends one
+_LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
 
 
-def through_reference(record: Record, order: int) -> tuple[Record, str]:
-    """The record with what its reference explains of its input, and a sentence that says so.
+def through_reference(records: Sequence[Record], order: int) -> tuple[list[Record], str]:
+    """Records of one loop with what the reference explains of their input, and a sentence on it.
 
     ``order`` is that of the plant; the loop's is chosen between that and some more by the minimum
-    description length. Raises InputError where the reference says nothing of the input.
+    description length. Raises InputError where no black box of the loop can be fitted.
     """
-    signal = np.asarray(record.reference, dtype=float).reshape(record.n_samples, -1)
-    m = record.n_inputs
-    names = [f"reference {i + 1}" for i in range(signal.shape[1])]
-    both = np.column_stack([record.inputs, record.outputs])
+    first = records[0]
     # like units, so that neither end rules the other
+    both = np.concatenate([np.column_stack([r.inputs, r.outputs]) for r in records])
     size = both.std(axis=0)
     size[size == 0] = 1
-    loop = Record(
-        signal, both / size, record.dt, hold=ZeroOrderHold(record.dt), input_names=names,
-        output_names=[*record.input_names, *record.output_names],
-    )  # fmt: skip
-    reading = Reading.of(loop)
-    best: tuple[float, int, FloatArray] | None = None
-    for n in range(max(order, 1), max(order, 1) + _BEYOND + 1):
+    loops = [_loop(r, size) for r in records]
+    readings = [Reading.of(loop) for loop in loops]
+    best: tuple[float, int, Chart, Solution] | None = None
+    for n in (max(order, 1) + more for more in _BEYOND):
         try:
-            est = fit_output_error(OutputError(n, True, stable=True), [reading])
+            chart, found, rows = _black_box(readings, n, _LINES)
         except (InputError, np.linalg.LinAlgError):
             continue
-        rows, unknowns = est.n_rows, len(est.minimum.x) + n
-        length = rows * np.log(max(est.cost, 1e-300)) + unknowns * np.log(rows)
+        unknowns = len(found.x) + n * len(records)
+        length = rows * np.log(max(found.cost, 1e-300)) + unknowns * np.log(rows)
         if best is None or length < best[0]:
-            left = errors_of(est.model, reading).in_time()[:, :m]
-            # errors are model less data
-            best = float(length), n, (loop.outputs[:, :m] + left) * size[:m]
+            best = float(length), n, chart, found
     if best is None:
         raise InputError(
             "reference: no black box from it to input and output could be fitted; use "
             "reference=False to fit the record directly"
         )
-    _, n, explained = best
-    share = 1 - ((record.inputs - explained) ** 2).sum() / (record.inputs**2).sum()
+    _, n, chart, found = best
+    names = loops[0].input_names, loops[0].output_names
+    model = DiscreteModel(chart.in_z(found.x), first.dt, ZeroOrderHold(first.dt), *names)
+    m, seen, left, power = first.n_inputs, [], 0.0, 0.0
+    for record, loop, reading in zip(records, loops, readings, strict=True):
+        # errors are model less data
+        error = errors_of(model, reading).in_time()[:, :m]
+        explained = (loop.outputs[:, :m] + error) * size[:m]
+        left += float(((record.inputs - explained) ** 2).sum())
+        power += float((record.inputs**2).sum())
+        seen.append(
+            dataclasses.replace(record, u=explained.reshape(record.u.shape), reference=None)
+        )
     note = (
-        f"fitted through the reference: a black box of order {n} explains {100 * share:.3g} % of "
-        "the input's power by it; reference=False fits the input as it is"
+        f"fitted through the reference: a black box of order {n} explains "
+        f"{100 * (1 - left / max(power, 1e-300)):.3g} % of the input's power by it; "
+        "reference=False fits the input as it is"
     )
-    return dataclasses.replace(record, u=explained.reshape(record.u.shape), reference=None), note
+    return seen, note
+
+
+def _loop(record: Record, size: np.ndarray) -> Record:
+    """From the reference to input and output together, in units of ``size`` (channels,)."""
+    signal = np.asarray(record.reference, dtype=float).reshape(record.n_samples, -1)
+    names = [f"reference {i + 1}" for i in range(signal.shape[1])]
+    return Record(
+        signal, np.column_stack([record.inputs, record.outputs]) / size, record.dt,
+        hold=ZeroOrderHold(record.dt), input_names=names,
+        output_names=[*record.input_names, *record.output_names],
+    )  # fmt: skip
+
+
+def _black_box(readings: Sequence[Reading], order: int, count: int) -> tuple[Chart, Solution, int]:
+    """A stable black box of the loop, and the real values that it was fitted to."""
+    lines, plane = lines_in_plane(readings, count)
+    start = nested_model(lines, order, True, True)
+    chart = Chart(start, True, plane, readings[0].sample_time, stable=True)
+    objective = Objective(chart, lines)
+    x = np.zeros(chart.size)
+    found = polish(objective, x, limit=_LIMIT, tolerance=_TOLERANCE)
+    return chart, found, objective.n_rows

@@ -172,6 +172,7 @@ def _through_references(
     notes: list[str] = []
     if reference is False:
         return seen, noise, notes
+    loops: dict[tuple[object, ...], list[int]] = {}
     for i, d in enumerate(sets):
         if not has[i] or not isinstance(d, Record):
             continue
@@ -182,10 +183,16 @@ def _through_references(
                 )
             notes.append("the input is faster than the reference, which is not used")
             continue
-        seen[i], note = through_reference(d, _order(model))
+        # experiments of one rate and the same channels are of one loop
+        loops.setdefault((d.dt, d.input_names, d.output_names), []).append(i)
+    for members in loops.values():
+        records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
+        explained, note = through_reference(records, _order(model))
         notes.append(note)
-        if plain:
-            noise[i] = as_noise_model("noise", seen[i])
+        for i, record in zip(members, explained, strict=True):
+            seen[i] = record
+            if plain:
+                noise[i] = as_noise_model("noise", record)
     return seen, noise, notes
 
 

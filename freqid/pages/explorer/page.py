@@ -246,7 +246,7 @@ def _sentence(shown: Scene) -> tuple[str, bool]:
         if abs(away[worst]) > 1e-3
         else f"Every parameter is {shown.truth} to a tenth of a per cent"
     )
-    return f"{text}. {shown.message}".strip(), bool(est.warnings)
+    return f"{text}. {shown.message}".strip(), bool(est.signs)
 
 
 _PAGE = """<!doctype html>

@@ -215,7 +215,7 @@ def scene(state: State, record: Record | None = None) -> Scene:
         )  # fmt: skip
     except InputError as error:
         return replace(found, message=str(error))
-    return replace(found, estimate=est, message="; ".join(est.warnings))
+    return replace(found, estimate=est, message="; ".join(est.signs))
 
 
 def _frequencies(model: GreyBox, state: State, nyquist: float) -> FloatArray:
