@@ -149,7 +149,7 @@ def _excited(
     level = np.abs(U.mean(axis=1)).max(axis=(0, 1))
     # few periods tell the noise of one line badly: those beside it have as much
     around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, _FREEDOM + 1, axis=-1)
-    noise = np.sqrt(around.max(axis=(0, 1)))
+    noise = np.sqrt(np.maximum(around.max(axis=(0, 1)), 0))
     # a line that noise alone could have made is none
     return (level > _SILENT * level.max()) & (level > _CERTAIN * noise)
 

@@ -69,6 +69,9 @@ def _mode_values(est: Estimate) -> pd.DataFrame:
     rows = {}
     for number, mode in enumerate(est.modes().to_dict("records"), 1):
         for what in ("frequency", "damping"):
+            # a real pole's damping is no estimate
+            if np.isnan(mode[f"{what}_std"]):
+                continue
             rows[f"{what} {number}"] = (mode[what], mode[f"{what}_std"])
     return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "std"])
 

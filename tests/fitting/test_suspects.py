@@ -35,7 +35,7 @@ def healthy(seed, pole=0.0):
 @pytest.mark.parametrize("pole", [0.0, 0.9])
 def test_false_alarms_are_those_of_the_level(pole):
     p = {}
-    for seed in range(60):
+    for seed in range(40):
         for name, row in fq.fit(LAG, healthy(seed, pole)).suspects.iterrows():
             p.setdefault(name, []).append(row["p_value"])
     # "hold" and "spikes" are the largest of several: their p is an upper limit

@@ -56,8 +56,8 @@ def relative_noise(seed, plant, size=0.02):
 
 def test_intervals_of_a_bare_response(plant):
     truth = {n: plant[n] for n in ("Jm", "k", "Ja", "fm", "d")}
-    held = coverage(lambda s: fq.fit(plant, relative_noise(s, plant)), truth, 100)
-    assert (held >= 0.86).all()
+    held = coverage(lambda s: fq.fit(plant, relative_noise(s, plant)), truth, 60)
+    assert (held >= 0.83).all()
 
 
 @pytest.mark.parametrize("method", [fq.local_polynomial, fq.local_rational])
@@ -76,10 +76,9 @@ def test_intervals_of_local_responses_whose_lines_share_windows(plant, method):
 
 @pytest.mark.parametrize(("method", "wide"), [(fq.h2, 0.25), (fq.hv, 0.25)])
 def test_variances_at_low_coherence(method, wide):
-    u = fq.white_noise(40_000, seed=1)
-    clean = fq.simulate(LAG, u, DT)
     values, told = [], []
     for seed in range(40):
+        clean = fq.simulate(LAG, fq.white_noise(40_000, seed=seed), DT)
         record = clean.with_noise(1.2 * clean.y.std(), seed=seed)
         frf = method(record, 400, band=(2, 10))
         values.append(frf.response[0, 0])
@@ -204,4 +203,4 @@ def test_the_report_shows_how_another_record_is_explained(tmp_path):
     u = fq.white_noise(1000, seed=5)
     train, other = (fq.simulate(LAG, u, DT).with_noise(0.1, seed=s) for s in (1, 2))
     fq.fit(LAG, train).report(tmp_path / "est.html", validation=other)
-    assert "validation" in (tmp_path / "est.html").read_text()
+    assert "nother record" in (tmp_path / "est.html").read_text()

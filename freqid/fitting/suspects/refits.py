@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import input_dt
 from freqid.fitting.cost.nuisance import Delay, HoldPeriod
 from freqid.fitting.cost.objective import Objective
-from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import minimise, polish
@@ -42,9 +41,9 @@ def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit |
     if not isinstance(structure, GreyStructure) or structure.unknown:
         return None
     dt = readings[0].sample_time
-    freed = structure.with_unknown(Delay(0.0, dt), minimum.x)
+    freed = structure.with_unknown(Delay(0.0, dt), _alone(minimum))
     lines = [r.at_lines().with_(delayed=True).lines() for r in readings]
-    objective = Objective(freed, lines, _prior(minimum, freed))
+    objective = Objective(freed, lines)
     tried = []
     for samples in (max(first / dt, 0.05), *_DELAYS):
         try:
@@ -83,11 +82,11 @@ def held(minimum: Minimum, readings: Sequence[Reading]) -> Refit | None:
 def _of_any_length(
     minimum: Minimum, structure: GreyStructure, readings: Sequence[Reading], dt: float
 ) -> Refit | None:
-    freed = structure.with_unknown(HoldPeriod.of(dt), minimum.x)
+    freed = structure.with_unknown(HoldPeriod.of(dt), _alone(minimum))
     lines = [r.lines() for r in readings]
     if any(e.lines.aliases > 1 for e in lines) or structure.model.delay_sources:
         return None
-    objective = Objective(freed, lines, _prior(minimum, freed))
+    objective = Objective(freed, lines)
     hold = readings[0].hold
     own = min(hold.period / dt, 1.0) if isinstance(hold, PeriodicHold) else 1.0
     best: tuple[float, float] | None = None
@@ -109,21 +108,19 @@ def _through(
 ) -> Refit | None:
     if all(r.hold == hold for r in readings):
         return None
-    plain = GreyStructure(structure.model, structure.physical(minimum.x))
+    plain = GreyStructure(structure.model, structure.physical(_alone(minimum)))
     try:
         lines = [r.with_(hold=hold).lines() for r in readings]
-        found = polish(Objective(plain, lines, _prior(minimum, plain)), plain.start, limit=_LIMIT)
+        found = polish(Objective(plain, lines), plain.start, limit=_LIMIT)
     except InputError:
         return None
     size = hold.period if isinstance(hold, PeriodicHold) else np.nan
     return Refit(found.cost, size, text)
 
 
-def _prior(minimum: Minimum, structure: GreyStructure) -> Prior | None:
-    known = minimum.prior
-    if known is None:
-        return None
-    return Prior.of(structure.parameters, structure.scale, known.variance)
+def _alone(minimum: Minimum) -> FloatArray:
+    """The unknowns where the data alone are least."""
+    return minimum.x if minimum.alone is None else minimum.alone
 
 
 def _time(seconds: float) -> str:

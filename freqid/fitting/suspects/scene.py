@@ -97,7 +97,8 @@ class Scene:
         """At the minimum on lines; InputError where there are none."""
         structure = minimum.structure
         chart = structure if isinstance(structure, Chart) else None
-        x, seen = minimum.x, []
+        # what a prior makes the data leave is no fault of theirs: they are asked alone
+        x, seen = minimum.x if minimum.alone is None else minimum.alone, []
         if chart is not None and any(r.own_cost for r in readings):
             raise InputError("a black box fitted to samples leaves no lines")
         at_lines = [r.at_lines().with_(delayed=chart is None) for r in readings]
@@ -113,8 +114,7 @@ class Scene:
             left, Q, delta = projected(evaluation)
             J = evaluation.jacobian(delta)
             seen.append(Seen(reading, e, left, Q, J - (J @ Q.T) @ Q))
-        P = len(x)
-        known = np.zeros((0, P + 1)) if minimum.prior is None else minimum.prior.rows(x)
+        known = np.zeros((0, len(x) + 1))
         near = 1e-6 * np.maximum(np.abs(x), 1e-300)
         held = (x - structure.lower <= near) | (structure.upper - x <= near)
         return cls(structure, x, seen, sum(e.energy for e in experiments), known, held)

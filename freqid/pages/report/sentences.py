@@ -44,7 +44,8 @@ def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
     found = est.verdict
     if validation is not None:
         found = _validated(est, found, validation)
-    text = " ".join(f"{reason[0].upper()}{reason[1:]}." for reason in found.reasons[:1])
+    said = found.reasons[:1] if validation is None else [found.reasons[0], found.reasons[-1]]
+    text = " ".join(f"{reason[0].upper()}{reason[1:]}." for reason in said)
     return Verdict(found.head, text, found.trusted)
 
 
