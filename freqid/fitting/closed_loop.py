@@ -29,13 +29,19 @@ from freqid.models import DiscreteModel
 _BEYOND = (0, 1, 2, 4)
 # lines on which the orders are compared, evaluations of each, and the gain that ends one
 _LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
+# part of the input's power of which the reference leaves too little to do harm
+_WHOLE = 0.995
 
 
-def through_reference(records: Sequence[Record], order: int) -> tuple[list[Record], str]:
+def through_reference(
+    records: Sequence[Record], order: int, always: bool
+) -> tuple[list[Record], str]:
     """Records of one loop with what the reference explains of their input, and a sentence on it.
 
     ``order`` is that of the plant; the loop's is chosen between that and some more by the minimum
-    description length. Raises InputError where no black box of the loop can be fitted.
+    description length. Unless ``always`` an input that the reference explains nearly whole stays as
+    it is: so little noise biases nothing, and what a linear black box of the loop lacks would.
+    Raises InputError where no black box of the loop can be fitted.
     """
     first = records[0]
     # like units, so that neither end rules the other
@@ -72,9 +78,17 @@ def through_reference(records: Sequence[Record], order: int) -> tuple[list[Recor
         seen.append(
             dataclasses.replace(record, u=explained.reshape(record.u.shape), reference=None)
         )
+    share = 1 - left / max(power, 1e-300)
+    if share > _WHOLE and not always:
+        note = (
+            f"the reference explains {100 * share:.4g} % of the input's power: the loop brings "
+            "next to no noise into it, and the input was fitted as it is; reference=True goes "
+            "through the reference all the same"
+        )
+        return list(records), note
     note = (
         f"fitted through the reference: a black box of order {n} explains "
-        f"{100 * (1 - left / max(power, 1e-300)):.3g} % of the input's power by it; "
+        f"{100 * share:.3g} % of the input's power by it; "
         "reference=False fits the input as it is"
     )
     return seen, note

@@ -72,8 +72,8 @@ def fit(
         seed: of the scattered starts.
         domain: ``"frequency"`` or ``"time"``, the paper's output error.
         reference: ``"auto"`` fits a record that has a reference through it, as one of a closed loop
-            must be, weighted by the noise unless ``weights`` says otherwise; ``True`` asks for a
-            reference; ``False`` fits the input as it is.
+            must be, weighted by the noise unless ``weights`` says otherwise, but where the
+            reference explains nearly all of the input; ``True`` always; ``False`` never.
         offset: ``"estimate"`` makes a constant of each output of each record an unknown.
         loss: ``"huber"`` lets samples that are far off count less, as spikes should.
         progress: show on the screen that a long fit is at work.
@@ -187,11 +187,12 @@ def _through_references(
         loops.setdefault((d.dt, d.input_names, d.output_names), []).append(i)
     for members in loops.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
-        explained, note = through_reference(records, _order(model))
+        explained, note = through_reference(records, _order(model), reference is True)
         notes.append(note)
         for i, record in zip(members, explained, strict=True):
+            changed = record is not seen[i]
             seen[i] = record
-            if plain:
+            if plain and changed:
                 noise[i] = as_noise_model("noise", record)
     return seen, noise, notes
 

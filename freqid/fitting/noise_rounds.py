@@ -38,7 +38,7 @@ def noise_weighted(
         readings = [_learnt(est, r, options.estimated_hold) for r in readings]
         before, near = est, again(est, options)
         est = work(readings, near)
-        std = np.sqrt(np.diag(est.covariance_matrix))
+        std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
     if known:

@@ -45,7 +45,7 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     for _ in range(_STEPS):
         cut, inside, count = _cut(est, readings)
         before, est = est, work(cut, est)
-        std = np.sqrt(np.diag(est.covariance_matrix))
+        std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
     samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))

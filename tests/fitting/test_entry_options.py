@@ -52,6 +52,15 @@ def test_a_direct_fit_in_a_loop_says_so():
     assert est.verdict.grade == "do not use"
 
 
+def test_a_loop_without_noise_needs_no_detour():
+    est = fq.fit(LAG, in_a_loop(1, level=0.01))
+    assert "fitted as it is" in est.notes[0]
+    assert est["a"] == pytest.approx(20, rel=0.01)
+    forced = fq.fit(LAG, in_a_loop(1, level=0.01), reference=True)
+    assert "through the reference" in forced.notes[0]
+    assert forced["a"] == pytest.approx(20, rel=0.05)
+
+
 def test_without_a_reference_none_can_be_asked_for():
     record = fq.simulate(LAG, fq.white_noise(500), DT)
     with pytest.raises(ValueError, match="reference=True, but a record has none"):
