@@ -38,6 +38,11 @@ def etfe(
             f"record has {first.n_inputs} inputs and there are {count} experiments; the ratio of "
             "DFTs needs as many experiments as inputs: give a list, or fit a model"
         )
+    if any(abs(r.dt / first.dt - 1) > 1e-9 or r.factor != first.factor for r in sets):
+        raise InputError(
+            f"records have sample times {sorted({r.dt for r in sets})} s, or inputs of other "
+            "rates; they must agree"
+        )
     if len({r.n_samples for r in sets}) > 1:
         raise InputError(
             f"records have {sorted({r.n_samples for r in sets})} samples; cut them to one length "

@@ -33,6 +33,8 @@ from freqid.frf.spectra import spectra
 _INFLATED, _WIDEST = 10.0, 0.15
 # and where polynomials remain useless all the same
 _HOPELESS = 100.0
+# inputs whose spectra have so small an eigenvalue are the same
+_DEPENDENT = 1e-12
 
 
 def local_polynomial(
@@ -106,6 +108,7 @@ def _estimate(
     signals = references_of(sets, reference)
     form = _form(sets, whole("order", order, least=0), poles, width)
     lines = _lines(sets, signals, band, form.width)
+    _told_apart(lines, sets[0])
     if width is None:
         lines, form = _widened(sets, signals, band, lines, form)
     local = local_models(lines, form)
@@ -115,6 +118,19 @@ def _estimate(
     else:
         local = _through(local, sets[0].n_inputs)
     return measured(sets[0], lines.frequency[lines.wanted], *local, spectrum, reach=form.width - 1)
+
+
+def _told_apart(lines: Lines, first: Record) -> None:
+    """ValueError for inputs that are the same at all lines of all experiments."""
+    U = np.moveaxis(lines.U, 1, 0).reshape(lines.U.shape[1], -1)
+    size = np.linalg.norm(U, axis=1, keepdims=True)
+    unit = U / np.where(size > 0, size, 1)
+    least = np.linalg.eigvalsh(unit @ unit.conj().T)[0]
+    if len(U) > 1 and least < _DEPENDENT:
+        raise InputError(
+            f"inputs {', '.join(first.input_names)} depend on one another at every line, so that "
+            "their effects cannot be told apart; excite them differently"
+        )
 
 
 def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> Form:

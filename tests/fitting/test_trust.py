@@ -181,6 +181,16 @@ def test_a_jacobian_that_is_wrong_is_refused():
         fq.fit(model, record)
 
 
+@pytest.mark.parametrize("method", [fq.local_polynomial, fq.local_rational])
+def test_inputs_that_are_one_are_refused(method):
+    u = fq.white_noise(2000, seed=1)
+    record = fq.Record(np.column_stack([u, 2 * u]), fq.simulate(LAG, u, DT).y, DT)
+    with pytest.raises(ValueError, match="depend on one another"):
+        method(record, band=(1, 20))
+    with pytest.raises(ValueError, match="must agree"):
+        fq.etfe([fq.Record(u, u, 1e-3), fq.Record(u, u, 2e-3)])
+
+
 def test_true_holds_are_checked(plant):
     spectra = {"10-80": fq.ChirpSpectrum(10, 80)}
     for wrong in ("zoh", 5):

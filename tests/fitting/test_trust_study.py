@@ -1,0 +1,36 @@
+"""The short version of the studies in ``benchmarks/trust``: a few cases of each."""
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+
+@pytest.fixture(scope="module")
+def studies():
+    folder = Path(__file__).resolve().parents[2] / "benchmarks"
+    sys.path.insert(0, str(folder))
+    try:
+        from trust import studies
+
+        yield studies
+    finally:
+        sys.path.remove(str(folder))
+
+
+def test_every_fault_is_mostly_named_and_seldom_trusted(studies, tmp_path):
+    count = 2 * len(studies.FAULTS)
+    table = pd.DataFrame([studies.named(case) for case in range(count)])
+    faulty = table[table["fault"] != "none"]
+    assert (faulty["first"] == faulty["fault"]).mean() >= 0.7
+    sound = table[table["fault"] == "none"]
+    assert (sound["first"] == "none").all()
+    studies.draw(table, tmp_path / "faults.png")
+    assert (tmp_path / "faults.png").stat().st_size > 10_000
+
+
+def test_every_cell_of_the_coverage_runs(studies):
+    table = pd.DataFrame([studies.covered(case) for case in range(2 * len(studies.CELLS))])
+    assert set(table["cell"]) == set(studies.CELLS)
+    assert table["held"].mean() > 0.6
