@@ -81,6 +81,8 @@ class FrequencyResponse:
                 f"response has shape {G.shape} for {len(f)} frequencies; "
                 "expected (outputs, inputs, frequencies)"
             )
+        if np.ndim(dt):
+            raise InputError("dt is an array; expected a sample time in s: give variance by name")
         if not np.isfinite(dt) or dt < 0:
             raise InputError(f"dt={dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape

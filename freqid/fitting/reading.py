@@ -115,6 +115,25 @@ class Reading:
         held = isinstance(self.hold, PeriodicHold)
         return self.hold.period if held else input_dt(self.data)  # type: ignore[attr-defined]
 
+    @property
+    def unheld(self) -> bool:
+        """Whether this is a response of the continuous-time plant itself."""
+        return isinstance(self.data, FrequencyResponse) and not isinstance(self.hold, PeriodicHold)
+
+    def on_circle(self, dt: float) -> Reading:
+        """An ``unheld`` response as that of a sampled model of the same order.
+
+        The bilinear map z = (1 + s·dt/2)/(1 − s·dt/2) takes jω to the angle 2 atan(ω·dt/2).
+        """
+        frf = self.data
+        assert isinstance(frf, FrequencyResponse)
+        if self.band is not None:
+            frf = frf.select(self.band)
+        turned = 2 * np.arctan(frf.omega * dt / 2) / dt
+        hold = ZeroOrderHold(dt)
+        seen = dataclasses.replace(frf, frequency=turned / (2 * np.pi), dt=dt, hold=hold)
+        return dataclasses.replace(self, data=seen, hold=hold, band=None)
+
     def experiment(self, plane: Plane | None = None) -> Experiment:
         """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
         if self.in_time:

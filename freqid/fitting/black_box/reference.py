@@ -19,7 +19,7 @@ from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
-from freqid.lti import PeriodicHold, Plane, StateSpace
+from freqid.lti import Hold, PeriodicHold, Plane, StateSpace
 from freqid.models import GreyBox, late_sampled
 
 # evaluations of a black box at the most, and the gain that ends them
@@ -52,10 +52,15 @@ def lines_in_plane(
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A black box where its cost is least: its chart, and the point in it."""
+    """A black box where its cost is least: its chart, and the point in it.
+
+    Beside responses without a hold it is a rational function of (1 + s·dt/2)/(1 − s·dt/2), with
+    ``dt`` that of its chart: ``bilinear``.
+    """
 
     objective: Objective
     solution: Solution
+    bilinear: bool = False
 
     @classmethod
     def of(
@@ -69,24 +74,32 @@ class Reference:
 
         Raises InputError where no black box of the order stands beside the model, saying why.
         """
-        dt = _common_period(readings)
+        bilinear = all(r.unheld for r in readings)
+        if bilinear:
+            if model.delay_sources:
+                raise InputError("no black box of the plant's own order has its delay")
+            dt = _middle_period(readings)
+            readings = [r.at_lines().on_circle(dt) for r in readings]
+        else:
+            dt = _common_period(readings)
         lines, plane = lines_in_plane(readings, count)
         # what is left of a delay within a sample lets the input through, too
-        direct = bool(model.state_space().D.any() or model.delay_sources)
+        direct = bilinear or bool(model.state_space().D.any() or model.delay_sources)
         direct = direct or readings[0].hold.reaches_next
         order = len(model.state_space().A) if order is None else order
         try:
             chart = Chart(first_model(lines, order, direct), direct, plane, dt)
-            return cls._descended(Objective(chart, lines))
+            return cls._descended(Objective(chart, lines), bilinear)
         except np.linalg.LinAlgError as error:
             raise InputError(f"the black box of order {order} has no start: {error}") from None
 
     @classmethod
-    def _descended(cls, objective: Objective) -> Reference:
+    def _descended(cls, objective: Objective, bilinear: bool) -> Reference:
         chart = objective.structure
         assert isinstance(chart, Chart)
         start = np.zeros(chart.size)
-        return cls(objective, polish(objective, start, limit=_LIMIT, tolerance=_TOLERANCE))
+        found = polish(objective, start, limit=_LIMIT, tolerance=_TOLERANCE)
+        return cls(objective, found, bilinear)
 
     @property
     def chart(self) -> Chart:
@@ -106,33 +119,65 @@ class Reference:
 
     def on(self, readings: Sequence[Reading]) -> Reference:
         """The same followed to the minimum on all lines of other readings of the same data."""
-        experiments = [r.at_lines().lines(Plane()).in_plane(self.chart.plane) for r in readings]
-        chart = self.chart.moved(self.solution.x)
-        return self._descended(Objective(chart, experiments))
+        return self._from(self.chart.moved(self.solution.x), readings)
+
+    def _from(self, chart: Chart, readings: Sequence[Reading]) -> Reference:
+        """The minimum next to the centre of a chart, on all lines."""
+        seen = [r.at_lines() for r in readings]
+        if self.bilinear:
+            seen = [r.on_circle(chart.dt) for r in seen]
+        experiments = [r.lines(Plane()).in_plane(chart.plane) for r in seen]
+        return self._descended(Objective(chart, experiments), self.bilinear)
 
     def beside(self, model: GreyBox, readings: Sequence[Reading]) -> Reference:
         """One that begins from a model: it leaves no more than the model does."""
-        hold = readings[0].hold
-        assert isinstance(hold, PeriodicHold)
-        at, s = model.state_space(), model.sampled(hold)
-        if model.late:
-            s = late_sampled(model, hold)
-        # what reaches the next sample, z Γ⁺, is (zI − Φ)Γ⁺ + ΦΓ⁺
-        gamma, D = s.gamma + s.phi @ s.gamma_next, at.D + at.C @ s.gamma_next
-        centre = to_plane(StateSpace(s.phi, gamma, at.C, D), self.chart.plane)
-        chart = Chart(centre, self.chart.feedthrough, self.chart.plane, self.chart.dt)
-        experiments = [r.at_lines().lines(Plane()).in_plane(chart.plane) for r in readings]
-        return self._descended(Objective(chart, experiments))
+        chart = self.chart
+        in_z = _bilinear(model, chart.dt) if self.bilinear else _held(model, readings[0].hold)
+        centre = to_plane(in_z, chart.plane)
+        return self._from(Chart(centre, chart.feedthrough, chart.plane, chart.dt), readings)
 
     def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Response (outputs, inputs, K) at omega (rad/s), and its relative standard error."""
-        G, dG = self.chart.response(self.solution.x, omega, None)
+        dt = self.chart.dt
+        seen = 2 * np.arctan(omega * dt / 2) / dt if self.bilinear else omega
+        G, dG = self.chart.response(self.solution.x, seen, None)
         half = np.linalg.pinv(self.solution.point.jacobian)
         freedom = self.objective.n_rows - self.unknowns - self.solution.point.n_initial
         noise = self.cost / max(freedom, 1)
         spread = np.tensordot(half.T, dG, (1, 0))
         std = np.sqrt(noise * (np.abs(spread) ** 2).sum(axis=0))
         return G, std / np.maximum(np.abs(G), 1e-300)
+
+
+def _held(model: GreyBox, hold: Hold) -> StateSpace:
+    """The sampled model of a plant behind a hold, with what reaches the next sample fed through."""
+    assert isinstance(hold, PeriodicHold)
+    at, s = model.state_space(), model.sampled(hold)
+    if model.late:
+        s = late_sampled(model, hold)
+    # z Γ⁺ is (zI − Φ)Γ⁺ + ΦΓ⁺
+    return StateSpace(s.phi, s.gamma + s.phi @ s.gamma_next, at.C, at.D + at.C @ s.gamma_next)
+
+
+def _bilinear(model: GreyBox, dt: float) -> StateSpace:
+    """The plant as a function of z = (1 + s·dt/2)/(1 − s·dt/2)."""
+    A, B, C, D = model.state_space()
+    eye = np.eye(len(A))
+    inverse = np.linalg.inv(eye - A * dt / 2)
+    return StateSpace(
+        inverse @ (eye + A * dt / 2), inverse @ B * dt, C @ inverse, D + C @ inverse @ B * dt / 2
+    )
+
+
+def _middle_period(readings: Sequence[Reading]) -> float:
+    """The period in s whose bilinear map takes the middle of the lines to a quarter turn."""
+    omega = np.concatenate(
+        [np.abs(r.at_lines().lines().lines.omega) for r in readings]
+    )  # lines that the band leaves
+    omega = omega[omega > 0]
+    if not len(omega):
+        raise InputError("a response at zero frequency alone has no black box")
+    return float(2 / np.sqrt(omega.min() * omega.max()))
 
 
 def _common_period(readings: Sequence[Reading]) -> float:

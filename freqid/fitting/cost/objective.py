@@ -20,6 +20,9 @@ from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.priors import Prior
 from freqid.lti import Hold, Realisation, eliminate, triangle_of
 
+# squares of what is larger leave the range of numbers
+_HUGE = 1e150
+
 
 class Structure(Protocol):
     """What the optimiser needs of a model: its unknowns, scaled to be of order one."""
@@ -163,7 +166,8 @@ class Objective:
             blocks.append((known[:, :-1].T, known[:, -1], None))
             parts.append(float(known[:, -1] @ known[:, -1]))
         triangle = triangle_of(blocks)
-        if not np.isfinite(triangle).all():
+        # a NaN is not less than anything
+        if not np.abs(triangle).max(initial=0) < _HUGE:
             self.failure = ArithmeticError("the response is not finite")
             return None
         return Point(triangle, initial, parts)
