@@ -1,0 +1,151 @@
+"""Plants from mass, stiffness and damping matrices."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from freqid.checks import Array, InputError, choice
+from freqid.models.grey_box import GreyBox
+from freqid.models.parameter import Parameter
+
+# a matrix, or a function of parameters and conditions that returns one
+MatrixLike = ArrayLike | Callable[..., Any]
+
+
+def mechanical(
+    M: MatrixLike,
+    K: MatrixLike,
+    D: MatrixLike | None = None,
+    B: MatrixLike | None = None,
+    C: MatrixLike | None = None,
+    *,
+    parameters: Sequence[Parameter],
+    measured: Literal["position", "velocity", "acceleration"] = "position",
+    conditions: Mapping[str, float] | None = None,
+    name: str = "mechanical",
+    **options: Any,
+) -> GreyBox:
+    """A GreyBox of M q'' + D q' + K q = B u, y = C q (or C q', or C q'').
+
+    Args:
+        M, K, D: mass, stiffness and damping, (n, n): matrices, or functions of those parameters
+            and conditions that they name as arguments. No D is no damping.
+        B: where inputs act, (n, inputs); none is a force on every coordinate.
+        C: what is measured, (outputs, n), or (outputs, 2n) of positions and velocities together;
+            none is every coordinate.
+        parameters: the Parameter objects.
+        measured: whether C takes positions, velocities or accelerations.
+        conditions: names and usual values of what is set for each experiment.
+        name, options: of the GreyBox.
+
+    Raises ValueError for matrices of other shapes and, naming the values, where the mass matrix is
+    not positive definite. States are q, then q'.
+
+    Source: Wernholt and Moberg, Nonlinear gray-box identification using local models applied to
+    industrial robots, Automatica 47, 2011.
+
+    >>> import freqid as fq
+    >>> arm = fq.mechanical(
+    ...     lambda Jm, Ja: [[Jm, 0], [0, Ja]], lambda k: [[k, -k], [-k, k]],
+    ...     lambda d: [[d, -d], [-d, d]], B=[[1], [0]], C=[[1, 0]], measured="velocity",
+    ...     parameters=[fq.Parameter("Jm", 1.0), fq.Parameter("Ja", 2.0), fq.Parameter("k", 600.0),
+    ...                 fq.Parameter("d", 0.5)])
+    >>> (abs(arm.poles.imag).max() / 6.283185307).round(2)  # Hz
+    np.float64(4.77)
+    """
+    choice("measured", measured, ("position", "velocity", "acceleration"))
+    matrices = _Mechanical(
+        _named("M", M), _named("K", K), _named("D", D), _named("B", B), _named("C", C), measured
+    )
+    known = {p.name for p in parameters} | set(conditions or {})
+    for letter, part in zip("MKDBC", matrices.parts, strict=True):
+        for wanted in part.names if part is not None else ():
+            if wanted not in known:
+                raise InputError(
+                    f"{letter} is a function of {wanted!r}, which is neither a parameter nor a "
+                    f"condition; those are {', '.join(sorted(known))}"
+                )
+    return GreyBox(matrices, parameters, conditions=conditions or {}, name=name, **options)
+
+
+class _Named:
+    """A matrix as a function that is given all values and takes those that it names."""
+
+    def __init__(self, letter: str, given: MatrixLike) -> None:
+        self.letter, self.given = letter, given
+        self.names: tuple[str, ...] = ()
+        self.takes_all = False
+        if callable(given):
+            taken = inspect.signature(given).parameters.values()
+            own = inspect.Parameter
+            self.takes_all = any(p.kind is own.VAR_KEYWORD for p in taken)
+            asked = own.KEYWORD_ONLY, own.POSITIONAL_OR_KEYWORD
+            self.names = tuple(p.name for p in taken if p.kind in asked and p.default is p.empty)
+
+    def __call__(self, values: Mapping[str, Any]) -> Array:
+        if not callable(self.given):
+            return np.atleast_2d(np.asarray(self.given, dtype=float))
+        chosen = values if self.takes_all else {name: values[name] for name in self.names}
+        found = self.given(**chosen)
+        kind = complex if any(np.iscomplexobj(v) for v in chosen.values()) else float
+        return np.atleast_2d(np.asarray(found, dtype=kind))
+
+
+def _named(letter: str, given: MatrixLike | None) -> _Named | None:
+    return None if given is None else _Named(letter, given)
+
+
+class _Mechanical:
+    """A, B, C, D of the matrices of mechanics; an object, so that it can be pickled."""
+
+    def __init__(
+        self,
+        M: _Named | None,
+        K: _Named | None,
+        D: _Named | None,
+        B: _Named | None,
+        C: _Named | None,
+        measured: str,
+    ) -> None:
+        self.parts, self.measured = (M, K, D, B, C), measured
+
+    def __call__(self, **values: Any) -> tuple[Array, Array, Array, Array]:
+        M, K, D, B, C = (None if part is None else part(values) for part in self.parts)
+        assert M is not None
+        assert K is not None
+        n = len(M)
+        damping = np.zeros((n, n)) if D is None else D
+        force = np.eye(n) if B is None else B
+        for letter, X in (("M", M), ("K", K), ("D", damping)):
+            if X.shape != (n, n):
+                raise InputError(f"{letter} has shape {X.shape}; expected {(n, n)}, as M")
+        if force.shape[0] != n:
+            raise InputError(f"B has shape {force.shape}; expected ({n}, inputs)")
+        seen = np.eye(n) if C is None else C
+        if seen.shape[1] not in (n, 2 * n):
+            raise InputError(f"C has shape {seen.shape}; expected (outputs, {n}) or (…, {2 * n})")
+        try:
+            np.linalg.cholesky(M.real)
+        except np.linalg.LinAlgError:
+            where = ", ".join(f"{k}={np.real(v):g}" for k, v in values.items())
+            raise InputError(f"the mass matrix M is not positive definite at {where}") from None
+        solved = np.linalg.solve(M, np.concatenate([K, damping, force], axis=1))
+        A = np.zeros((2 * n, 2 * n), solved.dtype)
+        A[:n, n:] = np.eye(n)
+        A[n:] = -solved[:, : 2 * n]
+        driven = np.zeros((2 * n, force.shape[1]), solved.dtype)
+        driven[n:] = solved[:, 2 * n :]
+        direct = np.zeros((len(seen), force.shape[1]), solved.dtype)
+        if seen.shape[1] == 2 * n:
+            return A, driven, seen, direct
+        if self.measured == "acceleration":
+            return A, driven, seen @ A[n:], seen @ driven[n:]
+        place = slice(n, None) if self.measured == "velocity" else slice(n)
+        output = np.zeros((len(seen), 2 * n), seen.dtype)
+        output[:, place] = seen
+        return A, driven, output, direct
