@@ -65,6 +65,7 @@ from .models import (
     TransferFunction as TransferFunction,
     drivetrain as drivetrain,
     first_order as first_order,
+    mechanical as mechanical,
     simulate as simulate,
     two_mass as two_mass,
 )

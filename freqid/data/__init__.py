@@ -4,6 +4,8 @@ It may import what stands below it: checks and lti.
 """
 
 from freqid.data.band import Band, as_band, chosen
+from freqid.data.channels import as_holds
+from freqid.data.conditions import as_conditions
 from freqid.data.data_set import (
     DataSet,
     as_data_sets,

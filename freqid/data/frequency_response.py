@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names, whole
 from freqid.data.band import Band, chosen
+from freqid.data.conditions import as_conditions
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ class FrequencyResponse:
         input_names, output_names: channel names.
         reach: lines on each side of one whose noise goes together with its own, as that of local
             models does, which share their windows.
+        conditions: what was set for this experiment, numbers by name.
 
     Raises ValueError for shapes that disagree, frequencies that do not increase, or values that
     are not finite.
@@ -56,6 +58,7 @@ class FrequencyResponse:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     reach: int
+    conditions: Mapping[str, float]
 
     # written by hand: fields hold what was checked, which is less than what may be given
     def __init__(
@@ -70,6 +73,7 @@ class FrequencyResponse:
         input_names: Sequence[str] | None = None,
         output_names: Sequence[str] | None = None,
         reach: int = 0,
+        conditions: Mapping[str, float] | None = None,
     ) -> None:
         f = np.array(frequency, dtype=float)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
@@ -97,7 +101,12 @@ class FrequencyResponse:
             input_names=channel_names("input_names", input_names, m, "u"),
             output_names=channel_names("output_names", output_names, p, "y"),
             reach=whole("reach", reach, least=0),
+            conditions=as_conditions(conditions),
         )
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore; what version 0.1.0 wrote lacks what it did not know."""
+        self.__dict__.update({"reach": 0, "conditions": {}} | state)
 
     @property
     def omega(self) -> FloatArray:
@@ -122,6 +131,14 @@ class FrequencyResponse:
             for name in ("frequency", "response", "variance", "coherence", "input_spectrum")
         }
         return dataclasses.replace(self, **cut)
+
+    def with_conditions(self, **conditions: float) -> FrequencyResponse:
+        """The response with what was set for it, by name: a posture, a load, a known parameter.
+
+        >>> FrequencyResponse([1.0], [1j]).with_conditions(q=0.3).conditions
+        {'q': 0.3}
+        """
+        return dataclasses.replace(self, conditions={**self.conditions, **conditions})
 
     def to_control(self) -> control.FrequencyResponseData:
         """The response as ``control.FrequencyResponseData``.

@@ -41,6 +41,7 @@ class PeriodicResponse(FrequencyResponse):
         input_names: Any = None,
         output_names: Any = None,
         reach: int = 0,
+        conditions: Any = None,
         inputs: Any = None,
         outputs: Any = None,
         noise: Any = None,
@@ -48,7 +49,7 @@ class PeriodicResponse(FrequencyResponse):
     ) -> None:
         super().__init__(
             frequency, response, dt, hold, variance, coherence, input_spectrum, input_names,
-            output_names, reach,
+            output_names, reach, conditions,
         )  # fmt: skip
         p, m, K = self.response.shape
         U, Y = np.array(inputs, dtype=complex), np.array(outputs, dtype=complex)
@@ -65,6 +66,11 @@ class PeriodicResponse(FrequencyResponse):
             inputs=frozen(U), outputs=frozen(Y), noise=frozen(C),
             freedom=whole("freedom", freedom),
         )  # fmt: skip
+
+    def with_conditions(self, **conditions: float) -> PeriodicResponse:
+        """The same with what was set for it, by name."""
+        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
+        return PeriodicResponse(**fields)
 
     def select(self, limits: tuple[float, float]) -> PeriodicResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,17 +19,21 @@ from freqid.checks import (
     unknown,
     whole,
 )
+from freqid.data.channels import as_holds, channel, selected, with_input
+from freqid.data.conditions import as_conditions
 from freqid.data.folding import low_pass, power_above
 from freqid.data.frames import record_of, samples_frame
+from freqid.data.printed import as_html, as_text
 from freqid.data.sampling import check_rates, less_trend, sample_at
-from freqid.lti import Hold, ZeroOrderHold, as_hold
+from freqid.data.signals import Signals
+from freqid.lti import Hold, ZeroOrderHold
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Record:
+class Record(Signals):
     """One experiment: input ``u`` and output ``y``, immutable, with the hold that made it.
 
     Args:
@@ -46,6 +49,7 @@ class Record:
         reference: the signal that was commanded, in closed loop; sampled like the output.
         notes: what was done to the samples before, in sentences.
         aliased: part of the input's power that decimation has folded into lower frequencies.
+        conditions: what was set for this experiment, numbers by name.
 
     Raises ValueError for NaN samples, lengths that do not agree, or a sample time that is not
     positive. The arrays are copied and read-only.
@@ -66,6 +70,7 @@ class Record:
     reference: FloatArray | None
     notes: Sequence[str]
     aliased: float
+    conditions: Mapping[str, float]
 
     # written by hand: fields hold what was checked, which is less than what may be given
     def __init__(
@@ -73,7 +78,7 @@ class Record:
         u: ArrayLike,
         y: ArrayLike,
         dt: float,
-        hold: Hold | str | None = None,
+        hold: Hold | str | Mapping[str, Hold | str] | None = None,
         input_dt: float | None = None,
         input_names: Sequence[str] | None = None,
         output_names: Sequence[str] | None = None,
@@ -81,13 +86,14 @@ class Record:
         reference: ArrayLike | None = None,
         notes: Sequence[str] = (),
         aliased: float = 0.0,
+        conditions: Mapping[str, float] | None = None,
     ) -> None:
         dt = positive("dt", dt, "s")
         step = dt if input_dt is None else positive("input_dt", input_dt, "s")
         fast, slow = samples("u", u), samples("y", y)
         check_rates(dt, step, len(slow), len(fast))
-        between = as_hold(hold, step, ZeroOrderHold(step))
         u_names = channel_names("input_names", input_names, fast.size // len(fast), "u")
+        between = as_holds(hold, step, ZeroOrderHold(step), u_names)
         y_names = channel_names("output_names", output_names, slow.size // len(slow), "y")
         both = (*u_names, *y_names)
         if len(set(both)) < len(both):
@@ -103,58 +109,12 @@ class Record:
         self.__dict__.update(
             u=fast, y=slow, dt=dt, hold=between, input_dt=step, input_names=u_names,
             output_names=y_names, units=dict(units or {}), reference=commanded, notes=notes,
-            aliased=float(aliased),
+            aliased=float(aliased), conditions=as_conditions(conditions),
         )  # fmt: skip
 
-    @property
-    def factor(self) -> int:
-        """Input samples for each output sample."""
-        return round(self.dt / self.input_dt)
-
-    @property
-    def inputs(self) -> FloatArray:
-        """Input samples as (N, inputs)."""
-        return self.u.reshape(len(self.u), -1)
-
-    @property
-    def outputs(self) -> FloatArray:
-        """Output samples as (N, outputs)."""
-        return self.y.reshape(len(self.y), -1)
-
-    @property
-    def n_samples(self) -> int:
-        """Number of output samples."""
-        return len(self.y)
-
-    @property
-    def n_inputs(self) -> int:
-        """Number of inputs."""
-        return self.inputs.shape[1]
-
-    @property
-    def n_outputs(self) -> int:
-        """Number of outputs."""
-        return self.outputs.shape[1]
-
-    @property
-    def time(self) -> FloatArray:
-        """Times of the output samples in s, from 0."""
-        return self.dt * np.arange(self.n_samples)
-
-    @property
-    def input_time(self) -> FloatArray:
-        """Times of the input samples in s, from 0."""
-        return self.input_dt * np.arange(len(self.u))
-
-    @property
-    def duration(self) -> float:
-        """Length in s: one sample time for each output sample."""
-        return self.n_samples * self.dt
-
-    @property
-    def nyquist(self) -> float:
-        """Nyquist limit of the output in Hz."""
-        return 0.5 / self.dt
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore; what version 0.1.0 wrote lacks what it did not know."""
+        self.__dict__.update({"notes": (), "aliased": 0.0, "conditions": {}} | state)
 
     def decimate(self, factor: int, keep_input: bool = False, antialias: bool = False) -> Record:
         """Every ``factor``-th sample, with the hold remembered as it was.
@@ -233,9 +193,12 @@ class Record:
         noise = np.random.default_rng(seed).standard_normal(self.y.shape)
         return replace(self, y=self.y + std * noise)
 
-    def with_hold(self, hold: Hold | str) -> Record:
-        """The same samples with another hold remembered; names mean it at the input's period."""
-        return replace(self, hold=as_hold(hold, self.input_dt))
+    def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> Record:
+        """The same samples with another hold remembered; names mean it at the input's period.
+
+        A dictionary gives each of several inputs its own, ``{"torque": "zoh", "coulomb": "bl"}``.
+        """
+        return replace(self, hold=as_holds(hold, self.input_dt, self.hold, self.input_names))
 
     def to_frame(self) -> pd.DataFrame:
         """Samples as a DataFrame indexed by time in s.
@@ -277,24 +240,47 @@ class Record:
         """
         return record_of(cls, frame, inputs, outputs, dt, hold, reference, units, resample)
 
+    def __getitem__(self, name: str) -> FloatArray:
+        """Samples (N,) of a channel by name; KeyError with the nearest name for another."""
+        return channel(self, name)
+
+    def select(
+        self,
+        inputs: Sequence[str] | str | None = None,
+        outputs: Sequence[str] | str | None = None,
+    ) -> Record:
+        """The record with some of its channels, in the order given; ValueError for unknown ones.
+
+        >>> Record([[0.0, 1.0]], [[2.0, 3.0]], dt=1.0).select(outputs="y2").y
+        array([3.])
+        """
+        return selected(self, inputs, outputs)
+
+    def with_input(
+        self, name: str, samples: ArrayLike, hold: Hold | str | None = None, unit: str | None = None
+    ) -> Record:
+        """The record with a known input more, (N,), sampled like the others.
+
+        ``hold`` is what it did between its samples: ``"bl"`` for one made of measured signals, such
+        as the sign of a velocity that stands for Coulomb friction; None is that of the record.
+        Raises ValueError for a name that is taken or another number of samples.
+
+        >>> record = Record([0.0, 1.0], [0.0, 0.5], dt=0.1)
+        >>> record.with_input("coulomb", -np.sign(record["y"]), hold="bl").input_names
+        ('u', 'coulomb')
+        """
+        return with_input(self, name, samples, hold, unit)
+
+    def with_conditions(self, **conditions: float) -> Record:
+        """The record with what was set for it, by name: a posture, a load, a known parameter.
+
+        >>> Record([0.0, 1.0], [0.0, 0.5], dt=0.1).with_conditions(q=0.3).conditions
+        {'q': 0.3}
+        """
+        return replace(self, conditions={**self.conditions, **conditions})
+
     def __repr__(self) -> str:
-        shown = f"{self.n_samples} samples at {self.dt:g} s"
-        if self.factor > 1:
-            shown += f", input at {self.input_dt:g} s"
-        channels = f"{', '.join(self.input_names)} -> {', '.join(self.output_names)}"
-        return f"<Record {channels}: {shown}, {self.hold!r}>"
+        return as_text(self)
 
     def _repr_html_(self) -> str:
-        rows = {
-            "inputs": ", ".join(self.input_names),
-            "outputs": ", ".join(self.output_names),
-            "samples": f"{self.n_samples}",
-            "sample time": f"{self.dt:g} s",
-            "input sample time": f"{self.input_dt:g} s",
-            "duration": f"{self.duration:g} s",
-            "hold": repr(self.hold),
-        }
-        if self.notes:
-            rows["notes"] = "; ".join(self.notes)
-        body = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
-        return f"<table><caption>Record</caption>{body}</table>"
+        return as_html(self)

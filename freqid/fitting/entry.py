@@ -30,7 +30,7 @@ def fit(
     model: object,
     data: DataSet | Sequence[DataSet],
     *,
-    hold: Hold | str | None = None,
+    hold: Hold | str | Mapping[str, Hold | str] | None = None,
     band: tuple[float, float] | None = None,
     weights: Weights | Sequence[Weights] = None,
     initial_state: InitialState = "estimate",
@@ -41,6 +41,7 @@ def fit(
     reference: Literal["auto"] | bool = "auto",
     offset: Literal["estimate"] | None = None,
     loss: Literal["linear", "huber"] = "linear",
+    separate: Sequence[str] = (),
     progress: bool = False,
 ) -> Estimate:
     """Estimate a model's free parameters by weighted least squares on the lines of a band.
@@ -51,8 +52,11 @@ def fit(
         model: a GreyBox, or OutputError(order) or TransferFunction(zeros, poles), black boxes in
             discrete and in continuous time.
         data: a Record, a FrequencyResponse, or several; each record has its own initial state.
+            Their conditions reach the matrices of a GreyBox; one that bears a parameter's name
+            makes it known for that experiment.
         hold: what the input did between its samples; None is what each record remembers, a name
             means that hold at the record's own sample time, as other tools assume;
+            a dictionary gives each of several inputs its own;
             ``"estimate"`` makes the period of a zero-order hold one more unknown. A hold that the
             data reject is reported in ``est.warnings``.
         band: (low, high) in Hz; None takes all lines, and the cost is the output error of the
@@ -76,6 +80,8 @@ def fit(
             reference explains nearly all of the input; ``True`` always; ``False`` never.
         offset: ``"estimate"`` makes a constant of each output of each record an unknown.
         loss: ``"huber"`` lets samples that are far off count less, as spikes should.
+        separate: names of parameters that each experiment has for itself: estimated as
+            ``fm[0]``, ``fm[1]``, … and shown in ``est.separate``.
         progress: show on the screen that a long fit is at work.
 
     Returns an Estimate. Raises ValueError for arguments that do not fit the data or the model.
@@ -114,13 +120,14 @@ def fit(
     seen, models, notes = _through_references(model, sets, models, reference, weights is None)
     readings: Sequence[Reading] = [
         Reading.of(
-            d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late
+            d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late, i
         )
-        for d, noise in zip(seen, models, strict=True)
+        for i, (d, noise) in enumerate(zip(seen, models, strict=True))
     ]
     if offset is not None:
         readings = [_with_offset(r) for r in readings]
-    options = SearchOptions(count, seed, start, estimated)
+    own = (separate,) if isinstance(separate, str) else tuple(separate)
+    options = SearchOptions(count, seed, start, estimated, own)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
     if offset is not None:
@@ -128,7 +135,7 @@ def fit(
     given = {
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
-        "reference": reference, "offset": offset, "loss": loss,
+        "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
     }  # fmt: skip
     call = _call(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)

@@ -38,8 +38,7 @@ class Estimate(Shown):
 
     Attributes:
         model: the model at the estimate: GreyBox, DiscreteModel or ContinuousModel.
-        names: names of the P values that were estimated.
-        values: the estimates, (P,), each in its own unit.
+        names, values: names of the P values that were estimated, and these, in their units.
         nominal: the values that the search began from, (P,); NaN where there were none.
         units: unit of each value.
         uncertainty: how the estimate scatters, or the covariance itself, (P, P).
@@ -264,8 +263,11 @@ class Estimate(Shown):
         """
         if not isinstance(self.model, GreyBox):
             raise InputError("a function of parameters needs a grey-box estimate")
-        count = len(self.model.free_parameters)
-        return derived(self.model, function, self.covariance_matrix[:count, :count])
+        # of values that each experiment has for itself the model has the first
+        first = {n.split("[")[0]: i for i, n in reversed([*enumerate(self.names)])}
+        free = [p.name for p in self.model.free_parameters]
+        model, at = self.model.fix(*{*free} - {*first}), [first[n] for n in free if n in first]
+        return derived(model, function, self.covariance_matrix[np.ix_(at, at)])
 
     def modes(self) -> pd.DataFrame:
         """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""

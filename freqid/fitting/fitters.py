@@ -15,7 +15,8 @@ from freqid.fitting.reading import Reading
 class SearchOptions:
     """Where a search begins and how long it goes on, as in ``fit``: None starts for "auto".
 
-    ``estimated_hold`` makes the period of a zero-order hold one more unknown. A ``refit`` begins
+    ``estimated_hold`` makes the period of a zero-order hold one more unknown, ``separate`` those
+    parameters that each experiment has for itself. A ``refit`` begins
     next to its minimum: it walks there on the cost itself.
     """
 
@@ -23,6 +24,7 @@ class SearchOptions:
     seed: int = 0
     start: Mapping[str, float] | None = None
     estimated_hold: bool = False
+    separate: Sequence[str] = ()
     refit: bool = False
 
 
@@ -43,6 +45,8 @@ def fits(kind: type, black_box: bool = False) -> Callable[[F], F]:
                 raise InputError(
                     "start has no meaning for a black box, which needs none; leave it out"
                 )
+            if options.separate:
+                raise InputError("separate needs a GreyBox: a black box has no parameters")
             if options.estimated_hold:
                 raise InputError(
                     "hold='estimate' needs a GreyBox; a black box can imitate any delay"

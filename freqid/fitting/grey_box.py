@@ -11,6 +11,8 @@ from freqid.checks import InputError, unknown
 from freqid.data import Record, input_dt, rate_factor
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.placed_structure import PlacedStructure
+from freqid.fitting.cost.places import Place, places_of
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
@@ -33,8 +35,14 @@ def fit_grey_box(
     options: SearchOptions,
 ) -> Estimate:
     """The work of ``fit`` for a GreyBox."""
-    hold = [HoldPeriod.of(_common_dt(readings))] if options.estimated_hold else []
-    structure = GreyStructure(model, checked_start(model, options.start), hold)
+    places, notes = places_of(model, [r.data for r in readings], options.separate)
+    structure: GreyStructure | None = _placed(model, readings, options, places)
+    if structure is None:
+        # alike everywhere: the model as it is there
+        model = model.with_conditions(**places[0].conditions, **places[0].known)
+        model = model.fix(*(n for n in places[0].known if not model.parameter(n).fixed))
+        hold = [HoldPeriod.of(_common_dt(readings))] if options.estimated_hold else []
+        structure = GreyStructure(model, checked_start(model, options.start), hold)
     if not structure.physical_names:
         raise InputError("model has no free parameter; free one with model.free(name)")
     _possible_delays(structure, readings)
@@ -47,7 +55,27 @@ def fit_grey_box(
     found, objective = _with_prior(structure, objective, found, readings)
     minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
     est = _estimate(structure, minimum, found, readings)
-    return dataclasses.replace(est, testimony=Testimony(minimum, tuple(readings), found.n_agreed))
+    testimony = Testimony(minimum, tuple(readings), found.n_agreed)
+    return dataclasses.replace(est, testimony=testimony, notes=notes)
+
+
+def _placed(
+    model: GreyBox, readings: Sequence[Reading], options: SearchOptions, places: Sequence[Place]
+) -> PlacedStructure | None:
+    """The structure where experiments differ in more than their data; None where they do not."""
+    first = places[0]
+    alike = all(p.conditions == first.conditions and p.known == first.known for p in places)
+    if alike and not options.separate:
+        return None
+    if options.estimated_hold:
+        raise InputError("hold='estimate' needs experiments that differ in their data alone")
+    start = {n: v for n, v in (options.start or {}).items() if "[" not in n}
+    checked_start(model, start)
+    structure = PlacedStructure(model, options.start, places, options.separate)
+    for name in options.start or {}:
+        if name not in model.values and name not in structure.names:
+            raise InputError(unknown("start", name, [*model.values, *structure.names]))
+    return structure
 
 
 def _possible_delays(structure: GreyStructure, readings: Sequence[Reading]) -> None:

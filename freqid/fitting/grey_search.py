@@ -16,12 +16,13 @@ from freqid.fitting.black_box.late import in_step, whole_samples
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, minimise, polish
-from freqid.fitting.search.log_stage import log_targets
+from freqid.fitting.search.log_stage import Smooth, log_targets
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Bound, Found, Search
 from freqid.lti import Hold
@@ -35,6 +36,8 @@ _ROUND_LINES = 60
 _DIRECT = 40
 # samples of an unknown delay that are tried
 _DELAYS = 20
+# places at which black boxes are asked for, and the lines that each takes at least
+_PLACES, _LEAST_LINES = 16, 100
 # a start that costs so many times more on a part of the lines costs more on all
 _FAR = 1.1
 # local noise, and a cost, of this part of the data's energy are those of their rounding
@@ -68,9 +71,9 @@ def search_grey(
         return dataclasses.replace(found, solution=_on_all(objective, scout, found))
     beside = _reference(structure, at_lines, lines)
     start = structure.start
-    if beside is not None and structure.model.delay_sources:
+    if isinstance(beside, Beside) and structure.model.delay_sources:
         start = beside.begun(structure, start)
-    smooth = None if beside is None else beside.response
+    smooth = None if beside is None else beside.at_place
     targets = log_targets(few, smooth)
     rounds = None if smooth is None else partial(log_targets, few, smooth, _ROUND_LINES)
     # a hold whose period is unknown is not one that the black box has
@@ -128,6 +131,15 @@ class Beside:
     shifts: tuple[int, ...]
     period: float
 
+    @property
+    def boxes(self) -> list[Reference]:
+        """It, and no other."""
+        return [self.box]
+
+    def at_place(self, place: int) -> Smooth:
+        """The response: it is the same at every place."""
+        return self.response
+
     def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Response (outputs, inputs, K) at omega (rad/s), and its relative standard error."""
         G, error = self.box.response(omega)
@@ -149,7 +161,39 @@ class Beside:
         return moved
 
 
-def _reference(structure: GreyStructure, readings: Sequence[Reading], lines: int) -> Beside | None:
+@dataclass(frozen=True)
+class BesidePlaces:
+    """A black box for each group of experiments that meet the same plant."""
+
+    boxes: list[Reference]
+    number: dict[int, int]
+
+    @classmethod
+    def of(
+        cls, structure: PlacedStructure, readings: Sequence[Reading], lines: int
+    ) -> BesidePlaces | None:
+        """None where there are too many of them, or one has none."""
+        groups = structure.groups
+        if len(groups) > _PLACES or structure.model.delay_sources:
+            return None
+        count = max(lines // len(groups), _LEAST_LINES)
+        try:
+            boxes = [
+                Reference.of(structure.at(structure.start, g[0]), [readings[i] for i in g], count)
+                for g in groups
+            ]
+        except (InputError, np.linalg.LinAlgError):
+            return None
+        return cls(boxes, {i: n for n, group in enumerate(groups) for i in group})
+
+    def at_place(self, place: int) -> Smooth:
+        """The response that an experiment met."""
+        return self.boxes[self.number[place]].response
+
+
+def _reference(
+    structure: GreyStructure, readings: Sequence[Reading], lines: int
+) -> Beside | BesidePlaces | None:
     """A black box of the plant's order on the lines of the search; None where there is none.
 
     Of an output slower than its input a sampled one finds no minimum to rely on. Where a delay is
@@ -157,6 +201,8 @@ def _reference(structure: GreyStructure, readings: Sequence[Reading], lines: int
     """
     if any(rate_factor(r.data) > 1 for r in readings):
         return None
+    if isinstance(structure, PlacedStructure):
+        return BesidePlaces.of(structure, readings, lines)
     model, tried = structure.at(structure.start), []
     for shifts in _candidates(structure, model, readings):
         try:
@@ -188,17 +234,20 @@ def _candidates(
     ]
 
 
-def _bound(beside: Beside, structure: GreyStructure, share: float) -> Bound | None:
+def _bound(beside: Beside | BesidePlaces, structure: GreyStructure, share: float) -> Bound | None:
     """What no plant of the order goes below; None where the black box itself has no minimum.
 
     Lines that stand for others, a ``share`` of all, tell no more than themselves.
     """
-    box = beside.box
+    boxes = beside.boxes
     # a delay leaves samples out, or is one that the black box does not have
-    if not box.solution.converged or structure.model.delay_sources:
+    if not all(b.solution.converged for b in boxes) or structure.model.delay_sources:
         return None
-    rows = int(share * box.objective.n_rows) - box.unknowns - box.solution.point.n_initial
-    return Bound(box.cost, box.unknowns - len(structure.names), rows)
+    rows = sum(
+        int(share * b.objective.n_rows) - b.unknowns - b.solution.point.n_initial for b in boxes
+    )
+    unknowns = sum(b.unknowns for b in boxes)
+    return Bound(sum(b.cost for b in boxes), unknowns - len(structure.names), rows)
 
 
 def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -17,6 +17,7 @@ from freqid.data import (
     PeriodicResponse,
     Record,
     as_band,
+    as_holds,
     channel_counts,
     input_dt,
 )
@@ -25,7 +26,7 @@ from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.noise_models import BiasIntegral, GivenWeights, NoiseModel, ResponseNoise
 from freqid.frf import spectra
-from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold, as_hold
+from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold
 
 # sums of squares below this have lost their digits
 _LEAST = 1e-280
@@ -42,7 +43,8 @@ class Reading:
 
     ``skip_zero`` leaves out the line at zero, where a plant that integrates answers with anything
     at all; ``delayed`` keeps a fast input as its alias frequencies, which a delay merely turns;
-    ``offset`` adds a constant of unknown size to each output.
+    ``offset`` adds a constant of unknown size to each output. ``place`` is the number of the
+    experiment where these differ in more than their data.
     """
 
     data: DataSet
@@ -54,23 +56,25 @@ class Reading:
     skip_zero: bool = False
     delayed: bool = False
     offset: bool = False
+    place: int = 0
 
     @classmethod
     def of(
         cls,
         data: DataSet,
-        hold: Hold | str | None = None,
+        hold: Hold | str | Mapping[str, Hold | str] | None = None,
         band: tuple[float, float] | None = None,
         noise: NoiseModel | None = None,
         initial_state: InitialState = "estimate",
         domain: Domain = "frequency",
         skip_zero: bool = False,
         delayed: bool = False,
+        place: int = 0,
     ) -> Reading:
         """With hold and band as a user gives them. Raises ValueError where they do not fit."""
         if isinstance(data, Record):
             # a name means the hold at the sample time of the input as it was kept
-            assumed = as_hold(hold, data.input_dt, data.hold)
+            assumed = as_holds(hold, data.input_dt, data.hold, data.input_names)
             nyquist = 0.5 / data.input_dt
         else:
             if domain == "time":
@@ -79,11 +83,14 @@ class Reading:
                 raise InputError(
                     f"hold={hold!r} needs a sample time and this response has dt=0; give a Hold"
                 )
-            assumed = as_hold(hold, data.dt or 1.0, data.hold or BandLimited())
+            own = data.hold or BandLimited()
+            assumed = as_holds(hold, data.dt or 1.0, own, data.input_names)
             nyquist = np.inf
         limits = as_band(band, nyquist)
         noise = noise or BiasIntegral()
-        return cls(data, assumed, limits, noise, initial_state, domain, skip_zero, delayed)
+        return cls(
+            data, assumed, limits, noise, initial_state, domain, skip_zero, delayed, place=place
+        )
 
     @property
     def in_time(self) -> bool:
@@ -140,7 +147,7 @@ class Reading:
             return self._samples(plane)
         if self.own_cost and isinstance(self.data, PeriodicResponse):
             data = self.data if self.band is None else self.data.select(self.band)
-            return PeriodicExperiment(data, self.hold, plane is not None)
+            return PeriodicExperiment(data, self.hold, plane is not None, self.place)
         return self.lines(plane)
 
     def lines(self, plane: Plane | None = None) -> SpectralExperiment:
@@ -158,7 +165,8 @@ class Reading:
             if self.band is not None:
                 frf = frf.select(self.band)
             weights = self.noise.weights(frf, frf.response.shape)
-            return SpectralExperiment.of_response(frf, hold, weights, plane)
+            made = SpectralExperiment.of_response(frf, hold, weights, plane)
+            return dataclasses.replace(made, place=self.place)
         record = self.data
         at_input = isinstance(hold, PeriodicHold) and np.isclose(
             hold.period, record.input_dt, rtol=1e-9
@@ -170,6 +178,7 @@ class Reading:
         weights = self.noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
+        made = dataclasses.replace(made, place=self.place)
         return made.with_offsets(s.n_samples) if self.offset else made
 
     def _samples(self, plane: Plane | None) -> TimeExperiment:
@@ -185,7 +194,7 @@ class Reading:
             )
         lines = None if self.band is None else spectra(record, self.band)
         free = self.initial_state == "estimate"
-        return TimeExperiment(record, hold if plane is None else None, lines, free)
+        return TimeExperiment(record, hold if plane is None else None, lines, free, self.place)
 
 
 def read_for(

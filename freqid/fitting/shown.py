@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError
 from freqid.fitting import printed
+from freqid.fitting.separate import separate_values
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
     import control
+    import pandas as pd
     from matplotlib.axes import Axes
 
     from freqid.data import Record
@@ -21,6 +23,19 @@ class Shown:
 
     model: Any
     hold: Hold
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Values, standard errors and intervals of the free parameters."""
+        raise NotImplementedError
+
+    @property
+    def separate(self) -> pd.DataFrame:
+        """Parameters that each experiment has for itself, with their standard errors.
+
+        A row for each experiment, columns ``fm``, ``fm_std``, …; NaN where one is known.
+        """
+        return separate_values(self.parameters)
 
     def to_control(self, pade: int | None = None) -> control.StateSpace:
         """The estimated model as a ``control.StateSpace``."""

@@ -23,6 +23,7 @@ from freqid.data import Record
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
@@ -82,28 +83,27 @@ class Testimony:
 
     def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
         grey = self._grey(structure, readings)
-        model, order = structure.at(grey.x), len(structure.model.state_space().A)
+        order = len(structure.model.state_space().A)
         if grey.cost <= 1e-18 * self.minimum.objective.energy:
             sentence = "the estimate leaves nothing but the rounding of the data"
             return Witness("complete", sentence, 0.0, 0.0, 1.0)
         if not self.minimum.solution.converged:
             return Witness("absent", "the descent has not come to a minimum")
-        found = Reference.of(model, readings)
-        beside = found.beside(model, readings)
-        box = min(found, beside, key=lambda r: r.cost)
+        boxes = [_beside(structure, readings, grey, g) for g in _groups(structure, readings)]
+        cost = sum(b.cost for b in boxes)
         free = len(self.minimum.x) - int(self.minimum.determined.loose.sum())
-        top = box.unknowns - free
-        bottom = box.objective.n_rows - box.solution.point.n_initial - box.unknowns
+        top = sum(b.unknowns for b in boxes) - free
+        bottom = sum(b.objective.n_rows - b.solution.point.n_initial - b.unknowns for b in boxes)
         if bottom < 1:
-            return Witness("absent", "the data are too few for a black box beside it", box.cost)
+            return Witness("absent", "the data are too few for a black box beside it", cost)
         if top < 1:
-            return self._alike(order, box.cost, grey.cost / box.cost - 1)
-        f = excess(structure, readings, box, grey) * bottom / top
+            return self._alike(order, cost, grey.cost / cost - 1)
+        f = excess(structure, readings, boxes, grey) * bottom / top
         p = float(scipy.stats.f.sf(f, top, bottom))
         numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
-        gap = grey.cost / box.cost - 1
+        gap = grey.cost / cost - 1
         verdict, sentence = self._verdict(order, numbers, p, gap, self._open())
-        return Witness(verdict, sentence, box.cost, float(f), p, (top, bottom))
+        return Witness(verdict, sentence, cost, float(f), p, (top, bottom))
 
     def _alike(self, order: int, cost: float, gap: float) -> Witness:
         """A plant with as much freedom as the black box: the same minimum, or a missed one."""
@@ -150,34 +150,55 @@ class Testimony:
         return polish(Objective(structure, [r.lines() for r in readings]), begin)
 
 
+def _groups(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:
+    """Numbers of the experiments that meet the same plant."""
+    if isinstance(structure, PlacedStructure):
+        return structure.groups
+    return [list(range(len(readings)))]
+
+
+def _beside(
+    structure: GreyStructure, readings: Sequence[Reading], grey: Solution, group: Sequence[int]
+) -> Reference:
+    """The black box of the experiments that meet one plant, begun from the data or from it."""
+    model, own = structure.at(grey.x, group[0]), [readings[i] for i in group]
+    found = Reference.of(model, own)
+    return min(found, found.beside(model, own), key=lambda r: r.cost)
+
+
 def excess(
     structure: GreyStructure,
     readings: Sequence[Reading],
-    box: Reference,
+    boxes: Sequence[Reference],
     grey: Solution,
     by_grey: bool = False,
 ) -> float:
-    """(V − V_bb)/V_bb, weighted by what the black box leaves where nothing else is known.
+    """(V − V_bb)/V_bb, weighted by what the black boxes leave where nothing else is known.
 
-    ``by_grey`` weights by what the grey box leaves: a black box of a higher order has taken part of
-    the noise itself.
+    There is one of these for each group of experiments that meet the same plant. ``by_grey``
+    weights by what the grey box leaves: a black box of a higher order has taken part of the noise
+    itself.
     """
-    model: Model = DiscreteModel(
-        box.chart.in_z(box.solution.x), box.chart.dt, readings[0].hold,
-        structure.model.inputs or (), structure.model.outputs or (),
-    )  # fmt: skip
-    if by_grey:
-        model = structure.at(grey.x)
-    weighted = []
-    for r in readings:
-        left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
-        # weights that are not needed would add their own scatter
-        if left is not None and not evenly_spread(left.error):
-            weighted.append(r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples)))
-        else:
-            weighted.append(r)
+    groups = _groups(structure, readings)
+    weighted = list(readings)
+    for box, group in zip(boxes, groups, strict=True):
+        model: Model = DiscreteModel(
+            box.chart.in_z(box.solution.x), box.chart.dt, readings[group[0]].hold,
+            structure.model.inputs or (), structure.model.outputs or (),
+        )  # fmt: skip
+        if by_grey:
+            model = structure.at(grey.x, group[0])
+        for i in group:
+            r = readings[i]
+            left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
+            # weights that are not needed would add their own scatter
+            if left is not None and not evenly_spread(left.error):
+                weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))
+    cost = sum(b.cost for b in boxes)
     if all(new is old for new, old in zip(weighted, readings, strict=True)):
-        return max(grey.cost / box.cost - 1, 0.0)
+        return max(grey.cost / cost - 1, 0.0)
     seen = Objective(structure, [r.lines() for r in weighted])
-    other = box.on(weighted)
-    return max(polish(seen, grey.x).cost / other.cost - 1, 0.0)
+    others = sum(
+        box.on([weighted[i] for i in group]).cost for box, group in zip(boxes, groups, strict=True)
+    )
+    return max(polish(seen, grey.x).cost / others - 1, 0.0)

@@ -33,4 +33,5 @@ def measured(
         input_names=record.input_names,
         output_names=record.output_names,
         reach=reach,
+        conditions=record.conditions,
     )

@@ -8,6 +8,7 @@ from freqid.lti.holds import (
     BandLimited,
     FirstOrderHold,
     Hold,
+    InputHolds,
     PeriodicHold,
     Sampled,
     ZeroOrderHold,

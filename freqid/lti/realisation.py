@@ -73,6 +73,10 @@ class Realisation:
         """Choose the state coordinates for these matrices."""
         return cls(linearisation, basis_of(*linearisation), period, delay)
 
+    def for_place(self, place: int) -> Realisation:
+        """The plant as experiment number ``place`` meets it: the same for all."""
+        return self
+
     def scaled(self, by: FloatArray) -> Realisation:
         """The same point with each derivative multiplied, (P,)."""
         at, d = self.linearisation

@@ -5,6 +5,7 @@ It may import checks, lti and data.
 
 from freqid.models.conversion import ModelLike, SystemModel, as_model
 from freqid.models.grey_box import GreyBox
+from freqid.models.mechanics import mechanical
 from freqid.models.model import Model
 from freqid.models.output_error import DiscreteModel, OutputError, coefficients_of
 from freqid.models.parameter import Parameter

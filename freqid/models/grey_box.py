@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, channel_names, finite, unknown
+from freqid.data import as_conditions
 from freqid.lti import Linearisation, StateSpace
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction, without
 from freqid.models.model import Model
@@ -37,6 +38,8 @@ class GreyBox(Model):
             returns matrices with that leading axis. It only saves time.
         input_delay: by how much the inputs come late: in s, the name of a parameter (in s, which
             ``matrices`` need not take), or one of these for each input.
+        conditions: what ``matrices`` is told beside the parameters, a posture or a load, with the
+            values used where a record does not say them (``record.with_conditions``).
 
     Raises ValueError when the matrices do not have agreeing shapes or are not finite, or when two
     parameters share a name.
@@ -58,6 +61,7 @@ class GreyBox(Model):
     ties: Mapping[str, str] = field(default_factory=dict)
     jacobian: Jacobian | None = None
     input_delay: float | str | Sequence[float | str] | None = None
+    conditions: Mapping[str, float] = field(default_factory=dict)
     _function: MatrixFunction = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -69,11 +73,23 @@ class GreyBox(Model):
         names = [p.name for p in parameters]
         if len(set(names)) < len(names):
             raise InputError(f"parameters={names} has a name twice; names must differ")
+        conditions = as_conditions(self.conditions)
+        object.__setattr__(self, "conditions", conditions)
+        if both := set(names) & set(conditions):
+            raise InputError(
+                f"conditions: {sorted(both)[0]!r} is a parameter; a record makes a parameter known "
+                "by a condition of its name, so leave it out here"
+            )
         ties = Ties(self.ties, names)
         nominal = ties.resolve({p.name: p.value for p in parameters})
         timing = self._delay_names(names)
         function = MatrixFunction(
-            without(self.matrices, timing), ties, self.vectorized, self.jacobian, nominal
+            without(self.matrices, timing),
+            ties,
+            self.vectorized,
+            self.jacobian,
+            nominal,
+            conditions,
         )
         object.__setattr__(self, "_function", function)
         at = self.state_space()
@@ -87,6 +103,10 @@ class GreyBox(Model):
             self, "outputs", channel_names("outputs", self.outputs, at.C.shape[0], "y")
         )
         object.__setattr__(self, "inputs", channel_names("inputs", self.inputs, at.B.shape[1], "u"))
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore; what version 0.1.0 wrote lacks what it did not know."""
+        self.__dict__.update({"conditions": {}} | state)
 
     @property
     def _given_delays(self) -> tuple[float | str, ...]:
@@ -152,6 +172,32 @@ class GreyBox(Model):
         200000.0
         """
         return self._changed({name: {"value": value} for name, value in values.items()})
+
+    def with_conditions(self, **conditions: float) -> GreyBox:
+        """The same plant at other conditions, and other values of parameters that are among them.
+
+        Raises ValueError for a name that is neither.
+
+        >>> import freqid as fq
+        >>> arm = fq.GreyBox(lambda k, q: ([[-k * q]], [[1.0]], [[1.0]], None),
+        ...                  [fq.Parameter("k", 2.0)], conditions={"q": 1.0})
+        >>> arm.with_conditions(q=3.0).poles.real
+        array([-6.])
+        """
+        for name in conditions:
+            if name not in self.conditions and name not in self.values:
+                raise InputError(unknown("conditions", name, [*self.conditions, *self.values]))
+        known = {n: v for n, v in conditions.items() if n in self.values}
+        other = copy.copy(self.with_values(**known) if known else self)
+        own = {n: v for n, v in conditions.items() if n in self.conditions}
+        new = {**self.conditions, **as_conditions(own)}
+        object.__setattr__(other, "conditions", new)
+        object.__setattr__(other, "_function", self._function.under(new))
+        return other
+
+    def met_at(self, conditions: Mapping[str, float]) -> GreyBox:
+        """The plant as an experiment under these conditions meets it."""
+        return self.with_conditions(**conditions) if conditions else self
 
     def fix(self, *names: str) -> GreyBox:
         """The same plant with these parameters held at their values in a fit."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -55,19 +57,33 @@ class MatrixFunction:
         vectorized: bool,
         jacobian: Jacobian | None,
         nominal: Mapping[str, float],
+        conditions: Mapping[str, float],
     ) -> None:
         self.matrices, self.ties, self.nominal = matrices, ties, nominal
-        self.vectorized, self.jacobian = vectorized, jacobian
+        self.vectorized, self.jacobian, self.conditions = vectorized, jacobian, conditions
         self._carries: dict[tuple[str, ...], bool] = {}
         self._believed: set[tuple[str, ...]] = set()
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore; what version 0.1.0 wrote lacks what it did not know."""
+        self.__dict__.update({"conditions": {}} | state)
+
+    def under(self, conditions: Mapping[str, float]) -> MatrixFunction:
+        """The same function where other conditions are set."""
+        other = copy.copy(self)
+        other.conditions = conditions
+        return other
+
+    def _matrices(self, values: Mapping[str, object]) -> Sequence[object]:
+        return self.matrices(**values, **self.conditions)
 
     def at(self, values: Mapping[str, float]) -> StateSpace:
         """Dense, finite matrices of agreeing shapes; ValueError where there are none."""
         resolved = self.ties.resolve(values)
         try:
-            matrices = self.matrices(**resolved)
+            matrices = self._matrices(resolved)
         except Exception as error:  # the user's function may raise anything
-            where = ", ".join(f"{k}={v:g}" for k, v in resolved.items())
+            where = ", ".join(f"{k}={v:g}" for k, v in {**resolved, **self.conditions}.items())
             raise InputError(f"the model cannot be computed at {where}: {error}") from error
         return _shaped(matrices, resolved)
 
@@ -75,9 +91,9 @@ class MatrixFunction:
         """Matrices (S, …) at many points, each column (S,)."""
         full = self.ties.resolve(columns)
         if self.vectorized:
-            return StateSpace(*(np.asarray(M, dtype=float) for M in self.matrices(**full)))
+            return StateSpace(*(np.asarray(M, dtype=float) for M in self._matrices(full)))
         rows = [dict(zip(full, row, strict=True)) for row in np.array(list(full.values())).T]
-        each = [_dense(self.matrices(**{k: float(v) for k, v in r.items()}), float) for r in rows]
+        each = [_dense(self._matrices({k: float(v) for k, v in r.items()}), float) for r in rows]
         return StateSpace(*(np.stack(M) for M in zip(*each, strict=True)))
 
     def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
@@ -93,7 +109,7 @@ class MatrixFunction:
                 StateSpace(*(M[0] for M in at)), StateSpace(*(M[0] for M in derivative))
             )
         resolved = self.ties.resolve(values)
-        at = _shaped(self.matrices(**resolved), resolved)
+        at = _shaped(self._matrices(resolved), resolved)
         if self.jacobian is not None:
             self._check_jacobian(names)
             return Linearisation(at, self._by_jacobian(at, values, names))
@@ -105,7 +121,7 @@ class MatrixFunction:
     ) -> StateSpace:
         """The user's derivatives, carried through the ties by the chain rule."""
         assert self.jacobian is not None
-        by = self.jacobian(**self.ties.resolve(values))
+        by = self.jacobian(**self.ties.resolve(values), **self.conditions)
         total = [np.zeros((len(names), *M.shape)) for M in at]
         for i, name in enumerate(names):
             moved = self.ties.resolve({**values, name: values[name] + _COMPLEX_STEP * 1j})
@@ -170,7 +186,7 @@ class MatrixFunction:
         flat = dict(zip(names, stacked.reshape(len(names), -1), strict=True))
         matrices = [
             np.asarray(M).reshape(S, count + 1, *np.asarray(M).shape[1:])
-            for M in self.matrices(**self.ties.resolve(flat))
+            for M in self._matrices(self.ties.resolve(flat))
         ]
         return (
             StateSpace(*(M[:, 0].real for M in matrices)),
@@ -189,13 +205,13 @@ class MatrixFunction:
             v = values[name]
             if by_complex_step:
                 stepped = self.ties.resolve({**values, name: v + _COMPLEX_STEP * 1j})
-                moved = _dense(self.matrices(**stepped), complex)
+                moved = _dense(self._matrices(stepped), complex)
                 columns.append([M.imag / _COMPLEX_STEP for M in moved])
             else:
                 # the step that balances rounding against the third derivative
                 step = np.finfo(float).eps ** (1 / 3) * max(abs(v), 1e-8)
                 up, down = (
-                    _dense(self.matrices(**self.ties.resolve({**values, name: v + s})), float)
+                    _dense(self._matrices(self.ties.resolve({**values, name: v + s})), float)
                     for s in (step, -step)
                 )
                 columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, InputError, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, whole
 from freqid.data import FrequencyResponse
 from freqid.lti import (
     BandLimited,
     Hold,
+    InputHolds,
     Linearisation,
     PeriodicHold,
     Realisation,
@@ -71,6 +73,10 @@ class Model(ABC):
     def poles(self) -> ComplexArray:
         """Poles, (n,): in rad/s, or in the z plane where the model is a sampled one."""
         return np.linalg.eigvals(self.state_space().A).astype(complex)
+
+    def met_at(self, conditions: Mapping[str, float]) -> Model:
+        """The model as an experiment under these conditions meets it."""
+        return self
 
     @property
     def own_hold(self) -> Hold | None:
@@ -132,6 +138,8 @@ class Model(ABC):
                 f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
                 "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
             )
+        if isinstance(hold, InputHolds):
+            return self._by_input(at, hold)
         between = BandLimited() if hold is None or self.dt else hold
         z = on_circle(at * self.dt) if self.dt else points(at, between)
         if self.late:
@@ -145,6 +153,17 @@ class Model(ABC):
             at / (2 * np.pi), G, dt=dt, hold=hold,
             input_names=self.inputs, output_names=self.outputs,
         )  # fmt: skip
+
+    def _by_input(self, omega: FloatArray, holds: InputHolds) -> FrequencyResponse:
+        """The response where each input has a hold of its own."""
+        parts = {h: self.frequency_response(omega, h) for h, _ in holds.groups}
+        if len(holds.holds) != self.n_inputs:
+            raise InputError(f"hold has {len(holds.holds)} entries for {self.n_inputs} inputs")
+        columns = [parts[h].response[:, i] for i, h in enumerate(holds.holds)]
+        dt = max(part.dt for part in parts.values())
+        return dataclasses.replace(
+            next(iter(parts.values())), response=np.stack(columns, axis=1), dt=dt, hold=holds
+        )
 
     def to_control(self, pade: int | None = None) -> control.StateSpace:
         """The model as a ``control.StateSpace``, continuous or discrete as it is.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.linalg
@@ -10,8 +10,8 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive, samples
-from freqid.data import Record
-from freqid.lti import Hold, PeriodicHold, Sampled, ZeroOrderHold, as_hold
+from freqid.data import Record, as_holds
+from freqid.lti import Hold, InputHolds, PeriodicHold, Sampled, ZeroOrderHold
 from freqid.models.conversion import ModelLike, as_model
 from freqid.models.model import Model
 
@@ -120,7 +120,7 @@ def simulate(
     model: ModelLike,
     u: ArrayLike,
     dt: float,
-    hold: Hold | str | None = None,
+    hold: Hold | str | Mapping[str, Hold | str] | None = None,
     initial_state: ArrayLike | None = None,
     input_names: Sequence[str] | None = None,
     output_names: Sequence[str] | None = None,
@@ -132,7 +132,8 @@ def simulate(
             have ``dt`` as its sample time.
         u: input samples, (N,) or (N, inputs), ``dt`` seconds apart.
         hold: what the input does between its samples: None or ``"zoh"``, ``"foh"``, ``"bl"``
-            (then the response is the periodic one, the input repeating for ever).
+            (then the response is the periodic one, the input repeating for ever), or one of these
+            for each input by name.
         input_names, output_names: of the channels, ``u`` and ``y`` where not given.
         initial_state: state of the plant at the first sample, (n,); None starts from rest.
 
@@ -145,14 +146,16 @@ def simulate(
     """
     dt = positive("dt", dt, "s")
     u = samples("u", u)
-    between = as_hold("zoh" if hold is None else hold, dt)
-    if isinstance(between, PeriodicHold) and abs(between.period - dt) > 1e-9 * dt:
-        raise InputError(
-            f"hold={between!r} must have the period dt={dt:g} s of the input's samples"
-        )
     plant = as_model(model)
     system = plant.state_space()
     inputs = u.reshape(len(u), -1)
+    names = input_names or plant.inputs or ()
+    between = as_holds(hold, dt, ZeroOrderHold(dt), names)
+    for each in InputHolds.each(between, 1):
+        if isinstance(each, PeriodicHold) and abs(each.period - dt) > 1e-9 * dt:
+            raise InputError(
+                f"hold={each!r} must have the period dt={dt:g} s of the input's samples"
+            )
     n, m = system.B.shape
     if inputs.shape[1] != m:
         raise InputError(f"u has {inputs.shape[1]} channels and the model {m} inputs; give as many")
@@ -161,24 +164,13 @@ def simulate(
         raise InputError(f"initial_state has shape {x0.shape}; the model has {n} states")
     if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
         raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
-    if plant.late and isinstance(between, PeriodicHold):
-        late, shifts = late_sampled(plant, between), late_samples(plant, dt)
-        seen = np.array([_shifted(c, q) for c, q in zip(inputs.T, shifts, strict=True)])
-        # an input of the next sample has come already when it is late by less than one
-        following = np.array([_shifted(c, q - 1) for c, q in zip(inputs.T, shifts, strict=True)])
-        x = propagate(late.phi, late.gamma @ seen + late.gamma_next @ following, x0)
-        y = (system.C @ x + system.D @ seen).T
-    elif plant.dt or isinstance(between, PeriodicHold):
-        sampled = plant.sampled(between)
-        x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
-        y = (system.C @ x + system.D @ inputs.T).T
-    else:
-        if initial_state is not None:
-            raise InputError("initial_state has no meaning for a band-limited, periodic input")
-        omega = 2 * np.pi * np.fft.rfftfreq(len(u), dt)
-        G = plant.frequency_response(omega, between).response
-        U = np.fft.rfft(inputs, axis=0)
-        y = np.fft.irfft(np.einsum("pmk,km->kp", G, U), n=len(u), axis=0)
+    y = np.zeros((len(u), len(system.C)))
+    groups = between.groups if isinstance(between, InputHolds) else [(between, list(range(m)))]
+    for number, (each, members) in enumerate(groups):
+        own = np.zeros_like(inputs)
+        own[:, members] = inputs[:, members]
+        begin = x0 if number == 0 else np.zeros(n)
+        y += _outputs(plant, own, dt, each, begin, initial_state is not None)
     return Record(
         u,
         y[:, 0] if y.shape[1] == 1 and u.ndim == 1 else y,
@@ -186,4 +178,29 @@ def simulate(
         hold=between,
         input_names=input_names,
         output_names=output_names,
+        conditions=getattr(plant, "conditions", None),
     )
+
+
+def _outputs(
+    plant: Model, inputs: FloatArray, dt: float, hold: Hold, x0: FloatArray, begun: bool
+) -> FloatArray:
+    """Outputs (N, outputs) under one hold from the state x0, which was ``begun`` by a user."""
+    system = plant.state_space()
+    if plant.late and isinstance(hold, PeriodicHold):
+        late, shifts = late_sampled(plant, hold), late_samples(plant, dt)
+        seen = np.array([_shifted(c, q) for c, q in zip(inputs.T, shifts, strict=True)])
+        # an input of the next sample has come already when it is late by less than one
+        following = np.array([_shifted(c, q - 1) for c, q in zip(inputs.T, shifts, strict=True)])
+        x = propagate(late.phi, late.gamma @ seen + late.gamma_next @ following, x0)
+        return (system.C @ x + system.D @ seen).T
+    if plant.dt or isinstance(hold, PeriodicHold):
+        sampled = plant.sampled(hold)
+        x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
+        return (system.C @ x + system.D @ inputs.T).T
+    if begun:
+        raise InputError("initial_state has no meaning for a band-limited, periodic input")
+    omega = 2 * np.pi * np.fft.rfftfreq(len(inputs), dt)
+    G = plant.frequency_response(omega, hold).response
+    U = np.fft.rfft(inputs, axis=0)
+    return np.fft.irfft(np.einsum("pmk,km->kp", G, U), n=len(inputs), axis=0)

@@ -98,7 +98,7 @@ def compare(
         )
     limits = as_band(band, record.nyquist)
     choice("initial_state", initial_state, ("estimate", "steady"))
-    given, hold = as_model(model), own_hold(model, hold, record)
+    given, hold = as_model(model).met_at(record.conditions), own_hold(model, hold, record)
     residual = -line_errors(given, record, hold, None, initial_state).in_time()
     y = record.outputs[: len(residual)]
     if limits is not None:
@@ -128,7 +128,7 @@ def _with_response(
     """The model's response beside a measured one, each output in per cent."""
     if band is not None:
         frf = frf.select(band)
-    given, found = as_model(model), own_hold(model, hold, frf)
+    given, found = as_model(model).met_at(frf.conditions), own_hold(model, hold, frf)
     if isinstance(found, str):
         found = as_hold(found, frf.dt or 1.0, frf.hold)
     if found is None:

@@ -66,7 +66,7 @@ def residual_test(
         raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
     limits = as_band(band, record.nyquist)
     hold = own_hold(model, hold, record)
-    e = -line_errors(as_model(model), record, hold).in_time()
+    e = -line_errors(as_model(model).met_at(record.conditions), record, hold).in_time()
     u = record.inputs[:: record.factor][: len(e)]
     N = len(e)
     if limits is not None:

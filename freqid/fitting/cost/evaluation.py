@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from freqid.fitting.cost.delays import unknown_inputs
 from freqid.lti import BandLimited, PeriodicHold, Realisation, sum_runs, transition
 
 if TYPE_CHECKING:
-    from freqid.fitting.cost.experiments import SpectralExperiment
+    from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 
 
 class SpectralEvaluation:
@@ -110,3 +111,20 @@ class SpectralEvaluation:
         other.unknown, other.U, other.U_state = None, self.U + more, self.U_state + more
         other.x = self.x + np.einsum("nck,c->nk", self._x_unknown, samples)[:, None]
         return other
+
+
+class SumOfEvaluations:
+    """Inputs that were held in several ways: what each group does, one beside the other."""
+
+    def __init__(self, parts: Sequence[Evaluation]) -> None:
+        self.parts = parts
+        self.residual: FloatArray = np.sum([e.residual for e in parts], axis=0)
+        self.transient = parts[0].transient
+
+    def jacobian(self, initial: FloatArray | None) -> FloatArray:
+        """Derivative of the residual by each parameter, (P, rows)."""
+        first, *others = self.parts
+        total: FloatArray = first.jacobian(initial)
+        for e in others:
+            total = total + e.jacobian(None)
+        return total

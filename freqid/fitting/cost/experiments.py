@@ -15,17 +15,19 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from freqid.checks import FloatArray, IntArray
 from freqid.data import FrequencyResponse
-from freqid.fitting.cost.evaluation import SpectralEvaluation
+from freqid.fitting.cost.evaluation import SpectralEvaluation, SumOfEvaluations
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf import Spectra
 from freqid.lti import (
     Hold,
+    InputHolds,
     PeriodicHold,
     Plane,
     Realisation,
@@ -71,7 +73,8 @@ class SpectralExperiment:
     model's matrices are taken as they are. ``n_rows`` counts real values. The noise of a
     ``response`` need not be alike at lines that are neighbours, and may go together within the
     ``reach`` of some lines. ``added`` (q, rows) are shapes of unknown size in the output, offsets
-    of the sensor, which are eliminated with the initial state.
+    of the sensor, which are eliminated with the initial state. ``place`` is the number of the
+    experiment where these differ in more than their data.
     """
 
     lines: Lines
@@ -84,6 +87,7 @@ class SpectralExperiment:
     response: bool = False
     reach: int = 0
     added: FloatArray | None = None
+    place: int = 0
 
     @classmethod
     def of(
@@ -96,14 +100,16 @@ class SpectralExperiment:
         plane: Plane | None = None,
     ) -> SpectralExperiment:
         """``transient_dt`` is the sample time of the output; None leaves the transient out."""
+        # the free motion is that of the sampled states, whatever drives them
+        seen_by = hold.groups[0][0] if isinstance(hold, InputHolds) else hold
         if lift > 1 and isinstance(hold, PeriodicHold):
             z = on_circle(hold.period * lift * lines.omega)
         else:
-            z = points(lines.omega_input.ravel(), hold)
+            z = points(lines.omega_input.ravel(), seen_by)
         n_rows = 2 * int(np.count_nonzero(lines.scale)) - n_real
         discrete, transient = plane is not None, None
         if transient_dt is not None:
-            transient = Transient.of(lines, transient_dt, hold, z, discrete, lift)
+            transient = Transient.of(lines, transient_dt, seen_by, z, discrete, lift)
         made = cls(lines, Points(z, lines.U), transient, hold, n_rows, lift, discrete)
         return made if plane is None or plane.a == 0 else made.in_plane(plane)
 
@@ -216,7 +222,26 @@ class SpectralExperiment:
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
-        return SpectralEvaluation(self, realisation)
+        met = realisation.for_place(self.place)
+        if isinstance(self.hold, InputHolds):
+            return SumOfEvaluations([e.at(met) for e in self._by_hold])
+        return SpectralEvaluation(self, met)
+
+    @cached_property
+    def _by_hold(self) -> list[SpectralExperiment]:
+        """The same lines with the inputs of each hold alone, the data with the first."""
+        assert isinstance(self.hold, InputHolds)
+        parts = []
+        for number, (hold, members) in enumerate(self.hold.groups):
+            own = np.zeros(len(self.lines.U), bool)
+            own[members] = True
+            keep = own.reshape(-1, *(1,) * (self.lines.U.ndim - 1))
+            U, first = self.lines.U * keep, number == 0
+            lines = dataclasses.replace(self.lines, U=U, Y=self.lines.Y * first)
+            z = points(lines.omega_input.ravel(), hold)
+            made = dataclasses.replace(self, lines=lines, points=Points(z, U), hold=hold)
+            parts.append(made if first else dataclasses.replace(made, transient=None, added=None))
+        return parts
 
 
 def thinned_to(

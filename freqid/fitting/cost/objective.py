@@ -46,12 +46,14 @@ class ScannableStructure(Structure, Protocol):
         """Lowest and highest values to scatter starts over."""
         ...
 
-    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> ComplexArray:
+    def responses(
+        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
+    ) -> ComplexArray:
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""
         ...
 
     def sensitivities(
-        self, points: FloatArray, omega: FloatArray, hold: Hold
+        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
     ) -> tuple[ComplexArray, ComplexArray]:
         """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
         ...

@@ -34,6 +34,7 @@ class PeriodicExperiment:
     data: PeriodicResponse
     hold: Hold
     discrete: bool = False
+    place: int = 0
 
     @property
     def n_rows(self) -> int:
@@ -55,7 +56,7 @@ class PeriodicExperiment:
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
-        omega = self.data.omega
+        omega, realisation = self.data.omega, realisation.for_place(self.place)
         if self.discrete:
             plant = realisation.basis.through(BandLimited())
             G, dG = response_and_derivatives(plant, on_circle(omega * self.data.dt))

@@ -13,7 +13,7 @@ from freqid.models import GreyBox
 
 @dataclass(frozen=True)
 class Place:
-    """One experiment's ``conditions``, and the parameters that it ``known``-s, by name."""
+    """Experiment ``number``: its ``conditions``, and the parameters that are ``known`` there."""
 
     number: int
     conditions: Mapping[str, float]
@@ -28,18 +28,20 @@ def places_of(
         if name not in model.values:
             raise InputError(unknown("separate", name, model.values))
         if not any(p.name == name for p in model.free_parameters):
-            raise InputError(f"separate={name!r} is fixed or tied; free it with model.free({name!r})")
+            raise InputError(f"separate={name!r} is fixed or tied; free it first: model.free(name)")
         if name in model.delay_sources:
             raise InputError(f"separate={name!r} is a delay, which all experiments share")
     places = []
     for number, d in enumerate(data):
         for name in d.conditions:
             if name not in model.conditions and name not in model.values:
-                raise InputError(unknown("conditions", name, [*model.conditions, *model.values]))
+                allowed = [*model.conditions, *model.values]
+                raise InputError(unknown(f"conditions of data set {number}", name, allowed))
             if name in model.ties:
                 raise InputError(f"condition {name!r} is tied to {model.ties[name]!r} in the model")
-        own = {n: v for n, v in d.conditions.items() if n in model.values}
-        places.append(Place(number, {**model.conditions, **d.conditions}, own))
+        known = {n: v for n, v in d.conditions.items() if n in model.values}
+        set_here = {n: d.conditions.get(n, v) for n, v in model.conditions.items()}
+        places.append(Place(number, set_here, known))
     silent = [n for n in model.conditions if not any(n in d.conditions for d in data)]
     notes = [
         f"condition {n}: no data set says it; the model's own {model.conditions[n]:g} is taken"
@@ -49,19 +51,32 @@ def places_of(
 
 
 class Family(Realisation):
-    """A plant at one trial point, at each place of the experiments: made when it is asked for."""
+    """A plant at one trial point, at the place of each experiment: made when it is asked for.
 
-    def __init__(self, make: Callable[[int], Realisation], first: int = 0) -> None:
-        self._make, self._made = make, {}
-        own = self.for_place(first)
-        self.__dict__.update(own.__dict__)
+    To what asks for no place it is the plant at its own conditions.
+    """
+
+    def __init__(self, own: Realisation, make: Callable[[int], Realisation]) -> None:
+        self.__dict__.update(own.__dict__, own=own, make=make, made={})
 
     def for_place(self, place: int) -> Realisation:
         """The plant as one experiment meets it."""
-        if place not in self._made:
-            self._made[place] = self._make(place)
-        return self._made[place]
+        made: dict[int, Realisation] = self.__dict__["made"]
+        if place not in made:
+            made[place] = self.__dict__["make"](place)
+        return made[place]
 
     def scaled(self, by: FloatArray) -> Realisation:
         """The same point with each derivative multiplied, (P,)."""
-        return Family(lambda place: self.for_place(place).scaled(by))
+        own: Realisation = self.__dict__["own"]
+        return Family(own.scaled(by), lambda place: self.for_place(place).scaled(by))
+
+    def without(self, index: int) -> Realisation:
+        """The same point without the derivative by one unknown, which is held."""
+        own: Realisation = self.__dict__["own"]
+        return Family(own.without(index), lambda place: self.for_place(place).without(index))
+
+    def at_known_period(self) -> Realisation:
+        """The plant at its own conditions."""
+        own: Realisation = self.__dict__["own"]
+        return own

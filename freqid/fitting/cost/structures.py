@@ -41,6 +41,7 @@ class GreyStructure:
 
     ``known`` nuisances stay at their start. ``start`` gives values to begin from; one next to zero
     keeps the size of the model's own. The unknowns of an ``anonymous`` one mean nothing to a user.
+    ``parameters`` are those that a fit moves, those of the model where not given.
     """
 
     def __init__(
@@ -50,9 +51,11 @@ class GreyStructure:
         unknown: Sequence[Nuisance] = (),
         known: Sequence[Nuisance] = (),
         anonymous: bool = False,
+        parameters: Sequence[Parameter] | None = None,
     ) -> None:
         self.model, self.unknown, self.known = model, tuple(unknown), tuple(known)
-        self.parameters = tuple(_not_early(p, model) for p in model.free_parameters)
+        chosen = model.free_parameters if parameters is None else parameters
+        self.parameters = tuple(_not_early(p, model) for p in chosen)
         self.physical_names = [p.name for p in self.parameters]
         self.count = len(self.parameters)
         begin = {} if start is None else start
@@ -97,8 +100,8 @@ class GreyStructure:
         theta = (x * self.scale[: len(x)]).tolist()
         return dict(zip(self.physical_names, theta, strict=False))
 
-    def at(self, x: FloatArray) -> GreyBox:
-        """The plant at x."""
+    def at(self, x: FloatArray, place: int | None = None) -> GreyBox:
+        """The plant at x; it is the same at every ``place``."""
         return self.model.with_values(**self.physical(x))
 
     def realise(self, x: FloatArray) -> Realisation:
@@ -118,7 +121,9 @@ class GreyStructure:
             plant = nuisance.applied(plant, nuisance.start, None)
         return plant
 
-    def responses(self, points: FloatArray, omega: FloatArray, hold: Hold) -> ComplexArray:
+    def responses(
+        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
+    ) -> ComplexArray:
         """Responses at many points (S, P), (S, outputs, inputs, lines)."""
         if self.unknown or self.model.delay_sources:
             each = [sampled_response(self.realise(x), omega, hold)[0] for x in points]
@@ -128,7 +133,7 @@ class GreyStructure:
         return many_responses(self.model.state_spaces(**columns), omega, hold)
 
     def sensitivities(
-        self, points: FloatArray, omega: FloatArray, hold: Hold
+        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
     ) -> tuple[ComplexArray, ComplexArray]:
         """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
         if self.unknown or self.known or self.model.delay_sources:
@@ -142,14 +147,14 @@ class GreyStructure:
         return response_and_derivatives(basis.through(hold), np.tile(z, (len(points), 1)))
 
     def _one_by_one(
-        self, points: FloatArray, omega: FloatArray, hold: Hold
+        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
     ) -> tuple[ComplexArray, ComplexArray]:
         p, m, count = self.model.n_outputs, self.model.n_inputs, points.shape[1]
         G = np.full((len(points), p, m, len(omega)), np.nan + 0j)
         dG = np.full((len(points), count, p, m, len(omega)), np.nan + 0j)
         for i, x in enumerate(points):
             try:
-                G[i], dG[i] = sampled_response(self.realise(x), omega, hold)
+                G[i], dG[i] = sampled_response(self.realise(x).for_place(place), omega, hold)
             except Exception:
                 continue
         return G, dG

@@ -27,12 +27,13 @@ class TimeExperiment:
         hold: PeriodicHold | None,
         lines: Spectra | None,
         free_state: bool,
+        place: int = 0,
     ) -> None:
         self.factor = record.factor
         N = len(record.u) // self.factor
         self.u = record.inputs[: N * self.factor].T
         self.y = record.outputs[:N].T
-        self.hold, self.free_state = hold, free_state
+        self.hold, self.free_state, self.place = hold, free_state, place
         self.lines = None
         if lines is not None:
             index = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
@@ -46,7 +47,7 @@ class TimeExperiment:
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
-        return _TimeEvaluation(self, realisation.linearisation)
+        return _TimeEvaluation(self, realisation.for_place(self.place).linearisation)
 
     def rows(self, y: Array) -> FloatArray:
         """(…, outputs, N) as real rows."""

@@ -34,10 +34,11 @@ class LogResponse:
         response: ComplexArray,
         hold: Hold,
         weight: FloatArray | float = 1.0,
+        place: int = 0,
     ) -> None:
         self.omega, self.measured, self.hold = omega, response, hold
         self.weight = np.broadcast_to(weight, response.shape)
-        self.n_rows = 2 * response.size
+        self.n_rows, self.place = 2 * response.size, place
 
     @property
     def energy(self) -> float:
@@ -46,7 +47,7 @@ class LogResponse:
 
     def at(self, realisation: Realisation) -> _LogEvaluation:
         """Evaluate at one trial point."""
-        return _LogEvaluation(self, realisation)
+        return _LogEvaluation(self, realisation.for_place(self.place))
 
     def error(self, G: ComplexArray) -> FloatArray:
         """log(G/Ĝ) as real rows, (…, rows)."""
@@ -110,31 +111,34 @@ _SURE, _KNOWN = 0.05, 1.0
 
 def log_targets(
     experiments: Sequence[SpectralExperiment],
-    smooth: Smooth | None,
+    black_boxes: Callable[[int], Smooth] | None,
     count: int = _LINES,
     damping: float = 0.0,
 ) -> list[LogResponse]:
-    """First-stage experiments: ``smooth`` at about ``count`` lines that the input drives.
+    """First-stage experiments: what ``black_boxes`` says of each place's response, at about
+    ``count`` lines that the input drives.
 
     With a ``damping`` the responses are those at s = (damping + j) ω, where the resonances of the
-    plant and of its model are blunt and find one another from farther away. Without ``smooth`` the
+    plant and of its model are blunt and find one another from farther away. Without them the
     ratio of output and input is taken where one input frequency rules, as in a response; empty
     where that cannot be read off the data.
     """
     targets = []
     for e in experiments:
-        if smooth is None:
+        if black_boxes is None:
             response = _empirical(e)
             if response is None or damping:
                 return []
-            targets.append(LogResponse(*response, e.hold))
+            targets.append(LogResponse(*response, e.hold, place=e.place))
             continue
+        smooth = black_boxes(e.place)
         omega = _told(e.lines.omega[e.lines.counted & (e.lines.omega > 0)], smooth, count)
         if len(omega) < 2:
             return []
         at = omega * (1 - 1j * damping) if damping else omega
         G, error = smooth(at)
-        targets.append(LogResponse(at, G, e.hold, 1 / np.maximum(error / _SURE, 1)))
+        weight = 1 / np.maximum(error / _SURE, 1)
+        targets.append(LogResponse(at, G, e.hold, weight, e.place))
     return targets
 
 

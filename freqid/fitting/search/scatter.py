@@ -30,7 +30,7 @@ def promising(
         with np.errstate(all="ignore"):
             for target in targets:
                 few = np.linspace(0, len(target.omega) - 1, _GLANCE_LINES).astype(int)
-                G = structure.responses(points, target.omega[few], target.hold)
+                G = structure.responses(points, target.omega[few], target.hold, target.place)
                 ratio = G / target.measured[..., few]
                 error = np.log(np.abs(ratio)) ** 2 + np.angle(ratio) ** 2
                 error = error * target.weight[..., few] ** 2

@@ -47,7 +47,8 @@ class _LogBatch:
         S, P = x.shape
         cost, g, H = np.zeros(S), np.zeros((S, P)), np.zeros((S, P, P))
         for target in self.targets:
-            G, dG = self.inner.sensitivities(values, target.omega, target.hold)
+            at = target.omega, target.hold, target.place
+            G, dG = self.inner.sensitivities(values, *at)
             r, J = target.error(G), target.relative(G, dG) * by[..., None]
             cost += np.einsum("sk,sk->s", r, r)
             g += (J @ r[..., None])[..., 0]

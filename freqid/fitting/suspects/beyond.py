@@ -13,6 +13,7 @@ from freqid.checks import InputError
 from freqid.data import Record
 from freqid.fitting.black_box.output_error import fit_output_error
 from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import plant
@@ -120,6 +121,8 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     """A black box with one mode more, which may lie at any of the lines."""
     if not isinstance(inquiry.model, GreyBox) or inquiry.model.delay_sources:
         return []
+    if isinstance(inquiry.minimum.structure, PlacedStructure):
+        return []
     if any(r.own_cost for r in inquiry.readings) or inquiry.minimum.prior is not None:
         return []
     readings = [r.at_lines() for r in inquiry.readings]
@@ -139,7 +142,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         return []
     structure = inquiry.minimum.structure
     assert isinstance(structure, GreyStructure)
-    more = excess(structure, readings, box, inquiry.minimum.solution, True)
+    more = excess(structure, readings, [box], inquiry.minimum.solution, True)
     f = more * freedom / degrees
     gain = scene.cost * more / (1 + more)
     # where the noise is coloured its shape is as uncertain as the place of the mode

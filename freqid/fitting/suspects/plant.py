@@ -36,10 +36,11 @@ def delay(scene: Scene, model: Model) -> list[Columns]:
     smooth, late = [], {q: [] for q in _SAMPLES}  # type: ignore[var-annotated]
     for s in scene.seen:
         omega, hold, step = s.omega_input, s.reading.hold, s.reading.sample_time
-        G = _responses(model, hold, omega)
+        own = s.own(model)
+        G = _responses(own, hold, omega)
         if not model.dt:
             held = isinstance(hold, PeriodicHold) and not model.late
-            slope = _slope(model, hold, omega) if held else -1j * omega * G
+            slope = _slope(own, hold, omega) if held else -1j * omega * G
             smooth.append(s.answered(slope)[None])
         for q in _SAMPLES if s.record is not None else ():
             moved = np.exp(-1j * omega * q * step) - 1
@@ -93,7 +94,7 @@ def hold_period(scene: Scene, model: Model) -> Columns | None:
         if _one_rate(s) and isinstance(h, PeriodicHold):
             step = _STEP * h.period
             up, down = (
-                _responses(model, dataclasses.replace(h, period=h.period + d), s.omega_input)
+                _responses(s.own(model), dataclasses.replace(h, period=h.period + d), s.omega_input)
                 for d in (step, -step)
             )
             drawn.append(s.answered((up - down) / (2 * step))[None])
@@ -114,8 +115,8 @@ def hold(scene: Scene, model: Model) -> list[Columns]:
             other = _alternative(name, s, model.late)
             if other is None or other == s.reading.hold:
                 break
-            own = _responses(model, s.reading.hold, s.omega_input)
-            drawn.append(s.answered(_responses(model, other, s.omega_input) - own)[None])
+            own = _responses(s.own(model), s.reading.hold, s.omega_input)
+            drawn.append(s.answered(_responses(s.own(model), other, s.omega_input) - own)[None])
         if len(drawn) == len(scene.seen):
             kinds[name] = drawn
     return [Columns(drawn, "", len(kinds), name) for name, drawn in kinds.items()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from freqid.checks import FloatArray, InputError
 from freqid.data import input_dt
 from freqid.fitting.cost.nuisance import Delay, HoldPeriod
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import minimise, polish
@@ -38,7 +40,7 @@ class Refit:
 def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit | None:
     """With a delay of all inputs, begun also from the score's own step ``first`` (s)."""
     structure = minimum.structure
-    if not isinstance(structure, GreyStructure) or structure.unknown:
+    if not _plain(structure):
         return None
     dt = readings[0].sample_time
     freed = structure.with_unknown(Delay(0.0, dt), _alone(minimum))
@@ -65,7 +67,7 @@ def held(minimum: Minimum, readings: Sequence[Reading]) -> Refit | None:
     """With another hold: a zero-order hold of any length that is possible, first-order, none."""
     structure = minimum.structure
     dt = input_dt(readings[0].data)
-    if not isinstance(structure, GreyStructure) or structure.unknown or not dt:
+    if not _plain(structure) or not dt:
         return None
     at_lines = [r.at_lines().with_(delayed=True) for r in readings]
     found = [_of_any_length(minimum, structure, at_lines, dt)]
@@ -77,6 +79,12 @@ def held(minimum: Minimum, readings: Sequence[Reading]) -> Refit | None:
         found += [_through(minimum, structure, at_lines, hold, text) for hold, text in others]
     told = [f for f in found if f is not None]
     return min(told, key=lambda f: f.cost, default=None)
+
+
+def _plain(structure: object) -> TypeGuard[GreyStructure]:
+    """Whether a grey box may be given one unknown more."""
+    grey = isinstance(structure, GreyStructure) and not isinstance(structure, PlacedStructure)
+    return grey and not structure.unknown  # type: ignore[attr-defined]
 
 
 def _of_any_length(

@@ -14,11 +14,13 @@ from freqid.data import Record
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import is_white, local_power, projected
 from freqid.lti import Plane, sum_runs
+from freqid.models import Model
 
 # singular values of the Jacobian below this part of the largest are directions left open
 _LOOSE = 1e-7
@@ -27,7 +29,8 @@ _LOOSE = 1e-7
 @dataclass(frozen=True, eq=False)
 class Seen:
     """One experiment at the estimate: ``left`` (rows,) of it, orthonormal rows ``free`` (q, rows)
-    that an initial state explains, and the ``jacobian`` (P, rows) without these.
+    that an initial state explains, and the ``jacobian`` (P, rows) without these. ``met`` is the
+    plant where experiments met several.
     """
 
     reading: Reading
@@ -35,6 +38,11 @@ class Seen:
     left: FloatArray
     free: FloatArray
     jacobian: FloatArray
+    met: Model | None = None
+
+    def own(self, model: Model) -> Model:
+        """The model as this experiment met it."""
+        return self.met or model
 
     @property
     def at_rest(self) -> FloatArray:
@@ -113,7 +121,9 @@ class Scene:
             evaluation = e.at(realisation)
             left, Q, delta = projected(evaluation)
             J = evaluation.jacobian(delta)
-            seen.append(Seen(reading, e, left, Q, J - (J @ Q.T) @ Q))
+            placed = isinstance(structure, PlacedStructure)
+            met = structure.at(x, reading.place) if placed else None  # type: ignore[attr-defined]
+            seen.append(Seen(reading, e, left, Q, J - (J @ Q.T) @ Q, met))
         known = np.zeros((0, len(x) + 1))
         near = 1e-6 * np.maximum(np.abs(x), 1e-300)
         held = (x - structure.lower <= near) | (structure.upper - x <= near)

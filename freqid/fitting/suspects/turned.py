@@ -12,6 +12,7 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import FrequencyResponse, Record
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
@@ -27,7 +28,10 @@ _STARTS = 3
 
 def turned(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[Finding]:
     """A finding where the plant explains the data turned back, and them alone, with sense."""
-    if not isinstance(model, GreyBox) or not isinstance(minimum.structure, GreyStructure):
+    structure = minimum.structure
+    if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
+        return []
+    if isinstance(structure, PlacedStructure):
         return []
     share = minimum.cost / max(minimum.objective.energy, 1e-300)
     tried = [("wrong sign", "the outputs have the opposite sign of the model's", _negated)]
@@ -36,7 +40,7 @@ def turned(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[
     for kind, what, turn in tried:
         try:
             other = [turn(r) for r in readings]
-            start = dict(zip(minimum.structure.physical_names, _begun(minimum), strict=False))
+            start = dict(zip(structure.physical_names, _begun(minimum), strict=False))
             est = fitter_of(model)(
                 model.with_values(**start), other, SearchOptions(n_starts=_STARTS)
             )

@@ -9,6 +9,7 @@ import pkgutil
 from freqid.lti.holds.band_limited import BandLimited
 from freqid.lti.holds.first_order_hold import FirstOrderHold
 from freqid.lti.holds.hold import Hold, ModalSampled, PeriodicHold, Sampled, as_hold, known_hold
+from freqid.lti.holds.input_holds import InputHolds
 from freqid.lti.holds.phi import phi_functions
 from freqid.lti.holds.zero_order_hold import ZeroOrderHold
 
@@ -20,6 +21,7 @@ __all__ = [
     "BandLimited",
     "FirstOrderHold",
     "Hold",
+    "InputHolds",
     "ModalSampled",
     "PeriodicHold",
     "Sampled",

@@ -1,0 +1,24 @@
+"""Parameters that each experiment has for itself, as a table."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def separate_values(parameters: pd.DataFrame) -> pd.DataFrame:
+    """A row for each experiment, a value and its standard error for each such parameter."""
+    import pandas as pd
+
+    columns: dict[str, dict[int, float]] = {}
+    for name, row in parameters.iterrows():
+        found = re.fullmatch(r"(.+)\[(\d+)\]", str(name))
+        if found:
+            columns.setdefault(found[1], {})[int(found[2])] = row["value"]
+            columns.setdefault(f"{found[1]}_std", {})[int(found[2])] = row["std"]
+    frame = pd.DataFrame(columns).sort_index()
+    frame.index.name = "experiment"
+    return frame
