@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Literal
 
 from freqid.checks import InputError, choice, whole
-from freqid.data import DataSet, Record, as_data_sets
+from freqid.data import DataSet, FrequencyResponse, Record, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.closed_loop import through_reference
 from freqid.fitting.estimate import Estimate
@@ -41,6 +41,7 @@ def fit(
     reference: Literal["auto"] | bool = "auto",
     offset: Literal["estimate"] | None = None,
     loss: Literal["linear", "huber"] = "linear",
+    error: Literal["linear", "log"] = "linear",
     separate: Sequence[str] = (),
     progress: bool = False,
 ) -> Estimate:
@@ -80,6 +81,9 @@ def fit(
             reference explains nearly all of the input; ``True`` always; ``False`` never.
         offset: ``"estimate"`` makes a constant of each output of each record an unknown.
         loss: ``"huber"`` lets samples that are far off count less, as spikes should.
+        error: ``"log"`` fits the logarithm of responses, magnitude and phase, which is robust
+            where their errors grow with their size (Wernholt and Moberg, Automatica 47, 2011);
+            weighted by their relative variance where they have one.
         separate: names of parameters that each experiment has for itself: estimated as
             ``fm[0]``, ``fm[1]``, … and shown in ``est.separate``.
         progress: show on the screen that a long fit is at work.
@@ -101,6 +105,7 @@ def fit(
     whole("seed", seed, least=0)
     fitter_of(model)
     choice("loss", loss, ("linear", "huber"))
+    choice("error", error, ("linear", "log"))
     if offset is not None:
         choice("offset", offset, ("estimate",))
     if not isinstance(reference, bool):
@@ -124,6 +129,8 @@ def fit(
         )
         for i, (d, noise) in enumerate(zip(seen, models, strict=True))
     ]
+    if error == "log":
+        readings = [_logarithmic(r, model) for r in readings]
     if offset is not None:
         readings = [_with_offset(r) for r in readings]
     own = (separate,) if isinstance(separate, str) else tuple(separate)
@@ -136,6 +143,7 @@ def fit(
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
         "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
+        "error": error,
     }  # fmt: skip
     call = _call(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
@@ -211,6 +219,17 @@ def _order(model: object) -> int:
     return int(getattr(model, "order", getattr(model, "poles", 1)))
 
 
+def _logarithmic(reading: Reading, model: object) -> Reading:
+    if not isinstance(reading.data, FrequencyResponse) or not isinstance(model, GreyBox):
+        raise InputError(
+            "error='log' needs a GreyBox and responses: estimate those of records first, with "
+            "h1, local_rational or periodic"
+        )
+    known = reading.data.variance is not None and reading.noise.plain
+    noise = as_noise_model("noise", reading.data) if known else reading.noise
+    return reading.with_(logarithmic=True, noise=noise)
+
+
 def _with_offset(reading: Reading) -> Reading:
     if not isinstance(reading.data, Record) or reading.in_time or reading.skip_zero:
         raise InputError(
@@ -265,7 +284,7 @@ def _call(model: object, count: int, given: Mapping[str, object]) -> str:
     """The call of ``fit`` as a user would type it, arguments at their defaults left out."""
     usual = {
         "initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency",
-        "reference": "auto", "loss": "linear",
+        "reference": "auto", "loss": "linear", "error": "linear",
     }  # fmt: skip
     shown = []
     for name, value in given.items():

@@ -94,6 +94,21 @@ class ResponseNoise(NoiseModel):
 
 
 @dataclass(frozen=True, eq=False)
+class RelativeNoise(NoiseModel):
+    """Weights of relative errors, as those of errors: divided by |Ĝ|²."""
+
+    relative: NoiseModel
+
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        assert isinstance(data, FrequencyResponse)
+        size = np.abs(data.response) ** 2
+        if isinstance(self.relative, ResponseNoise):
+            return self.relative.weights(data, shape)
+        own = np.ones(shape) if self.relative.plain else self.relative.weights(data, shape)
+        return own / size
+
+
+@dataclass(frozen=True, eq=False)
 class MeasuredNoise(NoiseModel):
     """``weights="noise"``: 1/variance, a response's own, or of what fits leave of a record.
 

@@ -22,9 +22,16 @@ from freqid.data import (
     input_dt,
 )
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
-from freqid.fitting.noise_models import BiasIntegral, GivenWeights, NoiseModel, ResponseNoise
+from freqid.fitting.noise_models import (
+    BiasIntegral,
+    GivenWeights,
+    NoiseModel,
+    RelativeNoise,
+    ResponseNoise,
+)
 from freqid.frf import spectra
 from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold
 
@@ -43,7 +50,8 @@ class Reading:
 
     ``skip_zero`` leaves out the line at zero, where a plant that integrates answers with anything
     at all; ``delayed`` keeps a fast input as its alias frequencies, which a delay merely turns;
-    ``offset`` adds a constant of unknown size to each output. ``place`` is the number of the
+    ``offset`` adds a constant of unknown size to each output. The errors of a response that is
+    read as ``logarithmic`` are those of its logarithm. ``place`` is the number of the
     experiment where these differ in more than their data.
     """
 
@@ -56,6 +64,7 @@ class Reading:
     skip_zero: bool = False
     delayed: bool = False
     offset: bool = False
+    logarithmic: bool = False
     place: int = 0
 
     @classmethod
@@ -101,12 +110,20 @@ class Reading:
 
     @property
     def own_cost(self) -> bool:
-        """Whether the cost is another than that of lines: of samples, or of noise on both ends."""
+        """Whether the cost is another than that of lines: of samples, of noise on both ends, or of
+        logarithms.
+        """
+        if self.logarithmic:
+            return True
         periodic = isinstance(self.data, PeriodicResponse)
         return self.in_time or (periodic and not isinstance(self.noise, GivenWeights))
 
     def at_lines(self) -> Reading:
         """The same data at their lines, the initial state free where it was at rest."""
+        if self.logarithmic:
+            noise = RelativeNoise(self.noise)
+            data = self.data.plain() if isinstance(self.data, PeriodicResponse) else self.data
+            return dataclasses.replace(self, data=data, noise=noise, logarithmic=False)
         if self.own_cost and isinstance(self.data, PeriodicResponse):
             return dataclasses.replace(self, data=self.data.plain(), noise=ResponseNoise())
         state: InitialState = "steady" if self.initial_state == "steady" else "estimate"
@@ -145,6 +162,8 @@ class Reading:
         """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
         if self.in_time:
             return self._samples(plane)
+        if self.logarithmic:
+            return self._logarithm()
         if self.own_cost and isinstance(self.data, PeriodicResponse):
             data = self.data if self.band is None else self.data.select(self.band)
             return PeriodicExperiment(data, self.hold, plane is not None, self.place)
@@ -180,6 +199,15 @@ class Reading:
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
         made = dataclasses.replace(made, place=self.place)
         return made.with_offsets(s.n_samples) if self.offset else made
+
+    def _logarithm(self) -> LogResponse:
+        assert isinstance(self.data, FrequencyResponse)
+        frf = self.data if self.band is None else self.data.select(self.band)
+        if (frf.response == 0).any():
+            raise InputError("error='log': the response is zero at a line; leave it out")
+        relative = RelativeNoise(self.noise).weights(frf, frf.response.shape)
+        weight = np.sqrt(relative) * np.abs(frf.response)
+        return LogResponse(frf.omega, frf.response, self.hold, weight, self.place)
 
     def _samples(self, plane: Plane | None) -> TimeExperiment:
         assert isinstance(self.data, Record)

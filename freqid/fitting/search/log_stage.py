@@ -1,8 +1,7 @@
 """The first stage of a search: errors and parameters as logarithms.
 
-Least squares on the response itself is lost once a resonance of the model has moved past that of
-the data. The logarithm of the ratio sees magnitude and phase of every line alike, and logarithms
-of the parameters make gains and frequencies additive, so this stage walks in from far away.
+The logarithm of the ratio of two responses sees every line alike, and logarithms of the parameters
+make gains and frequencies additive, so this stage walks in from far away.
 """
 
 from __future__ import annotations
@@ -13,63 +12,14 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.objective import Structure
-from freqid.lti import Hold, PeriodicHold, Realisation, sampled_response
+from freqid.lti import PeriodicHold, Realisation
 
 # lines of the first stage: enough to show every mode, few enough to cost next to nothing
 _LINES = 160
 # nepers from the start that the first stage may go: a parameter that wants to be zero stops here
 _REACH = 16.0
-
-
-class LogResponse:
-    """log(G/Ĝ) on a few lines of an experiment: the residual of the first stage.
-
-    ``weight`` (outputs, inputs, lines) says how well Ĝ is known.
-    """
-
-    def __init__(
-        self,
-        omega: FloatArray,
-        response: ComplexArray,
-        hold: Hold,
-        weight: FloatArray | float = 1.0,
-        place: int = 0,
-    ) -> None:
-        self.omega, self.measured, self.hold = omega, response, hold
-        self.weight = np.broadcast_to(weight, response.shape)
-        self.n_rows, self.place = 2 * response.size, place
-
-    @property
-    def energy(self) -> float:
-        """Errors of one neper and one radian at every line."""
-        return float(self.n_rows)
-
-    def at(self, realisation: Realisation) -> _LogEvaluation:
-        """Evaluate at one trial point."""
-        return _LogEvaluation(self, realisation.for_place(self.place))
-
-    def error(self, G: ComplexArray) -> FloatArray:
-        """log(G/Ĝ) as real rows, (…, rows)."""
-        ratio = G / self.measured
-        error = (np.log(np.abs(ratio)) + 1j * np.angle(ratio)) * self.weight
-        return error.reshape(*G.shape[:-3], -1).view(float)
-
-    def relative(self, G: ComplexArray, dG: ComplexArray) -> FloatArray:
-        """Derivatives of the same, (…, P, rows)."""
-        change = dG / G[..., None, :, :, :] * self.weight
-        return change.reshape(*dG.shape[:-3], -1).view(float)
-
-
-class _LogEvaluation:
-    def __init__(self, target: LogResponse, realisation: Realisation) -> None:
-        self.target = target
-        self.G, self.dG = sampled_response(realisation, target.omega, target.hold)
-        self.residual = target.error(self.G)
-        self.transient: FloatArray | None = None
-
-    def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        return self.target.relative(self.G, self.dG)
 
 
 class LogStructure:

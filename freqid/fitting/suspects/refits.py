@@ -42,7 +42,8 @@ def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit |
     structure = minimum.structure
     if not _plain(structure):
         return None
-    dt = readings[0].sample_time
+    # a response in continuous time has no sample: its fastest line is the measure
+    dt = readings[0].sample_time or 1 / max(float(r.lines().lines.omega.max()) for r in readings)
     freed = structure.with_unknown(Delay(0.0, dt), _alone(minimum))
     lines = [r.at_lines().with_(delayed=True).lines() for r in readings]
     objective = Objective(freed, lines)

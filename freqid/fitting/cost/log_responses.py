@@ -1,0 +1,64 @@
+"""Responses whose error is a logarithm: magnitude and phase of every line count alike.
+
+log(G/Ĝ) = ln|G/Ĝ| + j arg(G/Ĝ) takes the phase along the model: nothing has to be unwrapped. It is
+robust where errors of a response grow with its size (Wernholt and Moberg, Automatica 47, 2011), and
+wide: least squares on the response itself is lost once a resonance of the model has moved past
+that of the data.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.lti import Hold, Realisation, sampled_response
+
+
+class LogResponse:
+    """log(G/Ĝ) at the lines of an experiment, (outputs, inputs, lines) as real rows.
+
+    ``weight`` (outputs, inputs, lines) multiplies the error: it says how well Ĝ is known.
+    """
+
+    def __init__(
+        self,
+        omega: FloatArray,
+        response: ComplexArray,
+        hold: Hold,
+        weight: FloatArray | float = 1.0,
+        place: int = 0,
+    ) -> None:
+        self.omega, self.measured, self.hold = omega, response, hold
+        self.weight = np.broadcast_to(weight, response.shape)
+        self.n_rows, self.place = 2 * response.size, place
+
+    @property
+    def energy(self) -> float:
+        """Errors of one neper and one radian at every line."""
+        return float(self.n_rows)
+
+    def at(self, realisation: Realisation) -> _LogEvaluation:
+        """Evaluate at one trial point."""
+        return _LogEvaluation(self, realisation.for_place(self.place))
+
+    def error(self, G: ComplexArray) -> FloatArray:
+        """log(G/Ĝ) as real rows, (…, rows)."""
+        ratio = G / self.measured
+        error = (np.log(np.abs(ratio)) + 1j * np.angle(ratio)) * self.weight
+        return error.reshape(*G.shape[:-3], -1).view(float)
+
+    def relative(self, G: ComplexArray, dG: ComplexArray) -> FloatArray:
+        """Derivatives of the same, (…, P, rows)."""
+        change = dG / G[..., None, :, :, :] * self.weight
+        return change.reshape(*dG.shape[:-3], -1).view(float)
+
+
+class _LogEvaluation:
+    def __init__(self, target: LogResponse, realisation: Realisation) -> None:
+        self.target = target
+        self.G, self.dG = sampled_response(realisation, target.omega, target.hold)
+        self.residual = target.error(self.G)
+        self.transient: FloatArray | None = None
+
+    def jacobian(self, initial: FloatArray | None) -> FloatArray:
+        return self.target.relative(self.G, self.dG)

@@ -1,0 +1,54 @@
+"""The weighted logarithmic estimator."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+F = np.linspace(4, 60, 120)
+
+
+def measured(plant, seed, size, variance=False):
+    """A response with an error that grows with its size."""
+    G = plant.frequency_response(2 * np.pi * F).response
+    e = np.random.default_rng(seed).standard_normal((2, *G.shape)) / np.sqrt(2)
+    told = {"variance": size**2 * np.abs(G) ** 2} if variance else {}
+    return fq.FrequencyResponse(F, G * (1 + size * (e[0] + 1j * e[1])), **told)
+
+
+def test_it_is_exact_without_noise(plant):
+    start = {"k": plant["k"] * 1.3, "Jm": plant["Jm"] * 0.8}
+    est = fq.fit(plant, measured(plant, 0, 0.0), error="log", start=start)
+    assert est.values == pytest.approx([plant[n] for n in est.names], rel=1e-7)
+
+
+def test_it_is_better_than_linear_where_errors_grow_with_the_response(plant):
+    errors = {"linear": [], "log": []}
+    inside = []
+    for seed in range(25):
+        frf = measured(plant, seed, 0.2)
+        for kind in errors:
+            est = fq.fit(plant, frf, error=kind)
+            errors[kind].append([est[n] / plant[n] - 1 for n in ("Jm", "k", "Ja")])
+        table = est.parameters
+        inside += [table.lower[n] <= plant[n] <= table.upper[n] for n in ("Jm", "k", "Ja")]
+    rms = {kind: np.sqrt(np.mean(np.square(e), axis=0)) for kind, e in errors.items()}
+    assert (rms["log"] < 0.7 * rms["linear"]).all()
+    # 75 intervals, three of an experiment together
+    assert np.mean(inside) > 0.85
+
+
+def test_its_witness_and_call(plant):
+    est = fq.fit(plant, measured(plant, 3, 0.05, variance=True), error="log")
+    assert est.witness.verdict in ("complete", "absent")
+    assert "error='log'" in est.call
+    assert fq.fit(fq.first_order(), measured(plant, 3, 0.05), error="log").verdict.grade != "trust"
+
+
+def test_what_it_cannot_take(plant, slow):
+    with pytest.raises(ValueError, match="responses"):
+        fq.fit(plant, slow, error="log")
+    with pytest.raises(ValueError, match="error='logarithm'"):
+        fq.fit(plant, slow, error="logarithm")
+    with pytest.raises(ValueError, match="zero at a line"):
+        fq.fit(plant, fq.FrequencyResponse([1.0, 2.0, 3.0, 4.0, 5.0], [1, 0, 1, 1, 1]), error="log")
