@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +13,11 @@ from numpy.typing import ArrayLike
 from freqid.checks import FloatArray, InputError, IntArray, choice, positive, steps, whole
 from freqid.excitation.signal_spectra import multisine_lines
 
-# rounds of clipping; the norms then taken in turn; entries of a Jacobian that still is quick
-_CLIPPING_ROUNDS = 400
-_NORMS = (4, 8, 16, 32, 64)
-_LARGEST = 50_000
+# starts, rounds of clipping of each, the norms then taken in turn, and the steps of each
+_STARTS, _CLIPPING_ROUNDS = 6, 400
+_NORMS, _STEPS = (32, 64, 128, 256, 512, 1024), 200
+# samples over which one more start is followed to the end
+_MORE = 8_000
 
 
 def multisine(
@@ -27,8 +29,12 @@ def multisine(
     seed: int = 0,
     rms: float = 1.0,
     powers: ArrayLike | None = None,
+    *,
+    n_inputs: int = 1,
+    orthogonal: bool = False,
+    grid: str = "full",
 ) -> FloatArray:
-    """A periodic sum of cosines at the multiples of 1/period in ``band``, (N,).
+    """A periodic sum of cosines at multiples of 1/period in ``band``, (N,) or (N, inputs).
 
     Args:
         band: in Hz, ends included.
@@ -37,8 +43,16 @@ def multisine(
             rms that clipping in turn (Van der Ouderaa, Schoukens and Renneboog, 1988) and rising
             norms (Guillaume, Schoukens, Pintelon and Kollár, IEEE Trans. Instrumentation and
             Measurement 40, 1991) find.
-        seed: of the random phases. ``rms``: of the signal.
+        seed: of the random phases. ``rms``: of each signal.
         powers: of the lines, relative to one another; equal where not given.
+        n_inputs: signals that are independent of one another, as many as inputs.
+        orthogonal: as many experiments as inputs, (inputs, N, inputs): the same lines with phases
+            turned by the columns of the DFT matrix, which tell the inputs apart with the least
+            variance (Dobrowiecki, Schoukens and Guillaume, IEEE Trans. Instrumentation and
+            Measurement 55, 2006).
+        grid: ``"full"``, or lines that show nonlinearities by what appears between them: ``"odd"``,
+            ``"odd-odd"`` (every fourth, from the first) or ``"log"``, odd lines spaced evenly
+            along a logarithm.
 
     Raises ValueError for a band that holds no line or reaches beyond Nyquist, or a period that is
     not a whole number of samples.
@@ -46,25 +60,69 @@ def multisine(
     >>> u = multisine((1, 31), period=1.0, dt=1 / 512)
     >>> bool(np.abs(u).max() < 1.5)
     True
+    >>> multisine((1, 31), 1.0, 1 / 512, n_inputs=3, orthogonal=True, grid="odd").shape
+    (3, 512, 3)
     """
     positive("rms", rms)
     N = steps("period", period, dt, least=2)
     repeats = whole("periods", periods)
     choice("crest", crest, ("minimise", "schroeder", "random"))
+    choice("grid", grid, tuple(_GRIDS))
+    count = whole("n_inputs", n_inputs)
     rng = np.random.default_rng(whole("seed", seed, least=0))
-    k = multisine_lines(band, period)
+    k = _GRIDS[grid](multisine_lines(band, period))
+    if not len(k):
+        raise InputError(
+            f"band=({band[0]:g}, {band[1]:g}) Hz holds no line of grid={grid!r}; take a longer "
+            "period"
+        )
     if 2 * k[-1] >= N:
         raise InputError(
             f"band=({band[0]:g}, {band[1]:g}) Hz must stay below {0.5 / dt:g} Hz, the Nyquist limit"
         )
     lines = _Lines(k, _amplitudes(powers, len(k)))
+    phases = np.array([_phases(lines, N, crest, rng, first=i == 0) for i in range(count)])
+    turns = np.zeros((1, count))
+    if orthogonal:
+        turns = 2 * np.pi * np.outer(np.arange(count), np.arange(count)) / count
+    made = [[lines.signal(own + turn, N) for own, turn in zip(phases, row, strict=True)]
+            for row in turns]  # fmt: skip
+    u = rms * np.tile(np.moveaxis(np.array(made), 1, 2), (1, repeats, 1))
+    if orthogonal:
+        return u
+    return u[0, :, 0] if count == 1 else u[0]
+
+
+def _logarithmic(k: IntArray) -> IntArray:
+    """Odd lines spaced evenly along a logarithm, as many as there are before two fall together."""
+    odd = k[k % 2 == 1]
+    if len(odd) < 3:
+        return odd
+    wanted = np.geomspace(odd[0], odd[-1], len(odd))
+    nearest = odd[np.abs(odd[None] - wanted[:, None]).argmin(axis=1)]
+    return np.unique(nearest)
+
+
+# lines of a band that each grid keeps
+_GRIDS: dict[str, Callable[[IntArray], IntArray]] = {
+    "full": lambda k: k,
+    "odd": lambda k: k[k % 2 == 1],
+    "odd-odd": lambda k: k[k % 4 == 1],
+    "log": _logarithmic,
+}
+
+
+def _phases(lines: _Lines, N: int, crest: str, rng: np.random.Generator, first: bool) -> FloatArray:
+    """Phases of one signal; those of a second one begin elsewhere."""
     if crest == "random":
-        phases = rng.uniform(0, 2 * np.pi, len(k))
-    else:
-        phases = lines.schroeder()
-        if crest == "minimise" and len(k) > 1:
-            phases = _least_crest(lines, N, phases, rng)
-    return np.tile(rms * lines.signal(phases, N), repeats)
+        return rng.uniform(0, 2 * np.pi, len(lines.k))
+    phases = lines.schroeder()
+    if not first:
+        # the same sweep from another moment on is another signal, with the same crest
+        phases = phases + 2 * np.pi * lines.k * rng.uniform()
+    if crest == "minimise" and len(lines.k) > 1:
+        return _least_crest(lines, N, phases, rng)
+    return phases
 
 
 def _amplitudes(powers: ArrayLike | None, count: int) -> FloatArray:
@@ -106,15 +164,14 @@ def _least_crest(lines: _Lines, N: int, first: FloatArray, rng: np.random.Genera
     k = lines.k
     # peaks between the samples do not exist for a converter; a coarser grid shows those that do
     grid = min(N, scipy.fft.next_fast_len(16 * int(k[-1]), real=True))
-    starts = [first, *rng.uniform(0, 2 * np.pi, (3, len(k)))]
+    starts = [first, *rng.uniform(0, 2 * np.pi, (_STARTS - 1, len(k)))]
 
     def crest(phases: FloatArray) -> float:
         return float(np.abs(lines.signal(phases, N)).max())
 
-    best = min((_clipped(lines, start, grid) for start in starts), key=crest)
-    if len(k) * grid > _LARGEST:
-        return best
-    return min(_lowered(lines, best, grid), best, key=crest)
+    clipped = sorted((_clipped(lines, start, grid) for start in starts), key=crest)
+    lowered = [_lowered(lines, phases, grid) for phases in clipped[: 1 + _MORE // grid]]
+    return min([*clipped, *lowered], key=crest)
 
 
 def _clipped(lines: _Lines, phases: FloatArray, grid: int) -> FloatArray:
@@ -130,19 +187,21 @@ def _clipped(lines: _Lines, phases: FloatArray, grid: int) -> FloatArray:
 
 
 def _lowered(lines: _Lines, phases: FloatArray, grid: int) -> FloatArray:
-    """Least ℓ_p norm for rising p: the maximum in the limit."""
-    angle = 2 * np.pi * np.outer(np.arange(grid), lines.k) / grid
+    """Least ℓ_p norm for rising p: the maximum in the limit. The gradient takes two FFTs."""
     x = phases
     for p in _NORMS:
-        size = float(np.abs(np.cos(angle + x) @ lines.amplitudes).max())
 
-        def residual(x: FloatArray, p: int = p, size: float = size) -> FloatArray:
-            return (np.cos(angle + x) @ lines.amplitudes / size) ** (p // 2)
+        def norm(x: FloatArray, p: int = p) -> tuple[float, FloatArray]:
+            signal = lines.signal(x, grid)
+            peak = np.abs(signal).max()
+            ratio = signal / peak
+            power = np.abs(ratio) ** (p - 1) * np.sign(ratio)
+            total = float(power @ ratio)
+            # d signal / d phase of a line is that line a quarter turn on
+            along = np.conj(scipy.fft.rfft(power)[lines.k]) * 1j * np.exp(1j * x)
+            slope = np.real(along) * lines.amplitudes / (peak * total)
+            return float(np.log(peak) + np.log(total / grid) / p), slope
 
-        def jacobian(x: FloatArray, p: int = p, size: float = size) -> FloatArray:
-            signal = np.cos(angle + x) @ lines.amplitudes / size
-            slope = p // 2 * signal ** (p // 2 - 1)
-            return slope[:, None] * (-lines.amplitudes / size * np.sin(angle + x))
-
-        x = scipy.optimize.least_squares(residual, x, jac=jacobian, max_nfev=15).x
+        options = {"maxiter": _STEPS, "maxcor": 30}
+        x = scipy.optimize.minimize(norm, x, jac=True, method="L-BFGS-B", options=options).x
     return x
