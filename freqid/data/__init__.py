@@ -21,3 +21,4 @@ from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.quality import check_record
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.data.stamped_record import StampedRecord

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray
+from freqid.lti import Hold
+
+if TYPE_CHECKING:
+    from freqid.data.record import Record
 
 
 class Signals:
@@ -64,3 +71,31 @@ class Signals:
     def nyquist(self) -> float:
         """Nyquist limit of the output in Hz."""
         return 0.5 / self.dt
+
+    @classmethod
+    def from_logs(
+        cls,
+        u_time: ArrayLike,
+        u: ArrayLike,
+        y_time: ArrayLike,
+        y: ArrayLike,
+        hold: Hold | str = "zoh",
+        resample: bool = False,
+        **named: Any,
+    ) -> Record:
+        """A record of an input and an output that two clocks stamped, times in s.
+
+        Where the rates have a simple ratio both lie on a common grid, exactly. Elsewhere, in
+        jitter, drift or drop-outs, the samples are kept at their own times, which a ``fit`` takes
+        as they are; ``resample=True`` puts them on a grid instead. ``notes`` tell of the clocks;
+        ``named`` are input_names, output_names and units. Raises ValueError for stamps that go
+        back, clocks that do not overlap, or numbers of samples that disagree.
+
+        >>> import freqid as fq
+        >>> t = np.arange(6) * 0.1
+        >>> fq.Record.from_logs(t, np.ones(6), t[::2], np.zeros(3)).factor
+        2
+        """
+        from freqid.data.logs import record_from_logs
+
+        return record_from_logs(u_time, u, y_time, y, hold, resample, **named)

@@ -16,6 +16,7 @@ from freqid.data import (
     FrequencyResponse,
     PeriodicResponse,
     Record,
+    StampedRecord,
     as_band,
     as_holds,
     channel_counts,
@@ -24,6 +25,7 @@ from freqid.data import (
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
+from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.noise_models import (
     BiasIntegral,
@@ -113,13 +115,16 @@ class Reading:
         """Whether the cost is another than that of lines: of samples, of noise on both ends, or of
         logarithms.
         """
-        if self.logarithmic:
+        if self.logarithmic or isinstance(self.data, StampedRecord):
             return True
         periodic = isinstance(self.data, PeriodicResponse)
         return self.in_time or (periodic and not isinstance(self.noise, GivenWeights))
 
     def at_lines(self) -> Reading:
         """The same data at their lines, the initial state free where it was at rest."""
+        if isinstance(self.data, StampedRecord):
+            regular = dataclasses.replace(self, data=self.data.regular())
+            return regular.at_lines()
         if self.logarithmic:
             noise = RelativeNoise(self.noise)
             data = self.data.plain() if isinstance(self.data, PeriodicResponse) else self.data
@@ -160,6 +165,8 @@ class Reading:
 
     def experiment(self, plane: Plane | None = None) -> Experiment:
         """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
+        if isinstance(self.data, StampedRecord):
+            return self._stamped(plane)
         if self.in_time:
             return self._samples(plane)
         if self.logarithmic:
@@ -199,6 +206,20 @@ class Reading:
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
         made = dataclasses.replace(made, place=self.place)
         return made.with_offsets(s.n_samples) if self.offset else made
+
+    def _stamped(self, plane: Plane | None) -> StampedExperiment:
+        assert isinstance(self.data, StampedRecord)
+        if plane is not None:
+            raise InputError(
+                "the stamps of this record fit no grid, as a sampled model needs: fit a GreyBox, "
+                "or take record.regular(), which is resampled"
+            )
+        if self.band is not None or not self.noise.plain or self.initial_state == "steady":
+            raise InputError(
+                "a record with stamps of its own is fitted whole, in time: leave out band, weights "
+                "and initial_state='steady', or take record.regular(), which is resampled"
+            )
+        return StampedExperiment(self.data, self.initial_state == "estimate", self.place)
 
     def _logarithm(self) -> LogResponse:
         assert isinstance(self.data, FrequencyResponse)

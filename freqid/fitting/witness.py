@@ -19,7 +19,7 @@ import numpy as np
 import scipy.stats
 
 from freqid.checks import InputError
-from freqid.data import Record
+from freqid.data import Record, StampedRecord
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
@@ -62,6 +62,8 @@ class Testimony:
         assert isinstance(structure, GreyStructure)
         if structure.unknown:
             return Witness("absent", "the period of the hold is unknown to a black box")
+        if any(isinstance(r.data, StampedRecord) for r in self.readings):
+            return Witness("absent", "samples at times of their own have no sampled black box")
         if any(r.initial_state == "zero" for r in self.readings):
             return Witness("absent", "an initial state at rest is none of a black box's lines")
         try:

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError
-from freqid.data import Record
+from freqid.data import Record, StampedRecord
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective
@@ -103,6 +103,8 @@ class Scene:
     @classmethod
     def of(cls, minimum: Minimum, readings: Sequence[Reading]) -> Scene:
         """At the minimum on lines; InputError where there are none."""
+        if any(isinstance(r.data, StampedRecord) for r in readings):
+            raise InputError("samples at times of their own have no lines")
         structure = minimum.structure
         chart = structure if isinstance(structure, Chart) else None
         # what a prior makes the data leave is no fault of theirs: they are asked alone

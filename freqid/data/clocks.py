@@ -1,0 +1,88 @@
+"""Clocks: what time stamps say of the clock that made them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from freqid.checks import FloatArray, InputError, IntArray
+
+# denominators of a ratio that two clocks are believed to have, smallest first
+_DENOMINATORS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """A line through stamps: sample ``number`` k comes at ``start`` + k·``period`` (s).
+
+    ``jitter`` is the rms distance of the stamps from the line and ``worst`` the largest, both in
+    periods; ``missing`` counts samples that never came.
+    """
+
+    stamps: FloatArray
+    number: IntArray
+    start: float
+    period: float
+    jitter: float
+    worst: float
+    missing: int
+
+    @classmethod
+    def of(cls, name: str, stamps: ArrayLike) -> Clock:
+        """ValueError unless the stamps (s) increase."""
+        t = np.array(stamps, dtype=float)
+        if t.ndim != 1 or len(t) < 3 or not np.isfinite(t).all():
+            raise InputError(f"{name} must be three finite times in s, (N,), or more")
+        gaps = np.diff(t)
+        if (gaps <= 0).any():
+            at = int(np.argmax(gaps <= 0))
+            raise InputError(
+                f"{name} goes back or stands still at row {at + 1} ({t[at]:g} s, then "
+                f"{t[at + 1]:g} s); sort or repair the rows"
+            )
+        period = float(np.median(gaps))
+        steps = np.maximum(np.round(gaps / period), 1).astype(int)
+        number = np.concatenate([[0], np.cumsum(steps)])
+        kept = np.ones(len(t), bool)
+        for _ in range(5):
+            period, start = np.polyfit(number[kept] - number[0], t[kept] - t[0], 1)
+            left = t - t[0] - start - period * number
+            size = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+            kept = np.abs(left) <= max(5 * size, 1e-12 * abs(period))
+            if kept.sum() < 3:
+                break
+        off = np.abs(left) / period
+        rms = float(np.sqrt(np.mean(off**2)))
+        missing = int(number[-1] + 1 - len(t))
+        # the last digits are rounding of the stamps
+        period, start = float(f"{period:.13g}"), float(f"{t[0] + start:.13g}")
+        return cls(t, number, start, period, rms, float(off.max()), missing)
+
+    @property
+    def standard_error(self) -> float:
+        """Of the period, as a part of it."""
+        spread = float(np.std(self.number)) * np.sqrt(len(self.number))
+        return self.jitter / max(spread, 1e-300)
+
+    def sentence(self, name: str) -> str:
+        """The clock in words."""
+        said = f"{name}: {1 / self.period:.9g} Hz, jitter {100 * self.jitter:.3g} % of a period"
+        if self.worst > 2 * self.jitter:
+            said += f", at most {100 * self.worst:.3g} %"
+        return said + (f", {self.missing} samples missing" if self.missing else "")
+
+
+def simple_ratio(slow: Clock, fast: Clock, tolerance: float) -> Fraction | None:
+    """slow.period / fast.period as a fraction that is off by less than ``tolerance`` periods of the
+    faster clock at the record's end; None where there is none.
+    """
+    ratio, length = slow.period / fast.period, max(int(slow.number[-1]), 1)
+    finer = min(1.0, ratio)
+    for denominator in range(1, _DENOMINATORS + 1):
+        found = Fraction(round(ratio * denominator), denominator)
+        if found > 0 and abs(float(found) - ratio) * length < tolerance * finer:
+            return found
+    return None

@@ -1,0 +1,166 @@
+"""Logs: inputs and outputs with time stamps of their own become a record.
+
+An input every h and an output every T with T/h = p/q in lowest terms lie on the grid h/q: a
+zero-order hold of period h is one of period h/q with each value repeated q times, a first-order
+hold is drawn out by straight lines. The common grid is exact; resampling is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from freqid.checks import FloatArray, InputError, choice, samples
+from freqid.data.clocks import Clock, simple_ratio
+from freqid.data.record import Record
+from freqid.data.stamped_record import StampedRecord
+from freqid.lti import Hold, as_hold
+
+# parts of a sample by which stamps may be off a grid, and clocks apart at the end
+_OFF = 0.1
+# how finely an offset of the clocks is told, and the samples that a grid may have
+_FINEST, _LARGEST = 40, 2e7
+# part of a sample of the grid that an offset may be off
+_EXACT = 0.01
+
+
+def record_from_logs(
+    u_time: ArrayLike,
+    u: ArrayLike,
+    y_time: ArrayLike,
+    y: ArrayLike,
+    hold: Hold | str = "zoh",
+    resample: bool = False,
+    input_names: Sequence[str] | None = None,
+    output_names: Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> Record:
+    """The work of ``Record.from_logs``."""
+    inputs, outputs = samples("u", u), samples("y", y)
+    clocks = Clock.of("u_time", u_time), Clock.of("y_time", y_time)
+    for name, x, clock in (("u", inputs, clocks[0]), ("y", outputs, clocks[1])):
+        if len(x) != len(clock.stamps):
+            raise InputError(f"{name} has {len(x)} samples and {len(clock.stamps)} time stamps")
+    named = {"input_names": input_names, "output_names": output_names, "units": units}
+    u_clock, y_clock = clocks
+    if u_clock.stamps[-1] <= y_clock.stamps[0] or y_clock.stamps[-1] <= u_clock.stamps[0]:
+        raise InputError(
+            f"the clocks do not overlap: u runs from {u_clock.stamps[0]:g} to "
+            f"{u_clock.stamps[-1]:g} s, y from {y_clock.stamps[0]:g} to {y_clock.stamps[-1]:g} s"
+        )
+    kind = as_hold(hold, u_clock.period).name
+    choice("hold", kind, ("zoh", "foh", "bl"))
+    notes = [u_clock.sentence("u_time"), y_clock.sentence("y_time")]
+    ratio = y_clock.period / u_clock.period
+    error = np.hypot(u_clock.standard_error, y_clock.standard_error)
+    notes.append(
+        f"the output comes every {ratio:.9g} (± {ratio * error:.2g}) input samples, the first "
+        f"{y_clock.start - u_clock.start:.6g} s after the first input"
+    )
+    fraction = simple_ratio(y_clock, u_clock, _OFF)
+    poor = [c for c in clocks if c.worst > _OFF or c.missing]
+    if fraction is not None and not poor:
+        grid = _Grid.of(u_clock, y_clock, fraction.denominator, fraction.numerator, kind)
+        if grid is not None:
+            return grid.record(inputs, outputs, notes, named)
+    regular = _resampled(u_clock, inputs, y_clock, outputs, kind, notes, named, resample)
+    if resample:
+        return regular
+    fields = dict(regular.__dict__)
+    fields["notes"] = (
+        *notes,
+        "the stamps fit no common grid: a fit takes the samples at their own times",
+    )
+    return StampedRecord(
+        **fields, u_time=u_clock.stamps, u_logged=inputs.reshape(len(inputs), -1),
+        y_time=y_clock.stamps, y_logged=outputs.reshape(len(outputs), -1),
+    )  # fmt: skip
+
+
+class _Grid:
+    """A common grid: the input every ``repeat`` of its steps, the output every ``factor``."""
+
+    def __init__(self, step: float, repeat: int, factor: int, first: int, kind: str) -> None:
+        self.step, self.repeat, self.factor = step, repeat, factor
+        # grid number of the first output, counted from the first input
+        self.first, self.kind = first, kind
+
+    @classmethod
+    def of(cls, u: Clock, y: Clock, repeat: int, factor: int, kind: str) -> _Grid | None:
+        """The coarsest grid that both clocks and their offset lie on; None where there is none."""
+        h = u.period
+        for finer in range(1, _FINEST + 1):
+            step = h / (repeat * finer)
+            if (u.number[-1] + 1) * repeat * finer > _LARGEST:
+                return None
+            at = (y.start - u.start) / step
+            if abs(at - round(at)) < max(_EXACT, 3 * (u.jitter + y.jitter) * h / step):
+                return cls(step, repeat * finer, factor * finer, round(at), kind)
+        return None
+
+    def record(
+        self, u: FloatArray, y: FloatArray, notes: Sequence[str], named: Mapping[str, Any]
+    ) -> Record:
+        """The samples on the grid, from the first output that an input came before."""
+        skip = max(-(self.first // self.factor), 0) if self.first < 0 else 0
+        start = self.first + skip * self.factor
+        fast = self._drawn(u)
+        length = min(len(y) - skip, (len(fast) - start) // self.factor)
+        if length < 2:
+            raise InputError("the clocks overlap in fewer than two output samples")
+        dropped = len(y) - length
+        said = [*notes]
+        if dropped:
+            said.append(f"{dropped} output samples without an input were left out")
+        if self.repeat > 1:
+            said.append(f"each input sample fills {self.repeat} steps of the common grid")
+        return Record(
+            fast[start : start + length * self.factor], y[skip : skip + length],
+            dt=self.step * self.factor, hold=self.kind, input_dt=self.step, notes=tuple(said),
+            **named,
+        )  # fmt: skip
+
+    def _drawn(self, u: FloatArray) -> FloatArray:
+        if self.kind == "zoh" or self.repeat == 1:
+            return np.repeat(u, self.repeat, axis=0)
+        at = np.arange(len(u) * self.repeat) / self.repeat
+        columns = u.reshape(len(u), -1).T
+        drawn = np.column_stack([np.interp(at, np.arange(len(u)), c) for c in columns])
+        return drawn.reshape(-1, *u.shape[1:])
+
+
+def _resampled(
+    u_clock: Clock,
+    u: FloatArray,
+    y_clock: Clock,
+    y: FloatArray,
+    kind: str,
+    notes: Sequence[str],
+    named: Mapping[str, Any],
+    asked: bool,
+) -> Record:
+    """Both on a grid of the output's own period: a held input is repeated, never drawn through."""
+    start = max(u_clock.stamps[0], y_clock.stamps[0])
+    end = min(u_clock.stamps[-1] + u_clock.period, y_clock.stamps[-1])
+    every = max(round(y_clock.period / u_clock.period), 1)
+    step = y_clock.period / every
+    count = int(np.floor((end - start) / y_clock.period)) + 1
+    if count < 3:
+        raise InputError("the clocks overlap in fewer than three output samples")
+    t_slow = start + y_clock.period * np.arange(count)
+    t_fast = start + step * np.arange(count * every)
+    inputs, outputs = u.reshape(len(u), -1), y.reshape(len(y), -1)
+    if kind == "zoh":
+        at = np.clip(np.searchsorted(u_clock.stamps, t_fast, side="right") - 1, 0, len(u) - 1)
+        fast = inputs[at]
+    else:
+        fast = np.column_stack([np.interp(t_fast, u_clock.stamps, c) for c in inputs.T])
+    slow = np.column_stack([np.interp(t_slow, y_clock.stamps, c) for c in outputs.T])
+    said = (*notes, "resampled: the input was repeated, the output drawn by straight lines")
+    return Record(
+        fast.reshape(-1, *u.shape[1:]), slow.reshape(-1, *y.shape[1:]),
+        dt=step * every, hold=kind, input_dt=step, notes=said if asked else tuple(notes), **named,
+    )  # fmt: skip
