@@ -23,6 +23,7 @@ from .data import (
     FrequencyResponse as FrequencyResponse,
     PeriodicResponse as PeriodicResponse,
     Record as Record,
+    channels as channels,
     check_record as check_record,
     read as read,
     write as write,

@@ -104,6 +104,18 @@ def frf(
         print(repr(response)[1:-1])
 
 
+def channels(log: Path) -> None:
+    """The channels of a file or log: rate, jitter, length and unit of each.
+
+    Parameters
+    ----------
+    log
+        any file that freqid reads; of logs that need an extra the message names it.
+    """
+    found = fq.channels(log)
+    print(found.to_string(index=False, float_format=lambda x: f"{x:.6g}"))
+
+
 def explore(
     data: Path | None = None,
     *,
@@ -137,7 +149,7 @@ app = cyclopts.App(
     version=fq.__version__,
     result_action="return_value",
 )
-for command in (reproduce, demo, frf, fit, bias, explore):
+for command in (reproduce, demo, channels, frf, fit, bias, explore):
     app.command(command)
 
 

@@ -4,7 +4,6 @@ It may import what stands below it: checks and lti.
 """
 
 from freqid.data.band import Band, as_band, chosen
-from freqid.data.channels import as_holds
 from freqid.data.conditions import as_conditions
 from freqid.data.data_set import (
     DataSet,
@@ -17,8 +16,10 @@ from freqid.data.data_set import (
 from freqid.data.files import read, whole_file, write
 from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.logged import channels
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.quality import check_record
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.data.selection import as_holds
 from freqid.data.stamped_record import StampedRecord

@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from freqid.checks import InputError, unknown
-from freqid.data.readers.kinds import READERS, WRITERS
+from freqid.data.logged import kind_of, logged_record
+from freqid.data.readers.kinds import LOGS, READERS, WRITERS
 from freqid.data.record import Record
 from freqid.lti import Hold
 
@@ -31,7 +32,9 @@ def read(
     """A record from a file; the suffix says which kind.
 
     .csv, .parquet (extra ``parquet``), .mat (version 7.3 with extra ``hdf5``), .npz, .h5 (extra
-    ``hdf5``) and .uff (data set 58, extra ``uff``).
+    ``hdf5``) and .uff (data set 58, extra ``uff``). Robot logs, whose channels have clocks of their
+    own (see ``channels`` and ``Record.from_logs``): .ulg (PX4, extra ``ulog``), .bag, .mcap and
+    folders of ROS 2 bags (extra ``ros``), .mf4 (extra ``mdf``).
 
     Args:
         inputs, outputs, reference: columns, as in ``Record.from_frame``.
@@ -52,9 +55,17 @@ def read(
     0.01
     """
     path = Path(path)
+    if kind_of(path) in LOGS:
+        try:
+            return _cut(
+                logged_record(path, inputs, outputs, hold, units, resample), start, stop, detrend
+            )
+        except InputError as error:
+            text = str(error)
+            raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise InputError(f"{path}: {unknown('suffix', path.suffix, READERS)}")
+        raise InputError(f"{path}: {unknown('suffix', path.suffix, [*READERS, *LOGS])}")
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
     if path.stat().st_size == 0:
@@ -63,11 +74,15 @@ def read(
         record = Record.from_frame(
             reader(path), inputs, outputs, dt, hold, reference, units=units, resample=resample
         )
-        if start is not None or stop is not None:
-            record = record.slice(start or 0.0, stop)
-        return record if detrend is None else record.detrend(detrend)
+        return _cut(record, start, stop, detrend)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+
+
+def _cut(record: Record, start: float | None, stop: float | None, detrend: int | None) -> Record:
+    if start is not None or stop is not None:
+        record = record.slice(start or 0.0, stop)
+    return record if detrend is None else record.detrend(detrend)
 
 
 def write(record: Record, path: str | Path) -> None:

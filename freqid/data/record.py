@@ -19,12 +19,12 @@ from freqid.checks import (
     unknown,
     whole,
 )
-from freqid.data.channels import as_holds, channel, selected, with_input
 from freqid.data.conditions import as_conditions
 from freqid.data.folding import low_pass, power_above
 from freqid.data.frames import record_of, samples_frame
 from freqid.data.printed import as_html, as_text
 from freqid.data.sampling import check_rates, less_trend, sample_at
+from freqid.data.selection import as_holds, channel, selected, with_input
 from freqid.data.signals import Signals
 from freqid.lti import Hold, ZeroOrderHold
 

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
     Reader = Callable[[Path], pd.DataFrame]
     Writer = Callable[[pd.DataFrame, Path], None]
+    LogReader = Callable[[Path], dict[str, "Channel"]]
 
 Function = TypeVar("Function")
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One signal of a log: times in s, values (N,), and its unit where the log says it."""
+
+    times: FloatArray
+    values: FloatArray
+    unit: str = ""
+
+
+# files whose channels have clocks of their own
+LOGS: dict[str, Callable[[Path], dict[str, Channel]]] = {}
 
 READERS: dict[str, Reader] = {}
 WRITERS: dict[str, Writer] = {}
@@ -28,6 +43,11 @@ def reads(*suffixes: str) -> Callable[[Reader], Reader]:
 def writes(*suffixes: str) -> Callable[[Writer], Writer]:
     """Decorator of a function that writes a frame, indexed by time, to a file."""
     return _registered(WRITERS, suffixes)
+
+
+def reads_log(*suffixes: str) -> Callable[[LogReader], LogReader]:
+    """Decorator of a function that makes channels by name of a log."""
+    return _registered(LOGS, suffixes)
 
 
 def _registered(

@@ -1,0 +1,144 @@
+"""Logs of many channels, each with a clock of its own: listed, chosen, made a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError, unknown
+from freqid.data.logs import record_from_logs
+from freqid.data.readers.kinds import LOGS, READERS, Channel
+from freqid.data.record import Record
+from freqid.lti import Hold
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def channels(path: str | Path) -> pd.DataFrame:
+    """What a file holds: a row for each channel, with its rate and how regular that is.
+
+    Columns: ``channel``, ``rate`` (Hz, the mean one), ``jitter`` (s, standard deviation of the
+    steps), ``samples``, ``missing`` (steps of more than one and a half median ones, in samples),
+    ``length`` (s) and ``unit``. Takes every file that ``read`` takes; raises ValueError like it.
+
+    >>> import tempfile, pathlib, freqid as fq
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "step.csv"
+    >>> fq.write(fq.Record([0.0, 1.0, 1.0], [0.0, 0.0, 0.5], dt=0.01), path)
+    >>> fq.channels(path)["samples"].to_dict()
+    {'u': 3, 'y': 3}
+    """
+    import pandas as pd
+
+    found = log_of(path)
+    rows = {name: _row(c) for name, c in found.items()}
+    columns = ["channel", "rate", "jitter", "samples", "missing", "length", "unit"]
+    return pd.DataFrame([(name, *row) for name, row in rows.items()], list(rows), columns)
+
+
+def _row(c: Channel) -> tuple[float, float, int, int, float, str]:
+    count = len(c.times)
+    if count < 2 or not np.isfinite(c.times).all() or c.times[-1] <= c.times[0]:
+        return float("nan"), float("nan"), count, 0, 0.0, c.unit
+    length, gaps = float(c.times[-1] - c.times[0]), np.diff(c.times)
+    period = float(np.median(gaps))
+    missing = int((np.round(gaps / period) - 1).clip(min=0).sum()) if period > 0 else 0
+    return (count - 1) / length, float(np.std(gaps)), count, missing, length, c.unit
+
+
+def log_of(path: str | Path) -> Mapping[str, Channel]:
+    """Every numeric channel of a file by name."""
+    path = Path(path)
+    kind = kind_of(path)
+    if kind in LOGS:
+        try:
+            return LOGS[kind](path)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+    if kind not in READERS:
+        raise InputError(f"{path}: {unknown('suffix', kind, [*READERS, *LOGS])}")
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    try:
+        frame = READERS[kind](path)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    times = frame["time"].to_numpy() if "time" in frame else np.full(len(frame), np.nan)
+    found = {}
+    for name in frame.columns:
+        x = frame[name].to_numpy()
+        if name == "time" or x.dtype.kind not in "fiub":
+            continue
+        there = np.isfinite(x.astype(float))
+        found[str(name)] = Channel(times[there], x[there].astype(float))
+    return found
+
+
+def kind_of(path: Path) -> str:
+    """The suffix that says which kind; a folder that holds a bag is one."""
+    if path.is_dir() and (path / "metadata.yaml").is_file():
+        return ".db3"
+    return path.suffix.lower()
+
+
+def logged_record(
+    path: Path,
+    inputs: Sequence[str] | str | None,
+    outputs: Sequence[str] | str | None,
+    hold: Hold | str | None,
+    units: Mapping[str, str] | None,
+    resample: bool,
+) -> Record:
+    """The record of some channels of a log."""
+    found = log_of(path)
+    u_names, y_names = _names("inputs", inputs, found), _names("outputs", outputs, found)
+    own = {n: found[n].unit for n in (*u_names, *y_names) if found[n].unit}
+    u_time, u = _together("inputs", u_names, found, held=hold in (None, "zoh"))
+    y_time, y = _together("outputs", y_names, found, held=False)
+    return record_from_logs(
+        u_time, u, y_time, y, "zoh" if hold is None else hold, resample,
+        u_names, y_names, own | dict(units or {}),
+    )  # fmt: skip
+
+
+def _names(
+    argument: str, given: Sequence[str] | str | None, found: Mapping[str, Channel]
+) -> list[str]:
+    if given is None:
+        shown = ", ".join(list(found)[:12]) + (", …" if len(found) > 12 else "")
+        raise InputError(
+            f"a log of {len(found)} channels; name {argument}=, freqid channels lists them: {shown}"
+        )
+    names = [given] if isinstance(given, str) else list(given)
+    for name in names:
+        if name not in found:
+            raise InputError(unknown(argument, name, found))
+    return names
+
+
+def _together(
+    argument: str, names: Sequence[str], found: Mapping[str, Channel], held: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Stamps and samples (N,) or (N, channels) of channels of one clock.
+
+    Inputs that were ``held`` may have several clocks: each keeps its value between its own stamps.
+    """
+    picked = [found[n] for n in names]
+    times = picked[0].times
+    alike = all(len(c.times) == len(times) and (c.times == times).all() for c in picked)
+    if not alike and not held:
+        raise InputError(
+            f"{argument}={list(names)} have several clocks; take channels of one topic, or read "
+            "them one at a time"
+        )
+    if not alike:
+        begin = max(c.times[0] for c in picked)
+        times = np.unique(np.concatenate([c.times[c.times >= begin] for c in picked] + [[begin]]))
+        columns = [c.values[np.searchsorted(c.times, times, side="right") - 1] for c in picked]
+    else:
+        columns = [c.values for c in picked]
+    samples = np.column_stack(columns)
+    return times, samples[:, 0] if len(names) == 1 else samples

@@ -1,0 +1,86 @@
+"""ROS 1 and 2 bags and MCAP, by rosbags (extra ``ros``)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data.readers.kinds import Channel, damaged, missing, reads_log
+
+# entries of an array that become channels of their own
+_LONGEST = 64
+
+
+@reads_log(".bag", ".mcap", ".db3")
+def read_bag(path: Path) -> dict[str, Channel]:
+    """Every number of every message by topic and field, ``joint_states.velocity[2]``.
+
+    Times are those of the messages' headers, where they have one, and else those of the log.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise missing("a ROS bag", "rosbags", "ros") from None
+    if not path.exists():
+        raise FileNotFoundError(f"{path} does not exist; check the path")
+    # a ROS 2 bag is a folder of which any file may be named
+    in_folder = path.suffix != ".bag" and (path.parent / "metadata.yaml").is_file()
+    where = path.parent if in_folder else path
+    rows: dict[str, tuple[list[float], dict[str, list[float]]]] = {}
+    try:
+        usual = get_typestore(Stores.LATEST)
+        with AnyReader([where], default_typestore=usual) as bag:
+            for connection, stamp, raw in bag.messages():
+                message = bag.deserialize(raw, connection.msgtype)
+                topic = connection.topic.strip("/")
+                times, fields = rows.setdefault(topic, ([], {}))
+                times.append(_time(message, stamp))
+                for name, value in _numbers(message, ""):
+                    fields.setdefault(name, []).append(value)
+    except Exception as error:
+        # rosbags has errors of many kinds for a file that is not what it says
+        raise damaged("a ROS bag", error) from None
+    found = {}
+    for topic, (times, fields) in rows.items():
+        for name, values in fields.items():
+            # an array that changes its length is no channel
+            if len(values) == len(times):
+                found[f"{topic}.{name}"] = Channel(np.array(times), np.array(values))
+    if not found:
+        raise InputError("holds no numbers")
+    return found
+
+
+def _time(message: Any, stamp: int) -> float:
+    """Time in s, exact to a nanosecond as long as a float is."""
+    header = getattr(getattr(message, "header", None), "stamp", None)
+    seconds = getattr(header, "sec", 0) or 0
+    if seconds or getattr(header, "nanosec", 0):
+        return float(seconds) + 1e-9 * float(header.nanosec)  # type: ignore[union-attr]
+    return stamp * 1e-9
+
+
+def _numbers(value: Any, name: str) -> Iterator[tuple[str, float]]:
+    """Every number of a message, with the path to it."""
+    if isinstance(value, (bool, int, float, np.number)):
+        yield name, float(value)
+    elif isinstance(value, np.ndarray):
+        if value.dtype.kind in "fiub" and value.size <= _LONGEST:
+            for i, x in enumerate(value.ravel().tolist()):
+                yield f"{name}[{i}]", float(x)
+    elif isinstance(value, list):
+        if len(value) <= _LONGEST:
+            for i, each in enumerate(value):
+                yield from _numbers(each, f"{name}[{i}]")
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            if field.name in ("header", "__msgtype__"):
+                continue
+            inner = f"{name}.{field.name}" if name else field.name
+            yield from _numbers(getattr(value, field.name), inner)
