@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from freqid.checks import InputError, unknown
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, READERS, WRITERS
+from freqid.data.readers.table import named
 from freqid.data.record import Record
+from freqid.data.time_column import with_time
 from freqid.lti import Hold
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def read(
@@ -23,36 +30,47 @@ def read(
     hold: Hold | str | None = None,
     reference: str | None = None,
     *,
+    time: str | None = None,
+    sep: str | None = None,
+    decimal: str | None = None,
+    columns: Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
     start: float | None = None,
     stop: float | None = None,
     detrend: int | None = None,
     resample: bool = False,
 ) -> Record:
-    """A record from a file; the suffix says which kind.
+    r"""A record from a file, which is looked at before anything is asked.
 
-    .csv, .parquet (extra ``parquet``), .mat (version 7.3 with extra ``hdf5``), .npz, .h5 (extra
-    ``hdf5``) and .uff (data set 58, extra ``uff``). Robot logs, whose channels have clocks of their
-    own (see ``channels`` and ``Record.from_logs``): .ulg (PX4, extra ``ulog``), .bag, .mcap and
-    folders of ROS 2 bags (extra ``ros``), .mf4 (extra ``mdf``).
+    Text tables (.csv, .txt, .dat, .tsv, .asc, also .gz, .bz2, .xz) with any separator, decimal
+    sign, comments, units and time; .xlsx (extra ``excel``), .parquet (extra ``parquet``), .mat
+    (version 7.3 with extra ``hdf5``), .npz, .h5 (extra ``hdf5``) and .uff (data set 58, extra
+    ``uff``). Robot logs, whose channels have clocks of their own (see ``channels`` and
+    ``Record.from_logs``): .ulg (PX4, extra ``ulog``), .bag, .mcap and folders of ROS 2 bags
+    (extra ``ros``), .mf4 (extra ``mdf``).
 
     Args:
         inputs, outputs, reference: columns, as in ``Record.from_frame``.
         dt: in s, for files without a time; hold: what the input did, where the file, unlike one
             that ``write`` made, does not say.
-        units: of channels by name. ``start``, ``stop`` in s cut the record, ``detrend`` takes a
-            polynomial of that order off (see ``Record.detrend``).
+        time: the column of the time, where its name or its behaviour does not tell.
+        sep, decimal: of a text table, where they cannot be found out.
+        columns: names for a table that has none.
+        units: of channels by name; that of the time is understood (s, ms, µs, ns, min, h).
+            ``start``, ``stop`` in s cut the record, ``detrend`` takes a polynomial of that order
+            off (see ``Record.detrend``).
         resample: put samples with gaps, jitter or missing values on a regular grid by straight
-            lines; ``record.notes`` says what was done. Without it they are an error.
+            lines. Without it they are an error.
 
-    Raises FileNotFoundError for a missing file, ValueError for an empty or damaged one, an unknown
-    suffix or column, missing samples and an irregular time.
+    ``record.notes`` says what was taken for what. Raises FileNotFoundError for a missing file,
+    ValueError for an empty or damaged one, an unknown suffix or column, missing samples and an
+    irregular time; the message lists what was found.
 
     >>> import tempfile, pathlib, freqid as fq
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "step.csv"
-    >>> fq.write(fq.Record([0.0, 1.0, 1.0], [0.0, 0.0, 0.5], dt=0.01), path)
-    >>> fq.read(path).dt
-    0.01
+    >>> _ = path.write_text("t [ms];u;y\n0;0,0;0,0\n10;1,0;0,1\n20;1,0;0,5\n")
+    >>> fq.read(path).dt, fq.read(path).notes
+    (0.01, ("column 't' was taken for the time, in ms",))
     """
     path = Path(path)
     if kind_of(path) in LOGS:
@@ -63,6 +81,28 @@ def read(
         except InputError as error:
             text = str(error)
             raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    frame = frame_of(path, sep, decimal, columns)
+    found = frame.attrs.get("found", f"columns {', '.join(map(str, frame.columns))}")
+    try:
+        told = {**frame.attrs.get("units", {}), **(units or {})}
+        frame, said = with_time(frame, time, told, dt)
+        record = Record.from_frame(
+            frame, _known(inputs, frame), _known(outputs, frame), dt, hold, reference,
+            units=told, resample=resample,
+        )  # fmt: skip
+        notes = (*frame.attrs.get("notes", ()), *said, *record.notes)
+        return _cut(dataclasses.replace(record, notes=notes), start, stop, detrend)
+    except InputError as error:
+        raise InputError(f"{path}: {error} (found {found})") from None
+
+
+def frame_of(
+    path: Path,
+    sep: str | None = None,
+    decimal: str | None = None,
+    columns: Sequence[str] | None = None,
+) -> pd.DataFrame:
+    """The table of a file, not yet told what is what."""
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(f"{path}: {unknown('suffix', path.suffix, [*READERS, *LOGS])}")
@@ -70,13 +110,31 @@ def read(
         raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
     if path.stat().st_size == 0:
         raise InputError(f"{path} is empty; expected columns of samples under a line of names")
+    asked = {k: v for k, v in (("sep", sep), ("decimal", decimal)) if v is not None}
+    if asked and reader is not READERS[".csv"]:
+        raise InputError(f"{path}: {next(iter(asked))}= is for text tables")
     try:
-        record = Record.from_frame(
-            reader(path), inputs, outputs, dt, hold, reference, units=units, resample=resample
-        )
-        return _cut(record, start, stop, detrend)
+        frame = reader(path, **asked)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+    if columns is not None:
+        if len(columns) != frame.shape[1]:
+            raise InputError(
+                f"{path}: columns names {len(columns)} and the table has {frame.shape[1]}"
+            )
+        frame.columns = list(columns)
+        frame.attrs.pop("notes", None)
+    return frame
+
+
+def _known(names: Sequence[str] | str | None, frame: pd.DataFrame) -> Sequence[str] | str | None:
+    """Columns as the frame calls them: the unit in brackets behind a name may be given or not."""
+    if names is None:
+        return None
+    given = [names] if isinstance(names, str) else list(names)
+    plain = [n if n in frame.columns or named(n)[0] not in frame.columns else named(n)[0]
+             for n in given]  # fmt: skip
+    return plain[0] if isinstance(names, str) else plain
 
 
 def _cut(record: Record, start: float | None, stop: float | None, detrend: int | None) -> Record:

@@ -24,7 +24,23 @@ def write_tsv(frame, path):
 
 
 def test_suffixes_stand_in_the_order_of_the_errors():
-    known = [".csv", ".parquet", ".npz", ".mat", ".h5", ".hdf5", ".uff", ".unv"]
+    known = [
+        ".csv",
+        ".txt",
+        ".dat",
+        ".tsv",
+        ".asc",
+        ".gz",
+        ".bz2",
+        ".xz",
+        ".parquet",
+        ".npz",
+        ".mat",
+        ".h5",
+        ".hdf5",
+        ".uff",
+        ".unv",
+    ]
     assert list(kinds.READERS)[: len(known)] == known
     assert list(kinds.WRITERS)[:3] == [".csv", ".parquet", ".npz"]
 

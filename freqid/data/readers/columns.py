@@ -47,9 +47,10 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
             full[name][:: N // len(x)] = x
         else:
             raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
-    if "time" not in full and "t" in full:
-        full["time"] = full.pop("t")
-    step = scalars.get("dt", scalars.get("Ts"))
+    step = next((scalars[n] for n in ("dt", "Ts", "ts", "Dt", "h") if n in scalars), None)
+    rate = next((scalars[n] for n in ("Fs", "fs", "FS", "sampling_rate") if n in scalars), None)
+    if step is None and rate is not None and rate > 0:
+        step = 1 / rate
     if "time" not in full and step is not None:
         full["time"] = step * np.arange(N)
     return pd.DataFrame(full)

@@ -12,7 +12,7 @@ from freqid.checks import FloatArray, InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    Reader = Callable[[Path], pd.DataFrame]
+    Reader = Callable[..., pd.DataFrame]
     Writer = Callable[[pd.DataFrame, Path], None]
     LogReader = Callable[[Path], dict[str, "Channel"]]
 

@@ -1,0 +1,49 @@
+"""Excel and OpenDocument, by python-calamine (extra ``excel``): the first sheet with numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from freqid.checks import InputError
+from freqid.data.readers.kinds import damaged, missing, reads
+from freqid.data.readers.table import heading
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@reads(".xlsx", ".xls", ".xlsm", ".ods")
+def read_excel(path: Path) -> pd.DataFrame:
+    """The columns of a sheet; ValueError for a damaged file, or without python-calamine."""
+    import pandas as pd
+
+    try:
+        from python_calamine import CalamineWorkbook
+    except ImportError:
+        raise missing("a workbook", "python-calamine", "excel") from None
+    try:
+        book = CalamineWorkbook.from_path(str(path))
+        sheets = {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}
+    except Exception as error:
+        # calamine has errors of many kinds for a file that is not what it says
+        raise damaged("a workbook", error) from None
+    for name, rows in sheets.items():
+        rows = [r for r in rows if any(c not in ("", None) for c in r)]
+        body = [
+            i for i, r in enumerate(rows) if sum(_is_number(c) for c in r) >= max(len(r) - 1, 1)
+        ]
+        if len(body) < 2:
+            continue
+        first, width = body[0], len(rows[body[0]])
+        names, units, _ = heading([[str(c) for c in r] for r in rows[:first]], width)
+        frame = pd.DataFrame([[None if c == "" else c for c in r] for r in rows[first:]])
+        frame = frame.iloc[:, :width].infer_objects()
+        frame.columns = names
+        frame.attrs.update(units=units, found=f"sheet {name!r}, columns {', '.join(names)}")
+        return frame
+    raise InputError(f"holds no columns of numbers in its sheets ({', '.join(sheets)})")
+
+
+def _is_number(cell: Any) -> bool:
+    return isinstance(cell, (int, float)) and not isinstance(cell, bool)

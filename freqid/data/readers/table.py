@@ -1,0 +1,159 @@
+"""Tables as programs print them: separator, decimal sign, names, units and comments found out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from freqid.checks import InputError
+
+# lines that are looked at before the columns are read
+LOOK = 400
+_COMMENT = ("#", "%", "//", "!")
+_SEPARATORS = {";": ";", "\t": "\\t", ",": ",", "|": "|", " ": "\\s+"}
+_NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
+}
+_BLANK = {"true", "false", "", "nan", "na", "n/a", "null", "none", "-nan", "inf", "-inf"}
+_STAMP = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([T ]?\d{0,2}:?\d{0,2}:?\d{0,2}[.,]?\d*)?.*")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a table is printed: how cells are parted, rows to skip, names and units of columns."""
+
+    separator: str
+    decimal: str
+    first: int
+    names: list[str]
+    units: dict[str, str]
+    headed: bool
+
+
+def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) -> Layout:
+    """The layout of a text table; ValueError where no lines of numbers can be found."""
+    shown = [_uncommented(line) for line in lines]
+    best: tuple[float, int, Layout] | None = None
+    for mark in [separator] if separator else _SEPARATORS:
+        for sign in [decimal] if decimal else (".", ","):
+            if mark == sign:
+                continue
+            found = _tried(shown, mark, sign)
+            if found is not None and (best is None or found[:2] > best[:2]):
+                best = found
+    if best is None:
+        seen = next((line for line in lines if line.strip()), "")
+        if not any(ch.isdigit() for line in lines for ch in line):
+            raise InputError(f"holds names but no samples; it begins {seen[:60]!r}")
+        raise InputError(
+            f"holds no columns of numbers that could be found; it begins {seen[:60]!r}: give sep= "
+            "and decimal="
+        )
+    return best[2]
+
+
+def parted(line: str, separator: str) -> list[str]:
+    """Cells of a line."""
+    cells = line.split() if separator == " " else line.rstrip("\r\n").split(separator)
+    return [c.strip().strip('"').strip("'") for c in cells]
+
+
+def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[str, str], bool]:
+    """Names and units from the rows above the samples, the last of as many cells as there are.
+
+    ``x [mm]``, ``x (mm)`` and a row of units below that of names are understood.
+    """
+    full = [list(r) for r in rows if len(r) in (width, width + 1) and any(r)]
+    full = [r[:width] for r in full if len(r) == width or not r[-1]]
+    if not full and rows and _are_names(rows[-1]) and len(rows[-1]) in range(2, width):
+        raise InputError(
+            f"the samples have {width} cells and the line of names {len(rows[-1])}: "
+            f"{', '.join(rows[-1])}; mend that line"
+        )
+    if not full:
+        return [f"column{i + 1}" for i in range(width)], {}, False
+    given, below = (
+        (full[-2], full[-1]) if len(full) > 1 and _are_units(full[-1]) else (full[-1], [])
+    )
+    names, units = [], {}
+    for i, text in enumerate(given):
+        name, unit = named(text or f"column{i + 1}")
+        unit = below[i].strip("[]() ") if below and below[i].strip("[]()- ") else unit
+        names.append(name)
+        if unit:
+            units[name] = unit
+    if len(set(names)) < len(names):
+        twice = next(n for n in names if names.count(n) > 1)
+        raise InputError(f"column {twice!r} is there twice; rename one of them: {', '.join(names)}")
+    return names, units, True
+
+
+def named(text: str) -> tuple[str, str]:
+    """A name and the unit in brackets behind it."""
+    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", text.strip())
+    if found and found[1] and not re.fullmatch(r"\d+", found[2]):
+        return found[1].strip(), found[2].strip()
+    return text.strip(), ""
+
+
+def _are_names(cells: Sequence[str]) -> bool:
+    """Whether cells could be names of columns: words that begin with a letter."""
+    return all(re.match(r"[^\W\d]", c) for c in cells)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether a row is one of units: brackets, or short words of which several are known."""
+    words = [c.strip() for c in cells if c.strip()]
+    if all(re.fullmatch(r"[\[(].*[\])]", w) or w == "-" for w in words):
+        return True
+    known = r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2|g|Hz|Pa|bar|K|°C|%|-|counts?)"  # noqa: E501
+    return bool(words) and sum(bool(re.fullmatch(known, w)) for w in words) >= 0.6 * len(words)
+
+
+def _uncommented(line: str) -> str:
+    text = line.strip("\ufeff").rstrip("\r\n")
+    for mark in _COMMENT:
+        if text.lstrip().startswith(mark):
+            return text.lstrip()[len(mark) :]
+    return text
+
+
+def _is_value(cell: str, decimal: str) -> bool:
+    return bool(_NUMBER[decimal].fullmatch(cell)) or cell.lower() in _BLANK
+
+
+def _tried(lines: Sequence[str], mark: str, sign: str) -> tuple[float, int, Layout] | None:
+    """How well a separator and a decimal sign explain the lines: part of numbers, columns."""
+    rows = [parted(line, mark) for line in lines]
+    last = [r for r in rows[-60:] if any(r)]
+    if not last:
+        return None
+    width = max({len(r) for r in last}, key=[len(r) for r in last].count)
+    if width < 1 or (width < 2 and mark != ","):
+        return None
+    good = [_is_row(r, width, sign) for r in rows]
+    if not any(good):
+        return None
+    followed = [g and after for g, after in zip(good, [*good[1:], True], strict=True)]
+    first = followed.index(True) if True in followed else good.index(True)
+    body = [g for r, g in zip(rows[first:], good[first:], strict=True) if any(r)]
+    share = sum(body) / len(body)
+    if share < 0.5:
+        return None
+    cells = [c for r in rows[first : first + 60] for c in r if c]
+    numbers = sum(bool(_NUMBER[sign].fullmatch(c)) for c in cells) / max(len(cells), 1)
+    names, units, headed = heading([r for r in rows[:first] if any(r)], width)
+    layout = Layout(mark, sign, first, names, units, headed)
+    return round(share * numbers, 2), width, layout
+
+
+def _is_row(cells: Sequence[str], width: int, sign: str) -> bool:
+    """Whether a row is one of samples: as many cells as the others, half of them numbers."""
+    trailing = len(cells) == width + 1 and not cells[-1]
+    if len(cells) != width and not trailing:
+        return False
+    numbers = sum(bool(_NUMBER[sign].fullmatch(c)) for c in cells[:width])
+    other = [c for c in cells[:width] if not _is_value(c, sign) and not _STAMP.fullmatch(c)]
+    return numbers > 0 and 2 * len(other) <= width

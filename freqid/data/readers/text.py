@@ -1,0 +1,108 @@
+"""Text tables: CSV as anybody writes it, whitespace tables, compressed or not."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import io
+import lzma
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from freqid.checks import InputError
+from freqid.data.readers.kinds import damaged, reads, writes
+from freqid.data.readers.table import LOOK, Layout, layout_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# part of a text that may be no plain characters
+_ODD = 0.2
+_OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
+
+
+@reads(".csv", ".txt", ".dat", ".tsv", ".asc", ".gz", ".bz2", ".xz")
+def read_text(path: Path, sep: str | None = None, decimal: str | None = None) -> pd.DataFrame:
+    """The columns of a text table; ValueError for one that is damaged or holds no samples."""
+    import pandas as pd
+
+    text = _text(path)
+    lines = [line for line in text[: 400 * LOOK].splitlines()[:LOOK] if line.strip()]
+    if not lines:
+        raise InputError("is empty; expected columns of samples under a line of names")
+    layout = layout_of(_complete(lines, text), sep, decimal)
+    body = text.splitlines()
+    kept = [line for line in body if line.strip()][layout.first :]
+    try:
+        frame = pd.read_csv(
+            io.StringIO("\n".join(line.lstrip() if layout.separator == " " else line
+                                  for line in kept)),
+            sep=r"\s+" if layout.separator == " " else layout.separator,
+            decimal=layout.decimal, header=None, comment="#", skipinitialspace=True,
+            index_col=False,
+        )  # fmt: skip
+    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
+        raise damaged("CSV", error) from None
+    return _with_names(frame, layout)
+
+
+def _text(path: Path) -> str:
+    opener = _OPENERS.get(path.suffix.lower())
+    try:
+        if opener is None:
+            raw = path.read_bytes()
+        else:
+            stream: IO[bytes] = opener(path, "rb")  # type: ignore[operator]
+            with stream:
+                raw = stream.read()
+    except (OSError, EOFError, lzma.LZMAError) as error:
+        raise damaged("a compressed table", error) from None
+    if b"\x00" in raw[:1000] and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError("is no text: it holds zero bytes; check the file's kind")
+    for encoding in ("utf-8-sig", "utf-16", "latin-1"):
+        if encoding == "utf-16" and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+            continue
+        try:
+            text = raw.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        odd = sum((not c.isprintable() and c not in "\r\n\t") or "\x7f" < c < "\xa0"
+                  or (encoding == "latin-1" and c > "\x7f") for c in text[:4000])  # fmt: skip
+        if odd > _ODD * len(text[:4000]):
+            break
+        return text
+    raise InputError("is not CSV: no text in any encoding that is known")
+
+
+def _complete(lines: list[str], text: str) -> list[str]:
+    """The lines without a last one that may be cut."""
+    return lines[:-1] if len(lines) == LOOK and len(text) > 400 * LOOK else lines
+
+
+def _with_names(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
+    width = len(layout.names)
+    if frame.shape[1] > width:
+        more = frame.iloc[:, width:]
+        if not more.isna().to_numpy().all():
+            raise InputError(
+                f"rows have {frame.shape[1]} cells and the line of names {width}: "
+                f"{', '.join(layout.names)}"
+            )
+        frame = frame.iloc[:, :width]
+    if len(frame) == 0:
+        raise InputError("holds names but no samples")
+    frame.columns = layout.names
+    frame.attrs["units"] = layout.units
+    if not layout.headed:
+        frame.attrs["notes"] = [f"no line of names: columns are {', '.join(layout.names)}"]
+    mark = {"\t": "tab", " ": "spaces"}.get(layout.separator, repr(layout.separator))
+    frame.attrs["found"] = f"columns {', '.join(layout.names)}, parted by {mark}"
+    if layout.decimal == ",":
+        frame.attrs["found"] += ", with decimal commas"
+    return frame
+
+
+@writes(".csv")
+def write_csv(frame: pd.DataFrame, path: Path) -> None:
+    """The frame as CSV, with the same line ends everywhere."""
+    frame.to_csv(path, lineterminator="\n")

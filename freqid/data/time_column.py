@@ -1,0 +1,143 @@
+"""Which column of a table is the time, and in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError, unknown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# seconds of each unit by its names
+UNITS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "µs", "μs", "usec", "microsecond", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
+    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
+}
+# names that mean the time, case and unit apart
+_NAMES = {
+    "time", "t", "zeit", "temps", "tid", "timestamp", "timestamps", "time stamp", "date time",
+    "datetime", "date", "elapsed", "elapsed time", "seconds", "sec", "t_s", "time_s", "time_ms",
+    "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
+}  # fmt: skip
+# a count since 1970 of this size is of seconds, milliseconds, …
+_EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
+# steps that differ by no more than this part make an unnamed column a time
+_EVEN = 1e-3
+
+
+def with_time(
+    frame: pd.DataFrame, time: str | None, units: dict[str, str], dt: float | None
+) -> tuple[pd.DataFrame, list[str]]:
+    """The frame with its time in s as the column ``time``, and what was taken for it, in words.
+
+    Raises ValueError for a column that is not there or holds no time.
+    """
+    name = _found(frame, time, dt)
+    if name is None:
+        return frame, []
+    seconds, said = in_seconds(name, frame[name], units.get(name, ""))
+    rest = frame.drop(columns=[name])
+    if "time" in rest.columns:
+        raise InputError(f"time={name!r}: the column 'time' is another; rename it")
+    rest.insert(0, "time", seconds)
+    plain = name == "time" and said == "s"
+    return rest, [] if plain else [f"column {name!r} was taken for the time, in {said}"]
+
+
+def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | None:
+    if time is not None:
+        if time not in frame.columns:
+            raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
+        return time
+    for column in frame.columns:
+        if str(column) == "time":
+            return str(column)
+    for column in frame.columns:
+        if re.sub(r"[\s_]+", " ", str(column).strip().casefold()) in _NAMES or (
+            str(column).casefold() in _NAMES
+        ):
+            return str(column)
+    if dt is not None or len(frame.columns) < 3 or len(frame) < 3:
+        return None
+    # by behaviour: only a first column that runs evenly
+    first = str(frame.columns[0])
+    x = frame[frame.columns[0]]
+    if x.dtype.kind not in "fiu":
+        return first if _is_stamp(x) else None
+    values = x.to_numpy(dtype=float)
+    gaps = np.diff(values)
+    even = np.isfinite(values).all() and gaps.min() > 0
+    if even and np.abs(gaps - gaps.mean()).max() <= _EVEN * gaps.mean():
+        return first
+    return None
+
+
+def _is_stamp(column: pd.Series[Any]) -> bool:
+    return column.dtype.kind in "mM" or _converted(column.iloc[:5]) is not None
+
+
+def _converted(column: pd.Series[Any]) -> pd.Series[Any] | None:
+    """Texts as dates or durations; None where they are neither."""
+    import pandas as pd
+
+    ways: list[Callable[[], Any]] = [
+        lambda: pd.to_datetime(column, format="ISO8601"),
+        lambda: pd.to_timedelta(column),
+        lambda: pd.to_datetime(column, format="mixed"),
+    ]
+    for way in ways:
+        try:
+            return pd.Series(way())
+        except (ValueError, TypeError, OverflowError):
+            continue
+    return None
+
+
+def in_seconds(name: str, column: pd.Series[Any], unit: str) -> tuple[FloatArray, str]:
+    """A column as seconds, and the unit that it was in."""
+    if column.dtype.kind == "M":
+        return _since_first(column), "date and time"
+    if column.dtype.kind == "m":
+        return column.dt.total_seconds().to_numpy(dtype=float), "durations"
+    if column.dtype.kind not in "fiub":
+        converted = _converted(column)
+        if converted is None:
+            raise InputError(
+                f"column {name!r} holds {column.iloc[0]!r}, which is neither a number nor a time"
+            )
+        return in_seconds(name, converted, unit)
+    values = column.to_numpy(dtype=float)
+    suffix = re.search(r"_(s|ms|us|ns)$", name.casefold())
+    wanted = unit or (suffix[1] if suffix else "")
+    if wanted:
+        if wanted.casefold() not in UNITS:
+            raise InputError(
+                f"the unit of {name!r} is {wanted!r}; expected one of {', '.join(UNITS)}"
+            )
+        scale = UNITS[wanted.casefold()]
+        return _scaled(values, scale), wanted
+    size = float(np.nanmax(np.abs(values), initial=0))
+    for least, scale, text in _EPOCHS:
+        if size > least:
+            return _scaled(values - values[0], scale), f"{text} since 1970"
+    return values, "s"
+
+
+def _scaled(values: FloatArray, scale: float) -> FloatArray:
+    """Values times a power of ten, rounded as one would divide."""
+    return values / round(1 / scale) if scale < 1 else values * scale
+
+
+def _since_first(column: pd.Series[Any]) -> FloatArray:
+    import pandas as pd
+
+    return np.asarray((column - column.iloc[0]) / pd.Timedelta(seconds=1), dtype=float)

@@ -1,0 +1,209 @@
+"""Files as programs and loggers write them: each is read right, or refused with the cure."""
+
+import bz2
+import gzip
+import lzma
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+
+N, DT = 200, 0.005
+U = np.round(np.random.default_rng(0).standard_normal(N), 6)
+Y = np.round(np.random.default_rng(1).standard_normal(N), 6)
+T = np.round(DT * np.arange(N), 6)
+
+
+def rows(sep=",", decimal=".", time=T, fmt="{}", columns=None):
+    made = zip(time, U, Y, strict=True) if columns is None else zip(*columns, strict=True)
+    lines = [sep.join(fmt.format(x) for x in row) for row in made]
+    return "\n".join(line.replace(".", decimal) for line in lines) + "\n"
+
+
+STAMPS = pd.date_range("2026-03-01 10:00:00", periods=N, freq="5ms")
+EPOCH = 1772358000
+
+
+def since_1970(scale):
+    return [int(EPOCH * scale) + round(scale * t) for t in T]
+
+
+TEXTS = {
+    "plain": "time,u,y\n" + rows(),
+    "t": "t,u,y\n" + rows(),
+    "Time": "Time,u,y\n" + rows(),
+    "capitals": "TIME;U;Y\n" + rows(";"),
+    "seconds in brackets": "time [s],u [V],y [rad]\n" + rows(),
+    "seconds in parentheses": "Time (s),u (V),y (rad)\n" + rows(),
+    "milliseconds": "time [ms],u,y\n" + rows(time=1e3 * T),
+    "microseconds": "t (us),u,y\n" + rows(time=np.round(1e6 * T).astype(int)),
+    "milliseconds by name": "time_ms,u,y\n" + rows(time=1e3 * T),
+    "minutes": "time [min],u,y\n" + rows(time=T / 60),
+    "a row of units": "time,u,y\ns,V,rad\n" + rows(),
+    "a row of units in brackets": "time;u;y\n[ms];[V];[rad]\n" + rows(";", time=1e3 * T),
+    "German": "Zeit;u;y\n" + rows(";", ","),
+    "German with thousands of digits": "Zeit [s];u;y\n" + rows(";", ",", fmt="{:.9f}"),
+    "tabs": "time\tu\ty\n" + rows("\t"),
+    "tabs with commas": "time\tu\ty\n" + rows("\t", ","),
+    "bars": "time|u|y\n" + rows("|"),
+    "spaces": "time u y\n" + rows(" "),
+    "aligned": "   time        u         y\n" + rows(" ", fmt="{:>12.6f}"),
+    "comma and space": "time, u, y\n" + rows(", "),
+    "comments": "# logger 3.1\n# started by hand\ntime,u,y\n" + rows(),
+    "names in a comment": "# time u y\n" + rows(" "),
+    "percent": "% recorded 2026\n% time u y\n" + rows(" "),
+    "numpy": "# time,u,y\n" + rows(fmt="{:.18e}"),
+    "preamble": "Device: Logger\nSerial: 12345\nRate: 200 Hz\n\ntime,u,y\n" + rows(),
+    "preamble with separators": "Device;Logger\nSerial;123\n\ntime;u;y\n" + rows(";"),
+    "quotes": '"time","u","y"\n' + rows(),
+    "windows": ("time,u,y\n" + rows()).replace("\n", "\r\n"),
+    "mark of the encoding": "\ufefftime,u,y\n" + rows(),
+    "trailing separator": "time;u;y;\n" + rows(";").replace("\n", ";\n"),
+    "blank lines": "time,u,y\n\n" + rows().replace("\n", "\n\n"),
+    "no names": rows(),
+    "no names, spaces": rows(" "),
+    "ISO stamps": "timestamp,u,y\n" + rows(time=[s.isoformat() for s in STAMPS]),
+    "stamps with a blank": "time;u;y\n" + rows(";", time=[str(s) for s in STAMPS]),
+    "stamps in UTC": "time,u,y\n" + rows(time=[s.isoformat() + "Z" for s in STAMPS]),
+    "times of day": "time,u,y\n" + rows(time=[f"{s:%H:%M:%S.%f}" for s in STAMPS]),
+    "seconds since 1970": "timestamp,u,y\n" + rows(time=[f"{EPOCH + t:.6f}" for t in T]),
+    "milliseconds since 1970": "timestamp,u,y\n" + rows(time=since_1970(1e3)),
+    "nanoseconds since 1970": "timestamp,u,y\n" + rows(time=since_1970(1e9)),
+    "an unnamed even column": "clock_value,u,y\n" + rows(),
+    "exponents": "time,u,y\n" + rows(fmt="{:e}"),
+    "French": "temps;u;y\n" + rows(";", ",", fmt="{:.6f}"),
+}  # fmt: skip
+
+
+def check(record):
+    assert record.dt == pytest.approx(DT, rel=1e-6)
+    assert np.allclose(record.u, U, atol=1.1e-6)
+    assert np.allclose(record.y, Y, atol=1.1e-6)
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_texts(kind, tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(TEXTS[kind], encoding="utf-8", newline="")
+    check(fq.read(path))
+
+
+def test_units_are_kept(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text(TEXTS["seconds in brackets"])
+    assert fq.read(path).units == {"u": "V", "y": "rad"}
+    assert fq.read(path, "u [V]", "y").input_names == ("u",)
+    path.write_text(TEXTS["a row of units"])
+    assert fq.read(path).units == {"u": "V", "y": "rad"}
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16", "utf-8-sig"])
+def test_encodings(encoding, tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_bytes(("# Prüfstand\ntime;u;y\n" + rows(";")).encode(encoding))
+    check(fq.read(path))
+
+
+@pytest.mark.parametrize("module", [gzip, bz2, lzma])
+def test_compressed(module, tmp_path):
+    path = tmp_path / ("log.csv" + {gzip: ".gz", bz2: ".bz2", lzma: ".xz"}[module])
+    with module.open(path, "wt") as file:
+        file.write(TEXTS["German"])
+    check(fq.read(path))
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(ValueError, match="damaged"):
+        fq.read(path)
+
+
+def test_notes_say_what_was_taken(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(TEXTS["milliseconds"])
+    assert fq.read(path).notes == ("column 'time' was taken for the time, in ms",)
+    path.write_text(TEXTS["no names"])
+    assert "no line of names" in fq.read(path).notes[0]
+    path.write_text(TEXTS["plain"])
+    assert fq.read(path).notes == ()
+
+
+@pytest.mark.parametrize("suffix", [".xlsx", ".xls"])
+@pytest.mark.parametrize("head", [0, 3])
+def test_workbooks(suffix, head, tmp_path):
+    pytest.importorskip("python_calamine")
+    if suffix == ".xls":
+        pytest.skip("no writer of the old format is kept any more")
+    frame = pd.DataFrame({"Time [ms]": 1e3 * T, "u": U, "y": Y})
+    with pd.ExcelWriter(tmp_path / "log.xlsx", engine="openpyxl") as writer:
+        pd.DataFrame({"note": ["made", "by hand"]}).to_excel(
+            writer, sheet_name="about", index=False
+        )
+        frame.to_excel(writer, sheet_name="data", index=False, startrow=head)
+    check(fq.read(tmp_path / "log.xlsx"))
+
+
+def test_matlab(tmp_path):
+    from scipy.io import savemat
+
+    path = tmp_path / "log.mat"
+    for name, value in (("Fs", 1 / DT), ("fs", 1 / DT), ("Ts", DT), ("dt", DT), ("t", T)):
+        savemat(path, {"u": U, "y": Y, name: value})
+        check(fq.read(path))
+    savemat(path, {"data": {"time": T, "u": U, "y": Y}})
+    check(fq.read(path))
+
+
+def test_binary_kinds(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["run/time"], file["run/u"], file["run/y"] = T, U, Y
+    check(fq.read(tmp_path / "log.h5"))
+    np.savez(tmp_path / "log.npz", t=T, u=U, y=Y)
+    check(fq.read(tmp_path / "log.npz"))
+    pd.DataFrame({"t": T, "u": U, "y": Y}).to_parquet(tmp_path / "log.parquet")
+    check(fq.read(tmp_path / "log.parquet"))
+
+
+def test_choices(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("stamp,a,b,c\n" + rows(columns=[T, U, Y, U * 2]))
+    with pytest.raises(ValueError, match=r"the columns are \['a', 'b', 'c'\]"):
+        fq.read(path)
+    record = fq.read(path, "a", "b")
+    check(record)
+    path.write_text("k,u,y,when\n" + rows(columns=[np.arange(N) ** 2, U, Y, T]))
+    check(fq.read(path, "u", "y", time="when"))
+    path.write_text(rows())
+    assert fq.read(path, columns=["time", "torque", "angle"]).output_names == ("angle",)
+    path.write_text(TEXTS["German"])
+    check(fq.read(path, sep=";", decimal=","))
+
+
+REFUSED = {
+    "one more cell than names": ("time,u\n" + rows(), "line of names"),
+    "names alone": ("time,u,y\n", "no samples"),
+    "words": ("this is a letter\nand no table at all 1\n", "no columns of numbers|name them"),
+    "a column twice": ("time,u,u\n" + rows(), "'u' is there twice"),
+    "no time": ("a,b\n" + rows(columns=[U, Y]), "give dt"),
+    "an unknown unit": ("time [fortnight],u,y\n" + rows(), "fortnight"),
+    "a wrong separator": (TEXTS["German"], "sep"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_refused(kind, tmp_path):
+    text, words = REFUSED[kind]
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    options = {"sep": "|"} if kind == "a wrong separator" else {}
+    with pytest.raises(ValueError, match=words) as raised:
+        fq.read(path, **options)
+    assert "log.csv" in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_error_lists_what_was_found(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("a;b;c;d\n" + rows(";", columns=[U, Y, U, Y]))
+    with pytest.raises(ValueError, match="found columns a, b, c, d, parted by ';'"):
+        fq.read(path, "a", "b")
