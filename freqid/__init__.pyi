@@ -26,6 +26,7 @@ from .data import (
     channels as channels,
     check_record as check_record,
     read as read,
+    read_response as read_response,
     write as write,
 )
 from .excitation import (

@@ -21,5 +21,6 @@ from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.quality import check_record
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.data.response_files import read_response
 from freqid.data.selection import as_holds
 from freqid.data.stamped_record import StampedRecord

@@ -13,9 +13,12 @@ DataSet = Record | FrequencyResponse
 
 def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
     """One data set or several, as a tuple; ValueError where there is none, or something else."""
+    if hasattr(data, "frdata"):
+        data = FrequencyResponse.from_control(data)
     if not isinstance(data, DataSet | Iterable):
         raise InputError(f"data={data!r} holds no experiment; give a record or a response")
     sets = (data,) if isinstance(data, DataSet) else tuple(data)
+    sets = tuple(FrequencyResponse.from_control(d) if hasattr(d, "frdata") else d for d in sets)
     if not sets:
         raise InputError("data=[] holds no experiment; give at least one record or response")
     for each in sets:

@@ -174,6 +174,35 @@ class FrequencyResponse:
             output_names=frd.output_labels,
         )
 
+    @classmethod
+    def from_db(
+        cls, frequency: ArrayLike, magnitude_db: ArrayLike, phase_deg: ArrayLike, **fields: Any
+    ) -> FrequencyResponse:
+        """A response from frequency (Hz), magnitude in dB and phase in degrees, (K,) each.
+
+        ``fields`` are dt, hold, variance and the others of FrequencyResponse. ValueError for
+        shapes that disagree.
+
+        >>> FrequencyResponse.from_db([1.0, 2.0], [20.0, 0.0], [0.0, -180.0]).response[0, 0].real
+        array([10., -1.])
+        """
+        from freqid.data.response_files import of_db
+
+        return of_db(frequency, magnitude_db, phase_deg, **fields)
+
+    @classmethod
+    def from_frame(cls, frame: pd.DataFrame) -> FrequencyResponse:
+        """A response from what ``to_frame`` gives, or from a table as ``read_response`` takes it.
+
+        ValueError, with the columns, for a frame that holds none.
+
+        >>> FrequencyResponse.from_frame(FrequencyResponse([1.0], [1j]).to_frame()).response
+        array([[[0.+1.j]]])
+        """
+        from freqid.data.response_files import of_frame
+
+        return of_frame(frame)
+
     def to_frame(self) -> pd.DataFrame:
         """One row for each frequency and channel pair: magnitude, phase (degrees), re, im, …
 

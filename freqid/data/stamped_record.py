@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError
 from freqid.data.record import Record
@@ -30,10 +31,10 @@ class StampedRecord(Record):
     def __init__(
         self,
         *args: Any,
-        u_time: Any = None,
-        u_logged: Any = None,
-        y_time: Any = None,
-        y_logged: Any = None,
+        u_time: ArrayLike = (),
+        u_logged: ArrayLike = (),
+        y_time: ArrayLike = (),
+        y_logged: ArrayLike = (),
         **fields: Any,
     ) -> None:
         super().__init__(*args, **fields)

@@ -13,6 +13,8 @@ from freqid.checks import FloatArray, InputError, unknown
 if TYPE_CHECKING:
     import pandas as pd
 
+    Column = pd.Series[Any]
+
 # seconds of each unit by its names
 UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek"), 1.0),
@@ -81,11 +83,11 @@ def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | Non
     return None
 
 
-def _is_stamp(column: pd.Series[Any]) -> bool:
+def _is_stamp(column: Column) -> bool:
     return column.dtype.kind in "mM" or _converted(column.iloc[:5]) is not None
 
 
-def _converted(column: pd.Series[Any]) -> pd.Series[Any] | None:
+def _converted(column: Column) -> Column | None:
     """Texts as dates or durations; None where they are neither."""
     import pandas as pd
 
@@ -102,7 +104,7 @@ def _converted(column: pd.Series[Any]) -> pd.Series[Any] | None:
     return None
 
 
-def in_seconds(name: str, column: pd.Series[Any], unit: str) -> tuple[FloatArray, str]:
+def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
     """A column as seconds, and the unit that it was in."""
     if column.dtype.kind == "M":
         return _since_first(column), "date and time"
@@ -137,7 +139,7 @@ def _scaled(values: FloatArray, scale: float) -> FloatArray:
     return values / round(1 / scale) if scale < 1 else values * scale
 
 
-def _since_first(column: pd.Series[Any]) -> FloatArray:
+def _since_first(column: Column) -> FloatArray:
     import pandas as pd
 
     return np.asarray((column - column.iloc[0]) / pd.Timedelta(seconds=1), dtype=float)

@@ -1,0 +1,273 @@
+"""Frequency responses from files: analysers' tables, Touchstone, universal files, MATLAB."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from freqid.checks import Array, ComplexArray, FloatArray, InputError
+from freqid.data.files import frame_of
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.readers.kinds import damaged, first_line, missing
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Hz of each unit of frequency
+_HERTZ = {
+    "hz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "rad/s": 1 / (2 * np.pi),
+    "rad/sec": 1 / (2 * np.pi),
+}  # fmt: skip
+_FREQUENCY = r"(f|freq|frequency|frequenz|w|omega|ω)"
+_PHASE = r"(phase|ph|phi|angle|arg|deg|degrees|∠)"
+_SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db)"
+
+
+def read_response(
+    path: str | Path,
+    *,
+    sep: str | None = None,
+    decimal: str | None = None,
+    input: int | str | None = None,
+    output: int | str | None = None,
+) -> FrequencyResponse:
+    r"""A frequency response from a file, as an analyser or another program wrote it.
+
+    A table (.csv, .txt, .xlsx, …) with a frequency (Hz, or its unit) and magnitude and phase, in dB
+    or plain, in degrees or radians, or real and imaginary parts, or what
+    ``FrequencyResponse.to_frame`` writes; Touchstone (.s1p, .s2p, …, extra ``rf``), universal files
+    (.uff, responses of data sets 58, extra ``uff``) and MATLAB (.mat: f or w, and a complex array).
+
+    Args:
+        sep, decimal: of a table, where they cannot be found out.
+        input, output: which of several, by name or number from 0; all where not given.
+
+    Raises FileNotFoundError for a missing file and ValueError, with what was found, where a file
+    holds no response.
+
+    >>> import tempfile, pathlib, freqid as fq
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "frf.csv"
+    >>> _ = path.write_text("Frequency [Hz];Magnitude [dB];Phase [deg]\n10;20;-90\n20;0;-180\n")
+    >>> fq.read_response(path).response[0, 0].round(6)
+    array([ 0.-10.j, -1. -0.j])
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    try:
+        if re.fullmatch(r"\.s\d+p", kind):
+            found = _touchstone(path)
+        elif kind in (".uff", ".unv"):
+            found = _universal(path)
+        elif kind == ".mat":
+            found = _matlab(path)
+        else:
+            frame = frame_of(path, sep, decimal)
+            found = of_frame(frame, frame.attrs.get("units", {}))
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    return _picked(found, input, output)
+
+
+def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> FrequencyResponse:
+    """The response that a table holds; ValueError, with its columns, where that is none."""
+    names = [str(c) for c in frame.columns]
+    if {"frequency", "output", "input", "real", "imag"} <= set(names):
+        return _long(frame)
+    told = dict(units or {})
+    at = _one(names, _FREQUENCY, told) or names[0]
+    f = _numbers(frame, at) * _scale(at, told.get(at, ""))
+    rest = [n for n in names if n != at]
+    G = _complex(frame, rest, told)
+    order = np.argsort(f, kind="stable")
+    if len(order) < 1 or (np.diff(f[order]) <= 0).any():
+        raise InputError(f"column {at!r} holds a frequency twice; keep one of them")
+    return FrequencyResponse(f[order], G[order])
+
+
+def of_db(
+    frequency: ArrayLike, magnitude_db: ArrayLike, phase_deg: ArrayLike, **fields: Any
+) -> FrequencyResponse:
+    """The work of ``FrequencyResponse.from_db``."""
+    size, turn = np.asarray(magnitude_db, dtype=float), np.asarray(phase_deg, dtype=float)
+    if size.shape != turn.shape:
+        raise InputError(
+            f"magnitude_db has shape {size.shape} and phase_deg {turn.shape}; they must agree"
+        )
+    return FrequencyResponse(frequency, 10 ** (size / 20) * np.exp(1j * np.deg2rad(turn)), **fields)
+
+
+def _long(frame: pd.DataFrame) -> FrequencyResponse:
+    outputs, inputs = list(dict.fromkeys(frame["output"])), list(dict.fromkeys(frame["input"]))
+    first = frame[(frame["output"] == outputs[0]) & (frame["input"] == inputs[0])]
+    f = first["frequency"].to_numpy(dtype=float)
+    fields: dict[str, Array] = {}
+    for name in ("response", "variance", "coherence"):
+        if name != "response" and name not in frame.columns:
+            continue
+        values = frame["real"] + 1j * frame["imag"] if name == "response" else frame[name]
+        kind = complex if name == "response" else float
+        whole = np.empty((len(outputs), len(inputs), len(f)), kind)
+        for i, y in enumerate(outputs):
+            for j, u in enumerate(inputs):
+                some = values[(frame["output"] == y) & (frame["input"] == u)].to_numpy()
+                if len(some) != len(f):
+                    raise InputError(f"{y} from {u} has {len(some)} rows and others {len(f)}")
+                whole[i, j] = some
+        fields[name] = whole
+    names = {"input_names": inputs, "output_names": outputs}
+    return FrequencyResponse(f, fields.pop("response"), **fields, **names)  # type: ignore[arg-type]
+
+
+def _one(names: list[str], pattern: str, units: dict[str, str]) -> str | None:
+    found = [n for n in names if re.search(rf"(^|[^a-z]){pattern}([^a-z]|$)", n.casefold())]
+    return found[0] if found else None
+
+
+def _scale(name: str, unit: str) -> float:
+    text = unit.casefold()
+    if not text:
+        tail = re.search(r"_(hz|khz|mhz|ghz)$", name.casefold())
+        turned = re.search(r"^(w|omega|ω)|rad", name.casefold())
+        text = tail[1] if tail else "rad/s" if turned else "hz"
+    if text not in _HERTZ:
+        raise InputError(f"the unit of {name!r} is {unit!r}; expected one of {', '.join(_HERTZ)}")
+    return _HERTZ[text]
+
+
+def _numbers(frame: pd.DataFrame, name: str) -> FloatArray:
+    try:
+        return frame[name].to_numpy(dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"column {name!r} holds values that are not numbers") from None
+
+
+def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> ComplexArray:
+    real = _one(names, r"(re|real|in-phase)", units)
+    imaginary = _one(names, r"(im|imag|imaginary|quadrature)", units)
+    if real and imaginary:
+        return _numbers(frame, real) + 1j * _numbers(frame, imaginary)
+    phase = _one(names, _PHASE, units)
+    others = [n for n in names if n != phase]
+    size = _one(others, _SIZE, units) or (others[0] if len(others) == 1 else None)
+    if size is None:
+        raise InputError(
+            f"no magnitude or real part among the columns {', '.join(names)}; name them magnitude "
+            "[dB], phase [deg], or real, imag"
+        )
+    magnitude = _numbers(frame, size)
+    if "db" in (units.get(size, "") + " " + size).casefold():
+        magnitude = 10 ** (magnitude / 20)
+    if phase is None:
+        raise InputError(
+            f"the columns {', '.join(names)} hold no phase: a fit needs it; export it too"
+        )
+    turn = _numbers(frame, phase)
+    text = (units.get(phase, "") + " " + phase).casefold()
+    if "rad" not in text:
+        turn = np.deg2rad(turn)
+    return magnitude * np.exp(1j * turn)
+
+
+def _touchstone(path: Path) -> FrequencyResponse:
+    try:
+        import skrf
+    except ImportError:
+        raise missing("Touchstone", "scikit-rf", "rf") from None
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    try:
+        network = skrf.Network(str(path))
+    except Exception as error:
+        # scikit-rf has errors of many kinds for a file that is not what it says
+        raise damaged("Touchstone", error) from None
+    return FrequencyResponse(np.asarray(network.f), np.moveaxis(np.asarray(network.s), 0, -1))
+
+
+def _universal(path: Path) -> FrequencyResponse:
+    try:
+        import pyuff
+    except ImportError:
+        raise missing("UFF58", "pyuff", "uff") from None
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    try:
+        sets = pyuff.UFF(str(path)).read_sets()
+    except Exception as error:
+        # pyuff has errors of many kinds for a file that is not what it says
+        raise damaged("UFF58", error) from None
+    sets = [sets] if isinstance(sets, dict) else list(sets)
+    # function type 4 is a frequency response
+    found = [s for s in sets if s.get("type") == 58 and s.get("func_type") == 4]
+    if not found:
+        raise InputError("holds no frequency responses (data sets 58 of function type 4)")
+
+    def end(s: dict[str, Any], kind: str) -> str:
+        return f"{s.get(f'{kind}_node', 0)}:{s.get(f'{kind}_dir', 0)}"
+
+    outputs = list(dict.fromkeys(end(s, "rsp") for s in found))
+    inputs = list(dict.fromkeys(end(s, "ref") for s in found))
+    f = np.asarray(found[0]["x"], dtype=float)
+    G = np.full((len(outputs), len(inputs), len(f)), np.nan + 0j)
+    for s in found:
+        if len(s["x"]) != len(f) or not np.allclose(s["x"], f):
+            raise InputError("its responses have unlike frequencies; read them one file each")
+        G[outputs.index(end(s, "rsp")), inputs.index(end(s, "ref"))] = s["data"]
+    if np.isnan(G).any():
+        raise InputError(f"holds {len(found)} responses, not all of {outputs} from {inputs}")
+    return FrequencyResponse(f, G, input_names=inputs, output_names=outputs)
+
+
+def _matlab(path: Path) -> FrequencyResponse:
+    import scipy.io
+
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    try:
+        content = scipy.io.loadmat(path, squeeze_me=True)
+    except (ValueError, TypeError, OSError, IndexError, NotImplementedError) as error:
+        raise InputError(f"is not a MAT file that can be read ({first_line(error)})") from None
+    arrays = {k: np.asarray(v) for k, v in content.items() if not k.startswith("__")}
+    found = [k for k, v in arrays.items() if np.iscomplexobj(v) and v.ndim >= 1]
+    axes = [k for k in arrays if re.fullmatch(_FREQUENCY, k.casefold())]
+    if len(found) != 1 or not axes:
+        raise InputError(
+            f"holds {', '.join(arrays)}; expected frequencies f (Hz) or w (rad/s) and one complex "
+            "array"
+        )
+    f = arrays[axes[0]].astype(float) * _scale(axes[0], "")
+    G = arrays[found[0]]
+    if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
+        G = np.moveaxis(G, 0, -1)
+    return FrequencyResponse(f, G if G.ndim != 2 else G[:, None])
+
+
+def _picked(
+    frf: FrequencyResponse, input: int | str | None, output: int | str | None
+) -> FrequencyResponse:
+    """The response from some of its inputs to some of its outputs."""
+    if input is None and output is None:
+        return frf
+    chosen: list[slice] = []
+    for name, given, names in (
+        ("output", output, frf.output_names), ("input", input, frf.input_names)
+    ):  # fmt: skip
+        if given is None:
+            chosen.append(slice(None))
+            continue
+        at = names.index(given) if isinstance(given, str) and given in names else given
+        if not isinstance(at, int) or not 0 <= at < len(names):
+            raise InputError(f"{name}={given!r} is not one of {', '.join(names)}")
+        chosen.append(slice(at, at + 1))
+    o, i = chosen
+    return dataclasses.replace(
+        frf, response=frf.response[o, i], output_names=frf.output_names[o],
+        input_names=frf.input_names[i],
+        variance=None if frf.variance is None else frf.variance[o, i],
+        coherence=None if frf.coherence is None else frf.coherence[o, i],
+    )  # fmt: skip

@@ -1,0 +1,144 @@
+"""Frequency responses as analysers and other programs write them."""
+
+import control
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+
+F = np.linspace(5, 80, 60)
+
+
+@pytest.fixture(scope="module")
+def frf(plant):
+    return plant.frequency_response(2 * np.pi * F)
+
+
+def table(columns, sep=",", decimal="."):
+    lines = [
+        sep.join(f"{x:.12g}" for x in row).replace(".", decimal)
+        for row in zip(*columns, strict=True)
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def texts(G):
+    db, deg = 20 * np.log10(np.abs(G)), np.rad2deg(np.angle(G))
+    way = np.rad2deg(np.unwrap(np.angle(G)))
+    return {
+        "decibel, degrees": "frequency,magnitude_db,phase_deg\n" + table([F, db, deg]),
+        "brackets": "Frequency [Hz];Magnitude [dB];Phase [deg]\n" + table([F, db, deg], ";", ","),
+        "units below": "Freq\tGain\tPhase\nHz\tdB\tdeg\n" + table([F, db, deg], "\t"),
+        "amplitude, radians": "f,amplitude,phase [rad]\n" + table([F, np.abs(G), np.angle(G)]),
+        "unwrapped": "f,|G| mag,phase\n" + table([F, np.abs(G), way]),
+        "real, imaginary": "f,real,imag\n" + table([F, G.real, G.imag]),
+        "re, im by rad/s": "omega [rad/s],Re(G),Im(G)\n" + table([2 * np.pi * F, G.real, G.imag]),
+        "kilohertz": "f [kHz],re,im\n" + table([F / 1e3, G.real, G.imag]),
+        "comments": "! analyser\n# f dB deg\n" + table([F, db, deg], " ").replace(",", " "),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", list(texts(np.ones(len(F)) + 0j)))
+def test_tables(kind, frf, tmp_path):
+    G = frf.response[0, 0]
+    path = tmp_path / "frf.csv"
+    path.write_text(texts(G)[kind])
+    found = fq.read_response(path)
+    assert np.allclose(found.frequency, F)
+    assert np.allclose(found.response[0, 0], G, rtol=1e-7)
+
+
+def test_from_an_analysers_file_to_parameters(plant, frf, tmp_path):
+    G = frf.response[0, 0]
+    (tmp_path / "frf.csv").write_text(texts(G)["brackets"])
+    est = fq.fit(plant, fq.read_response(tmp_path / "frf.csv"), start={"k": plant["k"] * 1.3})
+    assert est["k"] == pytest.approx(plant["k"], rel=1e-5)
+
+
+def test_constructors(frf):
+    G = frf.response[0, 0]
+    made = fq.FrequencyResponse.from_db(
+        F, 20 * np.log10(np.abs(G)), np.rad2deg(np.angle(G)), dt=0.1
+    )
+    assert np.allclose(made.response, frf.response)
+    assert made.dt == 0.1
+    again = fq.FrequencyResponse.from_frame(frf.to_frame())
+    assert np.array_equal(again.response, frf.response)
+    two = fq.FrequencyResponse(
+        [1.0, 2.0], np.arange(8.0).reshape(2, 2, 2), variance=np.ones((2, 2, 2)),
+        input_names=["a", "b"],
+    )  # fmt: skip
+    back = fq.FrequencyResponse.from_frame(two.to_frame())
+    assert np.array_equal(back.response, two.response)
+    assert back.input_names == ("a", "b")
+    assert np.array_equal(back.variance, two.variance)
+    with pytest.raises(ValueError, match="must agree"):
+        fq.FrequencyResponse.from_db(F, F, F[:3])
+
+
+def test_a_control_response_is_data(plant, frf):
+    frd = frf.to_control()
+    start = {"k": plant["k"] * 1.2}
+    for data in (frd, [frd, frf]):
+        assert fq.fit(plant, data, start=start)["k"] == pytest.approx(plant["k"], rel=1e-6)
+    assert isinstance(frd, control.FrequencyResponseData)
+
+
+def test_touchstone(tmp_path):
+    skrf = pytest.importorskip("skrf")
+    S = np.random.default_rng(0).standard_normal((20, 2, 2)) * (0.3 + 0.1j)
+    f = np.linspace(1e3, 2e4, 20)
+    network = skrf.Network(frequency=skrf.Frequency.from_f(f, unit="hz"), s=S, z0=50)
+    network.write_touchstone(filename="two", dir=str(tmp_path))
+    found = fq.read_response(tmp_path / "two.s2p")
+    assert np.allclose(found.frequency, f)
+    assert np.allclose(found.response[1, 0], S[:, 1, 0])
+    assert fq.read_response(tmp_path / "two.s2p", input=0, output=1).response.shape == (1, 1, 20)
+    with pytest.raises(ValueError, match="input=5"):
+        fq.read_response(tmp_path / "two.s2p", input=5)
+
+
+def test_universal_files(frf, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    G, path = frf.response[0, 0], tmp_path / "frf.uff"
+    sets = [
+        pyuff.prepare_58(
+            func_type=4, rsp_node=node, rsp_dir=3, ref_node=7, ref_dir=3, data=node * G, x=F,
+            id1="frf", rsp_ent_name="a", ref_ent_name="b", abscissa_spacing=1,
+            binary=0, ordinate_spec_data_type=20, orddenom_spec_data_type=13,
+        )
+        for node in (1, 2)
+    ]  # fmt: skip
+    pyuff.UFF(str(path)).write_sets(sets, "overwrite")
+    found = fq.read_response(path)
+    assert found.output_names == ("1:3", "2:3")
+    assert np.allclose(found.response[1, 0], 2 * G, rtol=1e-5)
+
+
+def test_matlab(frf, tmp_path):
+    from scipy.io import savemat
+
+    G = frf.response[0, 0]
+    for name, axis in (("f", F), ("w", 2 * np.pi * F)):
+        savemat(tmp_path / "frf.mat", {name: axis, "G": G})
+        found = fq.read_response(tmp_path / "frf.mat")
+        assert np.allclose(found.frequency, F)
+        assert np.allclose(found.response[0, 0], G)
+
+
+def test_refused(tmp_path):
+    path = tmp_path / "frf.csv"
+    path.write_text("f,magnitude\n" + table([F, F]))
+    with pytest.raises(ValueError, match=r"frf\.csv.*no phase"):
+        fq.read_response(path)
+    path.write_text("f,a,b,c\n" + table([F, F, F, F]))
+    with pytest.raises(ValueError, match="a, b, c"):
+        fq.read_response(path)
+    path.write_text("f [furlong],re,im\n" + table([F, F, F]))
+    with pytest.raises(ValueError, match="furlong"):
+        fq.read_response(path)
+    with pytest.raises(FileNotFoundError):
+        fq.read_response(tmp_path / "none.s1p")
+    with pytest.raises(ValueError, match="twice"):
+        fq.FrequencyResponse.from_frame(pd.DataFrame({"f": [1, 1], "re": [1, 2], "im": [0, 0]}))
