@@ -44,7 +44,12 @@ from .excitation import (
     sine as sine,
     white_noise as white_noise,
 )
-from .fitting import Estimate as Estimate, fit as fit, select_order as select_order
+from .fitting import (
+    Estimate as Estimate,
+    fit as fit,
+    load as load,
+    select_order as select_order,
+)
 from .frf import (
     distortion as distortion,
     etfe as etfe,

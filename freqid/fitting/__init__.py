@@ -11,6 +11,7 @@ from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import FITTERS, SearchOptions, fitter_of
 from freqid.fitting.grades import Verdict
 from freqid.fitting.grey_box import fit_grey_box
+from freqid.fitting.kept import load
 from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order
 from freqid.fitting.reading import Reading

@@ -73,6 +73,17 @@ class Shown:
 
         write_report(self, path, title, validation)  # type: ignore[arg-type]
 
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the estimate to a .json file that ``freqid.load`` reads, in any later process.
+
+        Values, covariance, hold, band, witness, verdict and warnings, the model, and what the data
+        were; not the data. Raises ValueError for another suffix, or a file that is there already
+        without ``overwrite``.
+        """
+        from freqid.fitting.kept import save
+
+        save(self, path, overwrite)  # type: ignore[arg-type]
+
     def to_dict(self) -> dict[str, object]:
         """Everything that a file needs, in plain numbers and strings."""
         return printed.as_dict(self)  # type: ignore[arg-type]

@@ -25,3 +25,9 @@ from freqid.models.transfer_function import (
     coefficients,
     rational_model,
 )
+from freqid.models.written import (
+    hold_of_dict,
+    hold_to_dict,
+    model_of_dict,
+    model_to_dict,
+)

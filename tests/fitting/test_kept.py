@@ -1,0 +1,137 @@
+"""Estimates that are saved and loaded, in this process and in another."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+RECORD = fq.simulate(fq.two_mass(), fq.chirp(5, 80, 4, 1e-3), 1e-3).with_noise(0.002)
+
+
+def lag_matrices(tau, gain):
+    return [[-1 / tau]], [[gain / tau]], [[1.0]], None
+
+
+def estimates():
+    own = fq.GreyBox(lag_matrices, [fq.Parameter("tau", 0.02, "s"), fq.Parameter("gain", 2.0)])
+    lag = fq.simulate(own, fq.white_noise(800), 1e-3).with_noise(0.05)
+    return {
+        "built in": fq.fit(fq.two_mass(), RECORD, band=(5, 80)),
+        "chain": fq.fit(fq.drivetrain(2), RECORD),
+        "bounded": fq.fit(fq.two_mass().with_bounds(fm=(0.0, 1.0)), RECORD),
+        "own": fq.fit(own, lag),
+        "black": fq.fit(fq.OutputError(3), RECORD),
+        "continuous": fq.fit(fq.TransferFunction(0, 1), lag),
+        "wrong": fq.fit(fq.first_order(), RECORD),
+    }
+
+
+ESTIMATES = estimates()
+
+
+@pytest.mark.parametrize("kind", ESTIMATES)
+def test_what_is_kept(kind, tmp_path):
+    est, path = ESTIMATES[kind], tmp_path / "est.json"
+    est.save(path)
+    kept = fq.load(path)
+    assert kept.names == list(est.names)
+    assert np.array_equal(kept.values, est.values)
+    assert kept.parameters.equals(est.parameters)
+    assert np.array_equal(kept.covariance_matrix, est.covariance_matrix)
+    assert kept.verdict == est.verdict
+    assert kept.witness.verdict == est.witness.verdict
+    assert [w.kind for w in kept.warnings] == [w.kind for w in est.warnings]
+    assert (kept.hold, kept.dt, kept.band) == (est.hold, est.dt, est.band)
+    data = est.data[0]
+    assert np.array_equal(fq.compare(kept, data).simulated, fq.compare(est, data).simulated)
+    omega = np.linspace(10, 300, 20)
+    hold = est.model.own_hold or fq.ZeroOrderHold(1e-3)
+    now, then = (e.frequency_response(omega, hold) for e in (kept, est))
+    assert np.array_equal(now.response, then.response)
+    if isinstance(est.model, fq.GreyBox):
+        assert np.allclose(now.variance, then.variance, rtol=1e-6)
+        assert kept.modes()["frequency"].tolist() == pytest.approx(
+            est.modes()["frequency"].tolist()
+        )
+    assert np.array_equal(kept.to_control().A, est.to_control().A)
+    kept.save(tmp_path / "again.json")
+    assert fq.load(tmp_path / "again.json").verdict == est.verdict
+
+
+def test_the_file_is_strict_json(tmp_path):
+    ESTIMATES["wrong"].save(tmp_path / "est.json")
+
+    def never(word):
+        raise AssertionError(word)
+
+    kept = json.loads((tmp_path / "est.json").read_text(), parse_constant=never)
+    assert kept["schema"] == 1
+    assert kept["freqid"] == fq.__version__
+    assert len(kept["data"][0]["sha256"]) == 64
+    assert (tmp_path / "est.json").stat().st_size < 20_000
+
+
+def test_in_another_process(tmp_path):
+    est, path = ESTIMATES["built in"], tmp_path / "est.json"
+    est.save(path)
+    code = (
+        "import sys, freqid as fq; e = fq.load(sys.argv[1]);"
+        "print(repr(e['k']), fq.simulate(e, [1.0, 0.0, 0.0], 1e-3).y[2], e.verdict.grade)"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert float(said[0]) == est["k"]
+    assert float(said[1]) == fq.simulate(est, [1.0, 0.0, 0.0], 1e-3).y[2]
+
+
+def test_plants_without_a_path(tmp_path):
+    plant = fq.GreyBox(
+        lambda tau, gain: lag_matrices(tau, gain),
+        [fq.Parameter("tau", 0.02), fq.Parameter("gain", 2.0)],
+    )
+    est = fq.fit(plant, fq.simulate(plant, fq.white_noise(300), 1e-3).with_noise(0.05))
+    est.save(tmp_path / "est.json")
+    with pytest.raises(ValueError, match=r"load\(path, model=plant\)"):
+        fq.load(tmp_path / "est.json")
+    assert fq.load(tmp_path / "est.json", model=plant)["tau"] == est["tau"]
+    with pytest.raises(ValueError, match="parameters b, a"):
+        fq.load(tmp_path / "est.json", model=fq.first_order())
+
+
+def test_own_values_and_conditions(tmp_path):
+    runs = [RECORD, RECORD.with_conditions(Ja=11.0)]
+    est = fq.fit(fq.two_mass(), runs, separate=["fm"])
+    est.save(tmp_path / "est.json")
+    assert fq.load(tmp_path / "est.json").separate.equals(est.separate)
+
+
+def test_what_is_refused(tmp_path):
+    est, path = ESTIMATES["own"], tmp_path / "est.json"
+    est.save(path)
+    with pytest.raises(ValueError, match="overwrite"):
+        est.save(path)
+    est.save(path, overwrite=True)
+    with pytest.raises(ValueError, match=r"\.json"):
+        est.save(tmp_path / "est.pkl")
+    with pytest.raises(FileNotFoundError):
+        fq.load(tmp_path / "none.json")
+    good = json.loads(path.read_text())
+    for change, words in (
+        ({"schema": 99}, "newer layout"),
+        ({"kind": "shopping list"}, "is not an estimate"),
+        ({"covariance": [[1.0]]}, "damaged"),
+        ({"values": None}, "damaged"),
+        ({"hold": {"name": "warp", "period": 1}}, "'warp'"),
+        ({"model": {**good["model"], "matrices": {"function": "nowhere:f"}}}, "cannot be imported"),
+    ):
+        path.write_text(json.dumps({**good, **change}))
+        with pytest.raises(ValueError, match=words):
+            fq.load(path)
+    path.write_text(json.dumps(good)[:200])
+    with pytest.raises(ValueError, match="is not JSON"):
+        fq.load(path)
