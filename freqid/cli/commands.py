@@ -10,9 +10,9 @@ import cyclopts
 
 import freqid as fq
 from freqid.checks import InputError
-from freqid.cli.estimates import bias, fit
+from freqid.cli.estimates import bias, fit, new_model
 from freqid.cli.options import Band, Columns, Dt
-from freqid.cli.terminal import folder, progress, show, write_picture, write_table
+from freqid.cli.terminal import folder, may_write, progress, show, write_picture, write_table
 
 
 def reproduce(out: Path = Path("out")) -> None:
@@ -66,6 +66,7 @@ def frf(
     reference: str | None = None,
     out: Path | None = None,
     plot: Path | None = None,
+    force: bool = False,
 ) -> None:
     """Frequency response of a record, to the screen, a CSV file or a picture.
 
@@ -80,7 +81,11 @@ def frf(
         samples of each segment of h1.
     reference
         column of the commanded signal, for data in closed loop (h1, lpm, lrm).
+    force
+        overwrite files that are there already; never the one that is read.
     """
+    for path in (out, plot):
+        may_write(path, [data], force)
     record = fq.read(data, input, output, dt, reference=reference)
     if reference is not None and method == "etfe":
         raise InputError("--reference needs --method h1, lpm or lrm")
@@ -102,6 +107,41 @@ def frf(
         print(frame.to_string(index=False))
     else:
         print(repr(response)[1:-1])
+
+
+def show_file(
+    file: Path,
+    *,
+    input: Columns = None,
+    output: Columns = None,
+    dt: Dt = None,
+    time: str | None = None,
+    plot: Path | None = None,
+    force: bool = False,
+) -> None:
+    """What would be read of a file: channels, rate, what was taken for the time; and a picture.
+
+    Parameters
+    ----------
+    file
+        any file that freqid reads.
+    time
+        the column of the time, where its name does not tell.
+    plot
+        picture of the record.
+    force
+        overwrite the picture.
+    """
+    may_write(plot, [file], force)
+    print(fq.channels(file).to_string(index=False, float_format=lambda x: f"{x:.6g}"))
+    record = fq.read(file, input, output, dt=dt, time=time)
+    print(f"{record!r}".strip("<>"))
+    for note in record.notes:
+        print(f"note: {note}")
+    for row in fq.check_record(record).itertuples(index=False):
+        print(f"{row.channel}: {row.finding} {row.value:g}")
+    if plot is not None:
+        write_picture(plot, fq.plot_record(record))
 
 
 def channels(log: Path) -> None:
@@ -149,8 +189,8 @@ app = cyclopts.App(
     version=fq.__version__,
     result_action="return_value",
 )
-for command in (reproduce, demo, channels, frf, fit, bias, explore):
-    app.command(command)
+for command in (reproduce, demo, show_file, channels, frf, fit, new_model, bias, explore):
+    app.command(command, name="show" if command is show_file else None)
 
 
 def main(arguments: list[str] | None = None) -> None:

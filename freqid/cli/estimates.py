@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter as Option
 
 import freqid as fq
-from freqid.checks import choice, whole
-from freqid.cli.options import Band, Columns, Dt, Hold, hold_of
-from freqid.cli.terminal import progress, show, write_json, write_picture, write_table
+from freqid.checks import InputError, choice, whole
+from freqid.cli.options import Band, Columns, Dt, Hold, Limits, Texts, hold_of
+from freqid.cli.plants import TEMPLATE, model_of, pairs, with_options
+from freqid.cli.terminal import may_write, progress, show, write_picture, write_table
+from freqid.data import whole_file
 from freqid.excitation import below_nyquist
 from freqid.lti import holds
 from freqid.models import PLANTS
@@ -20,11 +22,15 @@ from freqid.models import PLANTS
 def fit(
     data: Path,
     *,
-    model: Literal["two-mass", "three-mass", "first-order", "output-error"],
+    model: str,
     order: int = 3,
+    zeros: int | None = None,
+    poles: int | None = None,
     input: Columns = None,
     output: Columns = None,
     dt: Dt = None,
+    time: str | None = None,
+    resample: bool = False,
     decimate: int = 1,
     keep_input: bool = False,
     hold: Hold = None,
@@ -32,35 +38,74 @@ def fit(
     domain: Literal["frequency", "time"] = "frequency",
     initial_state: Literal["estimate", "zero", "steady"] = "estimate",
     weights: str | None = None,
+    start: Texts = None,
+    fix: Texts = None,
+    bounds: Limits = None,
+    prior: Limits = None,
+    conditions: Texts = None,
+    n_starts: int | None = None,
+    validate: Path | None = None,
     out: Path | None = None,
     plot: Path | None = None,
     report: Path | None = None,
+    force: bool = False,
 ) -> int:
     """Estimate a model's parameters from a record.
 
     Parameters
     ----------
     data
-        CSV file with a column of time and one for each channel.
+        any file that freqid reads (freqid show FILE says how).
     model
-        two-mass (the paper's), three-mass, first-order, or output-error, a black box of --order.
+        two-mass (the paper's), three-mass, first-order, output-error (a black box of --order),
+        transfer-function (--zeros, --poles), or your own: my_plant.py:plant (freqid new-model).
+    time
+        the column of the time, where its name does not tell.
+    resample
+        put jittered or missing samples on a regular grid.
     decimate
         keep every so many-th sample before the fit; the hold is remembered.
     keep_input
         when decimating, keep the whole input (the lifted model).
     weights
         noise: weigh each line by the noise that the fit leaves there.
+    start
+        NAME=VALUE to begin from, as often as wanted.
+    fix
+        parameters that keep their values.
+    bounds
+        NAME LOW HIGH of the search.
+    prior
+        NAME MEAN STD that were known before.
+    conditions
+        NAME=VALUE of what was set for this experiment.
+    n_starts
+        how many starts to try; by default as many as it takes to be sure.
+    validate
+        another record, on which the estimate is tried.
     out
-        JSON file for the estimate.
+        JSON file for the estimate, which freqid.load reads.
     plot
         picture of the record beside the model's simulation.
     report
         HTML page about the estimate, which works offline (needs the extra "report").
+    force
+        overwrite files that are there already; never those that are read.
     """
-    record = fq.read(data, input, output, dt)
+    read = [data, *([] if validate is None else [validate])]
+    for path in (out, plot, report):
+        may_write(path, read, force)
+    if out is not None and out.suffix.lower() != ".json":
+        raise InputError(f"--out {out} must be a .json file")
+    options: dict[str, Any] = {"dt": dt, "time": time, "resample": resample}
+    record = fq.read(data, input, output, **options)
+    other = None if validate is None else fq.read(validate, input, output, **options)
+    if conditions:
+        record = record.with_conditions(**pairs("--conditions", conditions))
+        other = other and other.with_conditions(**record.conditions)
     if decimate != 1:
         record = record.decimate(decimate, keep_input=keep_input)
-    plant = fq.OutputError(order) if model == "output-error" else PLANTS[model]()
+    plant = with_options(model_of(model, order, zeros, poles), fix or (), bounds or (), prior or ())
     with progress() as bar:
         bar.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
         estimate = fq.fit(
@@ -71,11 +116,14 @@ def fit(
             domain=domain,
             initial_state=initial_state,
             weights=weights,
+            start=pairs("--start", start) or None,
+            n_starts="auto" if n_starts is None else n_starts,
         )
+    compared = None if other is None else fq.compare(estimate, other, band=band)
     if out is not None:
-        write_json(out, estimate.to_dict())
+        estimate.save(out, overwrite=force)
     if report is not None:
-        estimate.report(report, title=f"{model} from {data.name}")
+        estimate.report(report, title=f"{model} from {data.name}", validation=other)
     if plot is not None:
         write_picture(plot, fq.compare(estimate, record, band=band).plot())
     show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
@@ -87,7 +135,30 @@ def fit(
     print(f"witness {estimate.witness.verdict}: {estimate.witness.sentence}")
     for warning in estimate.warnings:
         print(f"warning: {warning}")
+    for note in [*record.notes, *estimate.notes]:
+        print(f"note: {note}")
+    if compared is not None and validate is not None:
+        shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)
+        print(f"{validate.name}, which was not fitted: {shares} explained")
     return 0 if estimate.converged else 1
+
+
+def new_model(path: Path = Path("my_plant.py"), *, force: bool = False) -> None:
+    """Write a commented template of a plant of your own.
+
+    Parameters
+    ----------
+    path
+        a .py file.
+    force
+        overwrite the file.
+    """
+    if path.suffix != ".py":
+        raise InputError(f"{path} must be a .py file")
+    may_write(path, [], force)
+    with whole_file(path) as beside:
+        beside.write_text(TEMPLATE.format(name=path.name, stem=path.stem), encoding="utf-8")
+    print(f"{path}: change it, then: freqid fit DATA --model {path}:plant")
 
 
 def bias(

@@ -18,6 +18,8 @@ Hold = Annotated[
     ),
 ]
 Dt = Annotated[float | None, Option(help="sample time in s, for data without a time column")]
+Texts = Annotated[list[str] | None, Option(consume_multiple=True)]
+Limits = list[tuple[str, float, float]] | None
 Columns = Annotated[list[str] | None, Option(consume_multiple=True)]
 
 

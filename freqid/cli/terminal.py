@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -32,6 +31,18 @@ def progress() -> Progress:
     )
 
 
+def may_write(path: Path | None, read: Sequence[Path], force: bool) -> None:
+    """ValueError for a file that is read, and for any other that is there without ``--force``."""
+    if path is None or not path.exists():
+        return
+    if any(r.exists() and path.samefile(r) for r in read):
+        raise InputError(f"{path} is the file that is read, which is never overwritten")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give a file")
+    if not force:
+        raise InputError(f"{path} is there already; give another name, or --force")
+
+
 def folder(out: Path) -> None:
     """Make the folder; ValueError where a file stands."""
     if out.exists() and not out.is_dir():
@@ -49,24 +60,6 @@ def write_picture(path: Path, axes: Panels) -> None:
     """Write the figure to which axes belong, whole or not at all."""
     with whole_file(path) as beside:
         axes[0].figure.savefig(beside)  # type: ignore[union-attr]
-
-
-def write_json(path: Path, content: object) -> None:
-    """Write a JSON file, whole or not at all."""
-    text = json.dumps(_plain(content), indent=2, allow_nan=False)
-    with whole_file(path) as beside:
-        beside.write_text(text + "\n")
-
-
-def _plain(value: object) -> object:
-    """JSON has neither infinity nor NaN: null stands for both."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
 
 
 def show(title: str, frame: pd.DataFrame) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import datetime
 import hashlib
 import json
@@ -45,6 +44,7 @@ def written(est: Estimate) -> Written:
 
     table = est.parameters
     return {
+        **est.to_dict(),
         "schema": SCHEMA,
         "kind": "freqid estimate",
         "freqid": freqid.__version__,
@@ -57,23 +57,15 @@ def written(est: Estimate) -> Written:
         "upper": table["upper"].to_numpy(),
         "nominal": est.nominal,
         "covariance": est.covariance_matrix,
-        "cost": est.cost,
-        "fit_percent": est.fit_percent,
-        "converged": bool(est.converged),
-        "message": est.message,
         "n_evaluations": est.n_evaluations,
         "n_rows": est.n_rows,
         "n_starts": est.n_starts,
         "n_agreed": est.n_agreed,
-        "hold": hold_to_dict(est.hold),
-        "dt": est.dt,
+        "held": hold_to_dict(est.hold),
         "band": est.band,
         "weights": est.weights if isinstance(est.weights, str) else None,
         "call": est.call,
-        "notes": list(est.notes),
-        "witness": dataclasses.asdict(est.witness),
-        "verdict": dataclasses.asdict(est.verdict),
-        "warnings": [_finding(w) for w in est.warnings],
+        "findings": [_finding(w) for w in est.warnings],
         "data": [_described(d) for d in est.data],
     }
 
@@ -133,7 +125,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         units=kept["units"], uncertainty=covariance, cost=float(kept["cost"]),
         fit_percent=float(kept["fit_percent"]), converged=bool(kept["converged"]),
         message=str(kept["message"]), n_evaluations=int(kept["n_evaluations"]),
-        hold=hold_of_dict(kept["hold"]), dt=float(kept["dt"]), n_rows=int(kept["n_rows"]),
+        hold=hold_of_dict(kept["held"]), dt=float(kept["dt"]), n_rows=int(kept["n_rows"]),
         n_starts=int(kept["n_starts"]), n_agreed=int(kept["n_agreed"]),
         band=None if kept["band"] is None else tuple(kept["band"]), weights=kept["weights"],
         call=str(kept["call"]), notes=list(kept["notes"]),
@@ -153,7 +145,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         witness=Witness(**{**witness, "degrees": tuple(witness["degrees"])}),
         verdict=Verdict(verdict["grade"], list(verdict["reasons"])),
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"])
-                  for w in kept["warnings"]],
+                  for w in kept["findings"]],
         parameters=table,
     )  # fmt: skip
     return est

@@ -126,7 +126,7 @@ def test_what_is_refused(tmp_path):
         ({"kind": "shopping list"}, "is not an estimate"),
         ({"covariance": [[1.0]]}, "damaged"),
         ({"values": None}, "damaged"),
-        ({"hold": {"name": "warp", "period": 1}}, "'warp'"),
+        ({"held": {"name": "warp", "period": 1}}, "'warp'"),
         ({"model": {**good["model"], "matrices": {"function": "nowhere:f"}}}, "cannot be imported"),
     ):
         path.write_text(json.dumps({**good, **change}))

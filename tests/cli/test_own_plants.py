@@ -1,0 +1,143 @@
+"""A first day on the command line: one's own file, one's own plant, a report."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import freqid as fq
+from freqid.cli import commands
+
+PLANT = """
+import freqid as fq
+
+def matrices(J, k, d):
+    return [[0, 1], [-k / J, -d / J]], [[0], [1 / J]], [[1, 0]], None
+
+plant = fq.GreyBox(matrices, [fq.Parameter("J", 0.12), fq.Parameter("k", 90.0),
+                              fq.Parameter("d", 0.3)])
+
+def made():
+    return plant.with_values(J=0.11)
+number = 3
+"""
+
+
+@pytest.fixture
+def day(tmp_path, monkeypatch):
+    """A folder with a semicolon file and a plant."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_plant.py").write_text(PLANT)
+    scope = {}
+    exec(PLANT, scope)
+    truth = scope["plant"].with_values(J=0.1, k=100.0, d=0.2)
+    for seed, name in enumerate(("train", "other")):
+        record = fq.simulate(truth, fq.white_noise(1500, seed=seed), 0.01).with_noise(
+            1e-4, seed=seed
+        )
+        rows = zip(1e3 * record.time, record.u, record.y, strict=True)
+        lines = [";".join(f"{x:.9f}" for x in row).replace(".", ",") for row in rows]
+        text = "Zeit [ms];torque [N m];angle [rad]\n" + "\n".join(lines) + "\n"
+        (tmp_path / f"{name}.csv").write_text(text)
+    return tmp_path
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        commands.main([str(a) for a in arguments])
+    return end.value.code
+
+
+def test_from_a_file_and_a_plant_to_a_report(day, capsys):
+    code = run(
+        "fit", "train.csv", "--model", "my_plant.py:plant", "--start", "k=80", "--validate",
+        "other.csv", "--out", "est.json", "--report", "est.html",
+    )  # fmt: skip
+    said = capsys.readouterr().out
+    assert code == 0
+    assert "verdict: trust" in said
+    assert "other.csv, which was not fitted: 9" in said
+    assert "in ms" in said
+    scope = {}
+    exec(PLANT, scope)
+    est = fq.load("est.json", model=scope["plant"])
+    assert est["k"] == pytest.approx(100, rel=0.01)
+    kept = json.loads(Path("est.json").read_text())
+    assert kept["parameters"]["k"]["value"] == est["k"]
+    assert kept["freqid"] == fq.__version__
+    assert Path("est.html").stat().st_size > 1000
+
+
+def test_options_of_the_plant(day, capsys):
+    assert run("fit", "train.csv", "--model", "my_plant.py:made", "--fix", "d", "--bounds", "k",
+               "50", "95", "--prior", "J", "0.1", "0.01", "--n-starts", "2") == 0  # fmt: skip
+    said = capsys.readouterr().out
+    assert "edge of a bound" in said
+    assert "\n        d " not in said
+    assert (
+        run("fit", "train.csv", "--model", "transfer-function", "--zeros", "0", "--poles", "2") == 0
+    )
+    assert run("fit", "train.csv", "--model", "my_plant.py:plant", "--conditions", "J=0.1") == 0
+
+
+def test_a_new_model_is_a_plant(day, capsys):
+    assert run("new-model", "axis.py") == 0
+    assert run("fit", "train.csv", "--model", "axis.py:plant") == 0
+    assert run("new-model", "axis.py") == 2
+    assert run("new-model", "axis.py", "--force") == 0
+    assert run("new-model", "axis.txt") == 2
+
+
+def test_show(day, capsys):
+    assert run("show", "train.csv", "--plot", "train.png") == 0
+    said = capsys.readouterr().out
+    assert "torque" in said
+    assert "1500 samples at 0.01 s" in said
+    assert Path("train.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--model", "my_plan.py:plant"], "does not exist"),
+        (["--model", "my_plant.py:plan"], "did you mean 'plant'"),
+        (["--model", "my_plant.py:number"], "expected a GreyBox"),
+        (["--model", "two-mas"], "did you mean 'two-mass'"),
+        (["--model", "my_plant.py:plant", "--start", "k"], "is not NAME=VALUE"),
+        (["--model", "my_plant.py:plant", "--start", "q=3"], "start='q'"),
+        (["--model", "my_plant.py:plant", "--fix", "stiffness"], "'stiffness'"),
+        (["--model", "output-error", "--fix", "k"], "need a plant"),
+        (["--model", "two-mass", "--out", "train.csv"], "never overwritten"),
+        (["--model", "two-mass", "--out", "train.csv", "--force"], "never overwritten"),
+        (["--model", "two-mass", "--out", "other.csv"], "--force"),
+        (["--model", "two-mass", "--out", "est.txt"], ".json"),
+        (["--model", "two-mass", "--report", "."], "is a folder"),
+    ],
+)
+def test_refused(day, arguments, words, capsys):
+    before = {p.name: p.read_bytes() for p in day.iterdir() if p.is_file()}
+    assert run("fit", "train.csv", *arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    after = {p.name: p.read_bytes() for p in day.iterdir() if p.is_file()}
+    assert after == before
+
+
+def test_a_measurement_is_never_overwritten(day, capsys):
+    for extra in ([], ["--force"]):
+        assert run("frf", "train.csv", "--out", "train.csv", *extra) == 2
+        assert run("frf", "train.csv", "--plot", "./train.csv", *extra) == 2
+    assert "never overwritten" in capsys.readouterr().err
+    assert run("frf", "train.csv", "--out", "frf.csv") == 0
+    assert run("frf", "train.csv", "--out", "frf.csv") == 2
+    assert run("frf", "train.csv", "--out", "frf.csv", "--force") == 0
+    assert fq.read_response("frf.csv").response.shape == (1, 1, 750)
+
+
+def test_a_file_that_fails_says_where(day, capsys):
+    Path("bad.py").write_text("import nothing_of_this_name")
+    assert run("fit", "train.csv", "--model", "bad.py:plant") == 2
+    assert "bad.py: ModuleNotFoundError" in capsys.readouterr().err
+    assert np.isfinite(fq.read("train.csv").dt)
