@@ -47,6 +47,7 @@ from .excitation import (
 from .fitting import (
     Estimate as Estimate,
     fit as fit,
+    fit_many as fit_many,
     load as load,
     select_order as select_order,
 )
@@ -84,6 +85,7 @@ from .plots import (
     plot_bias_map as plot_bias_map,
     plot_coherence as plot_coherence,
     plot_design as plot_design,
+    plot_fleet as plot_fleet,
     plot_orders as plot_orders,
     plot_parameters as plot_parameters,
     plot_poles as plot_poles,

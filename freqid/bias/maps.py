@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +14,9 @@ import numpy as np
 from freqid.bias.apparent import Sampling, weight_of
 from freqid.bias.conditions import Conditions
 from freqid.bias.map_rows import Answer, Row, answer_chunk
-from freqid.bias.map_store import MapStore
-from freqid.bias.progress import Bar
 from freqid.checks import Array, InputError, whole
 from freqid.excitation import ChirpSpectrum, InputSpectrum
+from freqid.fitting import Bar, TableStore, unordered
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
 from freqid.models import GreyBox
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _CHUNK = 64
+_OTHER = "a map of other plants, spectra, factors or holds"
 
 
 def bias_map(
@@ -80,7 +81,9 @@ def bias_map(
     # each row puts its own spectrum and factor in
     shared = Conditions(rows[0].spectrum, sampling, band, prefilter, noise_model)
     chunks = _chunks(rows, whole("chunk", chunk))
-    store = None if path is None else MapStore(path, _identity(plants, rows, shared, chunk))
+    store = (
+        None if path is None else TableStore(path, _identity(plants, rows, shared, chunk), _OTHER)
+    )
     finished = None if store is None else store.whole()
     if finished is not None:
         return finished
@@ -90,8 +93,8 @@ def bias_map(
         tables = {n: t for n, t in kept.items() if t is not None}
     todo = [n for n in range(len(chunks)) if n not in tables]
     jobs = [(n, plants[rows[chunks[n][0]].plant_label], [rows[i] for i in chunks[n]]) for n in todo]
-    with Bar(progress, len(rows), sum(len(chunks[n]) for n in tables)) as advance:
-        for n, answers in _run(jobs, shared, n_jobs):
+    with Bar(progress, len(rows), sum(len(chunks[n]) for n in tables), "bias map") as advance:
+        for _, (n, answers) in unordered(partial(_work, shared=shared), jobs, n_jobs):
             model = plants[rows[chunks[n][0]].plant_label]
             tables[n] = _table(model, chunks[n], [rows[i] for i in chunks[n]], answers)
             if store is not None:
@@ -185,23 +188,6 @@ Job = tuple[int, GreyBox, list[Row]]
 def _work(job: Job, shared: Conditions) -> tuple[int, list[Answer]]:
     number, model, rows = job
     return number, answer_chunk(model, rows, shared)
-
-
-def _run(
-    jobs: Sequence[Job], shared: Conditions, n_jobs: int | None
-) -> Iterator[tuple[int, list[Answer]]]:
-    """Answers of the chunks in the order in which they are finished."""
-    try:
-        import joblib
-    except ImportError:
-        if n_jobs not in (None, 1):
-            raise InputError(
-                f"n_jobs={n_jobs} needs joblib; pip install 'freqid[parallel]'"
-            ) from None
-        yield from (_work(job, shared) for job in jobs)
-        return
-    parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")
-    yield from parallel(joblib.delayed(_work)(job, shared) for job in jobs)
 
 
 def _table(

@@ -10,7 +10,7 @@ import cyclopts
 
 import freqid as fq
 from freqid.checks import InputError
-from freqid.cli.estimates import bias, fit, new_model
+from freqid.cli.estimates import bias, fit, fit_many, new_model
 from freqid.cli.options import Band, Columns, Dt
 from freqid.cli.terminal import folder, may_write, progress, show, write_picture, write_table
 
@@ -189,7 +189,7 @@ app = cyclopts.App(
     version=fq.__version__,
     result_action="return_value",
 )
-for command in (reproduce, demo, show_file, channels, frf, fit, new_model, bias, explore):
+for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_model, bias, explore):
     app.command(command, name="show" if command is show_file else None)
 
 

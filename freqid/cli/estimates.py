@@ -10,6 +10,7 @@ from cyclopts import Parameter as Option
 
 import freqid as fq
 from freqid.checks import InputError, choice, whole
+from freqid.cli.fleets import engine, matching
 from freqid.cli.options import Band, Columns, Dt, Hold, Limits, Texts, hold_of
 from freqid.cli.plants import TEMPLATE, model_of, pairs, with_options
 from freqid.cli.terminal import may_write, progress, show, write_picture, write_table
@@ -141,6 +142,67 @@ def fit(
         shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)
         print(f"{validate.name}, which was not fitted: {shares} explained")
     return 0 if estimate.converged else 1
+
+
+def fit_many(
+    data: list[str],
+    *,
+    model: str,
+    out: Path,
+    order: int = 3,
+    zeros: int | None = None,
+    poles: int | None = None,
+    input: Columns = None,
+    output: Columns = None,
+    dt: Dt = None,
+    hold: Hold = None,
+    band: Band = None,
+    weights: str | None = None,
+    start: Texts = None,
+    fix: Texts = None,
+    bounds: Limits = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    verdicts: bool = True,
+) -> int:
+    """Fit one model to many files, a row each; interrupted, it goes on where it was.
+
+    Parameters
+    ----------
+    data
+        files, or patterns in quotes, 'logs/*.parquet'.
+    model
+        as in freqid fit.
+    out
+        .parquet file for the table; a finished one of the same job is read back.
+    jobs
+        processes; by default all cores where there are many files.
+    scheduler
+        address of a Dask scheduler, tcp://host:8786, whose workers do the work (extra "dask").
+    verdicts
+        --no-verdicts leaves out witness, warnings and verdict, which take longer than the fit.
+    """
+    files = matching(data)
+    plant = with_options(model_of(model, order, zeros, poles), fix or (), bounds or (), ())
+    options: dict[str, Any] = {
+        "hold": hold_of(hold), "band": band, "weights": weights,
+        "start": pairs("--start", start) or None,
+    }  # fmt: skip
+    reading = {"inputs": input, "outputs": output, "dt": dt}
+    with engine(scheduler):
+        table = fq.fit_many(
+            plant, files, out, n_jobs=jobs, verdicts=verdicts,
+            reading={k: v for k, v in reading.items() if v is not None},
+            **{k: v for k, v in options.items() if v is not None},
+        )  # fmt: skip
+    failed = table[table["error"] != ""]
+    print(f"{out}: {len(table)} files, {len(failed)} failed")
+    if "verdict" in table:
+        for grade, count in table["verdict"].value_counts().items():
+            print(f"  {grade}: {count}")
+    for row in failed.head(10).itertuples():
+        print(f"  {row.error}")
+    return 0 if len(failed) < len(table) else 1
 
 
 def new_model(path: Path = Path("my_plant.py"), *, force: bool = False) -> None:

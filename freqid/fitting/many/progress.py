@@ -1,4 +1,4 @@
-"""Progress of a map: a bar on a terminal, lines in a log file."""
+"""Progress of long work: a bar on a terminal, lines in a log file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Bar:
     A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth.
     """
 
-    def __init__(self, wanted: bool | None, total: int, done: int) -> None:
+    def __init__(self, wanted: bool | None, total: int, done: int, what: str) -> None:
         from rich.console import Console
         from rich.progress import (
             BarColumn,
@@ -25,7 +25,7 @@ class Bar:
         self.console = Console(stderr=True)
         live = self.console.is_terminal or self.console.is_jupyter
         self.lines = bool(wanted) and not live
-        self.total, self.done = total, done
+        self.total, self.done, self.what = total, done, what
         self.progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -34,7 +34,7 @@ class Bar:
             console=self.console,
             disable=not live if wanted is None else not (wanted and live),
         )
-        self.task = self.progress.add_task("bias map", total=total, completed=done)
+        self.task = self.progress.add_task(what, total=total, completed=done)
 
     def __enter__(self) -> Callable[[int], None]:
         self.progress.start()
@@ -45,7 +45,7 @@ class Bar:
         before, self.done = self.done, self.done + count
         self.progress.advance(self.task, count)
         if self.lines and 10 * before // self.total != 10 * self.done // self.total:
-            print(f"bias map: {self.done} of {self.total}", file=sys.stderr, flush=True)
+            print(f"{self.what}: {self.done} of {self.total}", file=sys.stderr, flush=True)
 
     def __exit__(self, *reason: object) -> None:
         self.progress.stop()

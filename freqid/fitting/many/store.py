@@ -1,4 +1,4 @@
-"""Finished chunks of a long map on disk, so that it can be interrupted and taken up again."""
+"""Finished chunks of a long table on disk, so that it can be interrupted and taken up again."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ if TYPE_CHECKING:
 _KEY = "freqid_map"
 
 
-class MapStore:
+class TableStore:
     """A Parquet file in the making: a folder of finished chunks beside it, joined at the end.
 
-    ``identity`` is a fingerprint of what was asked; chunks and files of another map are refused.
+    ``identity`` is a fingerprint of what was asked; chunks and files of another table are refused,
+    which holds ``what``.
     """
 
-    def __init__(self, path: str | Path, identity: str) -> None:
-        self.path, self.identity = Path(path), identity
+    def __init__(self, path: str | Path, identity: str, what: str) -> None:
+        self.path, self.identity, self.what = Path(path), identity, what
         if self.path.suffix != ".parquet":
             raise InputError(f"path={str(path)!r} must end in .parquet")
         try:
@@ -63,10 +64,11 @@ class MapStore:
     def _read(self, path: Path) -> pd.DataFrame:
         import pandas as pd
 
-        table = pd.read_parquet(path)
+        try:
+            table = pd.read_parquet(path)
+        except Exception as error:
+            # pyarrow has errors of many kinds for a file that is not what it says
+            raise InputError(f"{path} is no Parquet file or is damaged; remove it") from error
         if table.attrs.pop(_KEY, None) != self.identity:
-            raise InputError(
-                f"{path} holds a map of other plants, spectra, factors or holds; give another path "
-                "or remove it"
-            )
+            raise InputError(f"{path} holds {self.what}; give another path or remove it")
         return table

@@ -1,0 +1,230 @@
+"""One model fitted to many records: a row a record, failures as rows with their reason."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import InputError, whole
+from freqid.data import DataSet, FrequencyResponse, Record, read
+from freqid.fitting.entry import fit
+from freqid.fitting.fitters import fitter_of
+from freqid.fitting.many.progress import Bar
+from freqid.fitting.many.running import unordered
+from freqid.fitting.many.store import TableStore
+from freqid.models import GreyBox, model_to_dict
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# records of a chunk, which is kept or lost as one, and from how many on processes are worth it
+_CHUNK, _FEW = 8, 16
+
+Source = DataSet | str | Path
+Row = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Task:
+    """What every row takes: model, options of ``fit`` and of ``read``, and what is computed."""
+
+    model: object
+    options: Mapping[str, object]
+    reading: Mapping[str, object]
+    verdicts: bool
+
+
+def fit_many(
+    model: object,
+    records: Iterable[Source] | Mapping[str, Source],
+    path: str | Path | None = None,
+    *,
+    n_jobs: int | None = None,
+    verdicts: bool = True,
+    reading: Mapping[str, object] | None = None,
+    chunk: int = _CHUNK,
+    progress: bool | None = None,
+    **fit_options: Any,
+) -> pd.DataFrame:
+    """One model fitted to many records, one by one: a row each.
+
+    Args:
+        model: as in ``fit``.
+        records: Records, FrequencyResponses or paths, or these by name.
+        path: a .parquet file for the table. Finished rows are safe beside it: asked again after an
+            interruption, only what is missing is computed. Another job on the same path is
+            refused.
+        n_jobs: processes; None is all cores where there are many records, or what
+            ``joblib.parallel_config`` says (``backend="dask"`` for a cluster); needs the extra
+            ``parallel``.
+        verdicts: False leaves out witness, warnings and verdict, which take longer than the fit.
+        reading: arguments of ``read`` for paths, ``{"inputs": "torque"}``.
+        chunk: records that are kept, or lost, as one.
+        progress: None shows a bar on a terminal, True also lines in a log, False nothing.
+        fit_options: of ``fit``: band, hold, weights, start, …
+
+    Columns: ``name``, each parameter and ``<parameter>_std``, ``cost``, ``fit_percent``,
+    ``converged``, ``verdict``, ``witness``, ``warnings`` (one text), ``seconds``, and ``error``,
+    empty but for a record that could not be read or fitted. Raises ValueError for options that no
+    fit takes or a path of another job.
+
+    >>> import freqid as fq
+    >>> runs = [fq.simulate(fq.first_order(), fq.white_noise(300, seed=s), 1e-3) for s in range(3)]
+    >>> fq.fit_many(fq.first_order(), runs)["a"].round(6).tolist()
+    [100.0, 100.0, 100.0]
+    """
+    import pandas as pd
+
+    fitter_of(model)
+    size = whole("chunk", chunk)
+    named = _named(records)
+    if not named:
+        raise InputError("records=[] holds nothing to be fitted")
+    task = _Task(model, _checked(fit_options), dict(reading or {}), verdicts)
+    names = list(named)
+    groups = [names[i : i + size] for i in range(0, len(names), size)]
+    store = None if path is None else TableStore(path, _identity(task, named, size), "other fits")
+    if store is not None and (whole_table := store.whole()) is not None:
+        return whole_table
+    tables: dict[int, pd.DataFrame] = {}
+    for i in range(len(groups)):
+        kept = None if store is None else store.chunk(i)
+        if kept is not None:
+            tables[i] = kept
+    missing = [i for i in range(len(groups)) if i not in tables]
+    jobs = [[(name, named[name]) for name in groups[i]] for i in missing]
+    few = n_jobs is None and len(names) < _FEW
+    with Bar(progress, len(groups), len(tables), "fits") as advance:
+        for at, rows in unordered(partial(_rows, task), jobs, 1 if few else n_jobs or _cores()):
+            tables[missing[at]] = pd.DataFrame(rows)
+            if store is not None:
+                store.keep(missing[at], tables[missing[at]])
+            advance(1)
+    table = pd.concat([tables[i] for i in range(len(groups))], ignore_index=True)
+    table = table[_columns(table)]
+    if store is not None:
+        store.finish(table)
+    return table
+
+
+def _cores() -> int | None:
+    """All cores, unless joblib has been told otherwise."""
+    try:
+        from joblib.parallel import get_active_backend
+    except ImportError:
+        return None
+    backend, given = get_active_backend()
+    own = type(backend).__name__ == "LokyBackend" and given in (None, 1)
+    return -1 if own else None
+
+
+def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source]:
+    if isinstance(records, (str, Path, Record, FrequencyResponse)):
+        records = [records]
+    if isinstance(records, Mapping):
+        return {str(name): r for name, r in records.items()}
+    named: dict[str, Source] = {}
+    for i, r in enumerate(records):
+        if not isinstance(r, (str, Path, Record, FrequencyResponse)):
+            raise InputError(
+                f"records[{i}] is a {type(r).__name__}; expected a Record, a FrequencyResponse or "
+                "a path"
+            )
+        name = str(r) if isinstance(r, (str, Path)) else f"record {i}"
+        if name in named:
+            raise InputError(f"records: {name} is there twice")
+        named[name] = r
+    return named
+
+
+def _checked(options: Mapping[str, Any]) -> dict[str, Any]:
+    """ValueError for an option that ``fit`` does not have."""
+    import inspect
+
+    from freqid.checks import unknown
+
+    known = [n for n, p in inspect.signature(fit).parameters.items() if p.kind is p.KEYWORD_ONLY]
+    for name in options:
+        if name not in known:
+            raise InputError(unknown("option", name, known))
+    return dict(options)
+
+
+def _rows(task: _Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
+    return [_row(task, name, source) for name, source in job]
+
+
+def _row(task: _Task, name: str, source: Source) -> Row:
+    """Everything of one fit; an error is a row, too."""
+    row: Row = {"name": name}
+    begin = time.perf_counter()
+    try:
+        given = isinstance(source, (str, Path))
+        data = read(source, **task.reading) if given else source  # type: ignore[arg-type]
+        est = fit(task.model, data, **task.options)  # type: ignore[arg-type]
+        std = np.sqrt(np.diag(est.covariance_matrix))
+        row |= dict(zip(est.names, est.values.tolist(), strict=True))
+        row |= {f"{n}_std": s for n, s in zip(est.names, std.tolist(), strict=True)}
+        row |= {
+            "cost": float(est.cost), "fit_percent": float(est.fit_percent),
+            "converged": bool(est.converged),
+        }  # fmt: skip
+        if task.verdicts:
+            row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
+            row |= {"warnings": "; ".join(est.warnings)}
+        row["error"] = ""
+    except (ValueError, OSError, ArithmeticError, np.linalg.LinAlgError) as error:
+        row["error"] = f"{type(error).__name__}: {error}"
+    row["seconds"] = time.perf_counter() - begin
+    return row
+
+
+def _columns(table: pd.DataFrame) -> list[str]:
+    """Name first, parameters, then what is said of the fit."""
+    last = [
+        "cost",
+        "fit_percent",
+        "converged",
+        "verdict",
+        "witness",
+        "warnings",
+        "seconds",
+        "error",
+    ]
+    parameters = [c for c in table.columns if c not in ("name", *last)]
+    return ["name", *parameters, *(c for c in last if c in table.columns)]
+
+
+def _identity(task: _Task, named: Mapping[str, Source], size: int) -> str:
+    """A fingerprint of what is asked: model, options and data."""
+    seen = hashlib.sha256()
+    model = task.model
+    if isinstance(model, GreyBox):
+        # the function by what it returns, its parameters by what a fit starts from
+        lin = model.linearise(model.values, [p.name for p in model.free_parameters])
+        for matrix in (*lin.at, *lin.derivative):
+            seen.update(np.ascontiguousarray(matrix).tobytes())
+        seen.update(repr(model_to_dict(model)["parameters"]).encode())
+    else:
+        seen.update(repr(model).encode())
+    seen.update(repr((sorted(task.options.items(), key=lambda o: o[0]), size)).encode())
+    seen.update(repr((sorted(task.reading.items()), task.verdicts)).encode())
+    for name, source in named.items():
+        seen.update(name.encode())
+        if isinstance(source, Record):
+            for array in (source.u, source.y):
+                seen.update(np.ascontiguousarray(array).tobytes())
+            seen.update(repr((source.dt, source.hold, source.conditions)).encode())
+        elif isinstance(source, FrequencyResponse):
+            seen.update(np.ascontiguousarray(source.response).tobytes())
+        elif Path(source).is_file():
+            stat = Path(source).stat()
+            seen.update(repr((stat.st_size, stat.st_mtime_ns)).encode())
+    return seen.hexdigest()

@@ -1,0 +1,201 @@
+"""Many fits: rows, failures, resumption, lost workers, alarms, pictures."""
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+from freqid.cli import commands
+from freqid.plots import alarms
+
+LAG = fq.first_order(b=50, a=20)
+
+
+def runs(count, noise=0.01, samples=400):
+    out = []
+    for seed in range(count):
+        record = fq.simulate(LAG, fq.white_noise(samples, seed=seed), 0.01)
+        out.append(record.with_noise(noise, seed=seed))
+    return out
+
+
+def same(a, b):
+    pd.testing.assert_frame_equal(a.drop(columns="seconds"), b.drop(columns="seconds"))
+
+
+def test_a_row_is_the_fit(tmp_path):
+    records = runs(5)
+    table = fq.fit_many(LAG, records, band=(0.5, 40))
+    assert list(table.columns) == [
+        "name", "b", "a", "b_std", "a_std", "cost", "fit_percent", "converged", "verdict",
+        "witness", "warnings", "seconds", "error",
+    ]  # fmt: skip
+    one = fq.fit(LAG, records[3], band=(0.5, 40))
+    row = table.iloc[3]
+    assert row["a"] == one["a"]
+    assert row["a_std"] == one.parameters["std"]["a"]
+    assert row["verdict"] == one.verdict.grade
+    assert (table["error"] == "").all()
+    quick = fq.fit_many(LAG, records, band=(0.5, 40), verdicts=False)
+    assert "verdict" not in quick
+    assert quick["a"].tolist() == table["a"].tolist()
+
+
+def test_failures_are_rows(tmp_path):
+    fq.write(runs(1)[0], tmp_path / "good.csv")
+    (tmp_path / "bad.csv").write_text("time,u,y\n")
+    flat = fq.Record(np.ones(50), np.zeros(50), 0.01)
+    table = fq.fit_many(
+        LAG, {"good": tmp_path / "good.csv", "bad": tmp_path / "bad.csv", "flat": flat,
+              "none": tmp_path / "none.csv"},
+    )  # fmt: skip
+    assert table["name"].tolist() == ["good", "bad", "flat", "none"]
+    assert table["error"][0] == ""
+    assert "no samples" in table["error"][1]
+    assert (table["error"][1:] != "").all()
+    assert table["a"].isna().tolist() == [False, True, True, True]
+
+
+def test_processes_give_the_same_rows(tmp_path):
+    records = runs(20, samples=150)
+    alone = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
+    same(alone, fq.fit_many(LAG, records, tmp_path / "t.parquet", n_jobs=2, verdicts=False))
+    # a finished table is read back
+    begun = (tmp_path / "t.parquet").stat().st_mtime_ns
+    same(alone, fq.fit_many(LAG, records, tmp_path / "t.parquet", n_jobs=2, verdicts=False))
+    assert (tmp_path / "t.parquet").stat().st_mtime_ns == begun
+    with pytest.raises(ValueError, match="other fits"):
+        fq.fit_many(LAG, records[1:], tmp_path / "t.parquet", verdicts=False)
+    with pytest.raises(ValueError, match="other fits"):
+        fq.fit_many(LAG, records, tmp_path / "t.parquet", band=(1, 20), verdicts=False)
+
+
+def lag_that_dies(marker, b, a):
+    """The lag; the first process that is told to dies in the middle."""
+    if marker.exists() and os.getpid() != int(marker.read_text()):
+        marker.unlink()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [[-a]], [[b]], [[1.0]], None
+
+
+def test_a_killed_worker_loses_no_row(tmp_path):
+    from functools import partial
+
+    marker = tmp_path / "kill"
+    plant = fq.GreyBox(partial(lag_that_dies, marker), LAG.parameters)
+    records = runs(24, samples=100)
+    alone = fq.fit_many(plant, records, n_jobs=1, verdicts=False)
+    marker.write_text(str(os.getpid()))
+    found = fq.fit_many(plant, records, n_jobs=2, verdicts=False, chunk=3)
+    assert not marker.exists()
+    same(alone, found)
+
+
+def test_an_interrupted_job_goes_on(tmp_path, monkeypatch):
+    from freqid.fitting.many import fleet
+
+    records, path = runs(12, samples=100), tmp_path / "t.parquet"
+    whole = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
+    real, calls = fleet._row, []
+
+    def interrupted(task, name, source):
+        calls.append(name)
+        if len(calls) == 7:
+            raise KeyboardInterrupt
+        return real(task, name, source)
+
+    monkeypatch.setattr(fleet, "_row", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        fq.fit_many(LAG, records, path, n_jobs=1, verdicts=False, chunk=2)
+    assert not path.exists()
+    again = []
+    monkeypatch.setattr(fleet, "_row", lambda *a: again.append(a[1]) or real(*a))
+    same(whole, fq.fit_many(LAG, records, path, n_jobs=1, verdicts=False, chunk=2))
+    # three chunks of two had been finished
+    assert len(again) == 6
+    assert path.exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
+
+
+def test_on_a_cluster(tmp_path):
+    distributed = pytest.importorskip("dask.distributed")
+    import joblib
+
+    records = runs(12, samples=100)
+    alone = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster),
+        joblib.parallel_config(backend="dask"),
+    ):
+        same(alone, fq.fit_many(LAG, records, n_jobs=2, verdicts=False, chunk=3))
+
+
+def test_what_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="records"):
+        fq.fit_many(LAG, [])
+    with pytest.raises(ValueError, match=r"records\[1\]"):
+        fq.fit_many(LAG, [runs(1)[0], 3])
+    with pytest.raises(ValueError, match="option='bnad'"):
+        fq.fit_many(LAG, runs(1), bnad=(1, 2))
+    with pytest.raises(ValueError, match=r"\.parquet"):
+        fq.fit_many(LAG, runs(1), tmp_path / "t.csv")
+    with pytest.raises(ValueError, match="not a model"):
+        fq.fit_many("lag", runs(1))
+    (tmp_path / "t.parquet").write_text("no table")
+    with pytest.raises(ValueError, match=r"t\.parquet"):
+        fq.fit_many(LAG, runs(1), tmp_path / "t.parquet")
+
+
+def fleet_of(seed, rows=60):
+    rng = np.random.default_rng(seed)
+    std = 0.5 + rng.random(rows)
+    value = 100 + std * rng.standard_normal(rows) + 0.5 * rng.standard_normal(rows)
+    return pd.DataFrame({"k": value, "k_std": std})
+
+
+def test_alarms_keep_their_level_and_find_a_change():
+    false = np.mean([alarms(fleet_of(s), "k").any() for s in range(600)])
+    assert false < 0.03
+    found = []
+    for seed in range(50):
+        table = fleet_of(seed)
+        table.loc[7, "k"] += 12 * table["k_std"][7]
+        found.append(alarms(table, "k")[7])
+    assert np.mean(found) > 0.95
+
+
+def test_the_picture(tmp_path):
+    table = fleet_of(1)
+    table.loc[7, "k"] = 130.0
+    table.loc[9, "k"] = np.nan
+    ax = fq.plot_fleet(table, parameter="k")
+    labels = [t.get_text() for t in ax.get_legend().get_texts()]
+    assert any("changed (1 of 59" in label for label in labels)
+    assert "1 failed" in ax.get_title()
+    with pytest.raises(ValueError, match="parameter='q'"):
+        fq.plot_fleet(table, parameter="q")
+
+
+def test_on_the_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for i, record in enumerate(runs(3)):
+        fq.write(record, f"run{i}.csv")
+    Path("run9.csv").write_text("time,u,y\n")
+    arguments = ["fit-many", "run*.csv", "--model", "first-order", "--out", "t.parquet"]
+    with pytest.raises(SystemExit) as end:
+        commands.main([*arguments, "--jobs", "1"])
+    assert end.value.code == 0
+    said = capsys.readouterr().out
+    assert "4 files, 1 failed" in said
+    assert "trust: 3" in said
+    assert pd.read_parquet("t.parquet")["a"].notna().sum() == 3
+    with pytest.raises(SystemExit) as end:
+        commands.main(["fit-many", "nothing*.csv", *arguments[2:]])
+    assert end.value.code == 2
