@@ -10,12 +10,26 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, choice
 from freqid.data import FrequencyResponse, Record
-from freqid.plots.curves import CHI2, UNITS, BodeCurve, Drawable, bode_curve, frequency_label, shown
+from freqid.fitting import Estimate
+from freqid.lti import Hold, PeriodicHold
+from freqid.models import Model
+from freqid.plots.curves import (
+    CHI2,
+    UNITS,
+    BodeCurve,
+    Drawable,
+    bode_curve,
+    common_hold,
+    frequency_label,
+    shown,
+)
 from freqid.plots.style import Panels, Style, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# ratio of the ends of a frequency axis below which every tick is a plain number
+_FEW_DECADES = 50.0
 _OFFSETS = [(13, 3), (-13, 3), (3, -10), (3, 10)]
 
 
@@ -27,16 +41,19 @@ def bode(
     unit: str = "rad/s",
     styles: Sequence[Style] | None = None,
     decibel: bool = False,
+    hold: Hold | None = None,
 ) -> Panels:
     """Amplitude above phase of responses, models, estimates or control systems.
 
     Args:
         labels: one for each response.
         ax: two axes (amplitude, phase) to draw on; a new figure where not given.
-        omega: frequencies in rad/s for models; by default those of the measured responses, or
-            0.1 to 1000 rad/s.
+        omega: frequencies in rad/s for models; by default those of the measured responses, those
+            of the fitted band, or those around the poles, and as many more as each mode takes.
         unit: ``"rad/s"`` or ``"Hz"`` of the frequency axis. ``decibel`` draws amplitude in dB.
         styles: matplotlib's line properties, one dict for each response.
+        hold: through which models in continuous time are seen; by default that of the measured
+            responses, as the legend then says.
 
     Several channels are drawn as several curves. Phases are unwrapped and moved by whole turns
     next to the first curve. Returns the two axes. Raises ValueError for an unknown unit, or labels
@@ -48,7 +65,9 @@ def bode(
     2
     """
     choice("unit", unit, list(UNITS))
-    curves = shown(responses, labels, omega, styles)
+    curves = shown(responses, labels, omega, styles, hold)
+    between = hold or common_hold(responses)
+    models = any(isinstance(r, Model | Estimate) for r in responses)
     with stacked(ax, 2) as ax:
         amplitude, phase = ax
         for one in curves:
@@ -61,9 +80,39 @@ def bode(
         else:
             amplitude.set(xscale="log", yscale="log", ylabel="amplitude")
         phase.set(xscale="log", ylabel="phase / degrees", xlabel=frequency_label(unit))
+        _ticks(amplitude, phase)
         if any(one.label for one in curves):
-            amplitude.legend()
+            amplitude.legend(title=_through(between) if models else None)
+        elif between is not None and models:
+            amplitude.set_title(_through(between) or "", fontsize="medium")
     return ax
+
+
+def _ticks(amplitude: Axes, phase: Axes) -> None:
+    """Phases in eighths or quarters of a turn, frequencies as plain numbers where few decades."""
+    from matplotlib.ticker import LogLocator, MultipleLocator, NullFormatter, ScalarFormatter
+
+    low, high = phase.get_ylim()
+    # more turns than these are left to matplotlib
+    if 45 <= high - low <= 720:
+        phase.yaxis.set_major_locator(MultipleLocator(45 if high - low <= 270 else 90))
+    left, right = phase.get_xlim()
+    if right / max(left, 1e-300) > _FEW_DECADES:
+        return
+    for axis in (amplitude.xaxis, phase.xaxis):
+        plain = ScalarFormatter()
+        plain.set_scientific(False)
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
+        axis.set_major_formatter(plain)
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _through(hold: Hold | None) -> str | None:
+    """What a legend says of the hold that everything is seen through."""
+    if not isinstance(hold, PeriodicHold):
+        return None
+    kind = {"zoh": "zero-order hold", "foh": "first-order hold"}.get(hold.name, hold.name)
+    return f"through a {kind} of {1e3 * hold.period:.4g} ms"
 
 
 def _draw(curve: BodeCurve, amplitude: Axes, phase: Axes, unit: str, decibel: bool) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse
 from freqid.fitting import Z95, Estimate
+from freqid.lti import Hold, PeriodicHold
 from freqid.models import Model, as_model
 from freqid.plots.style import Style, line
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 # of a frequency axis, in each Hz
 UNITS = {"rad/s": 2 * np.pi, "Hz": 1.0}
+# points around each mode's circle
+_ARCS = 160
 # squared radius of a 95 % ellipse of two normal variables
 CHI2 = 5.991464547107979
 
@@ -61,36 +64,75 @@ def shown(
     labels: Sequence[str] | None,
     omega: ArrayLike | None,
     styles: Sequence[Style] | None,
+    hold: Hold | None = None,
 ) -> list[Shown]:
     """The responses of what was given to be drawn, at ``omega`` (rad/s) where they have none.
 
+    All are seen through one hold: ``hold``, or that of the measured responses where these have one.
     Raises ValueError for nothing, for what has no response, or for labels of another number.
     """
     if not things:
         raise InputError("give at least one response, model, estimate or control system")
     if labels is not None and len(labels) != len(things):
         raise InputError(f"labels has {len(labels)} entries for {len(things)} responses")
-    if omega is None:
-        measured = [r.omega for r in things if isinstance(r, FrequencyResponse)]
-        at = np.unique(np.concatenate(measured)) if measured else np.geomspace(0.1, 1000, 600)
-        at = at[at > 0]
-    else:
-        at = np.asarray(omega, dtype=float)
+    between = hold or common_hold(things)
+    at = frequencies(things) if omega is None else np.asarray(omega, dtype=float)
     names: Sequence[str | None] = labels or [None] * len(things)
     looks = [line(i) if styles is None else styles[i] for i in range(len(things))]
     each = zip(things, names, looks, strict=True)
-    return [Shown(response_of(thing, at), name, look) for thing, name, look in each]
+    return [Shown(response_of(thing, at, between), name, look) for thing, name, look in each]
 
 
-def response_of(thing: Drawable, omega: FloatArray) -> FrequencyResponse:
+def common_hold(things: Sequence[Drawable]) -> Hold | None:
+    """The hold through which the first measured response was seen."""
+    held = [t.hold for t in things if isinstance(t, FrequencyResponse) and t.hold is not None]
+    return held[0] if held and isinstance(held[0], PeriodicHold) else None
+
+
+def frequencies(things: Sequence[Drawable]) -> FloatArray:
+    """Frequencies (rad/s) that show all of it: those measured, or those that the models bend at.
+
+    Around each mode they lie as ω₀ + σ tan θ with θ even, which walks round its Nyquist circle in
+    equal arcs, however weakly it is damped.
+    """
+    measured = [r.omega[r.omega > 0] for r in things if isinstance(r, FrequencyResponse)]
+    models = [as_model(t) for t in things if isinstance(t, Model | Estimate)]
+    # a sampled model's poles lie in another plane
+    poles = [m.poles for m in models if not m.dt]
+    p = np.concatenate(poles) if poles else np.zeros(0, complex)
+    sizes = np.abs(p[np.abs(p) > 1e-9 * np.abs(p).max(initial=0)])
+    fitted = [t for t in things if isinstance(t, Estimate)]
+    if measured:
+        base = np.unique(np.concatenate(measured))
+        low, high = base[0], base[-1]
+    else:
+        low, high = 0.1, 1000.0
+        if len(sizes):
+            low, high = min(sizes.min() / 20, 1e3), max(sizes.max() * 20, 1e-2)
+        if fitted and all(e.band is not None for e in fitted):
+            # what was fitted, and as much again on both sides
+            low = 2 * np.pi * max(min(e.band[0] for e in fitted) / 2, 1e-9)  # type: ignore[index]
+            high = 4 * np.pi * max(e.band[1] for e in fitted)  # type: ignore[index]
+            low = max(low, high / 1e4)
+        base = np.geomspace(low, high, 600)
+    modes = p[p.imag > 0]
+    theta = np.linspace(-np.pi / 2, np.pi / 2, _ARCS + 2)[1:-1]
+    around = (modes.imag[:, None] + np.abs(modes.real)[:, None] * np.tan(theta)).ravel()
+    kept = around[(around > low) & (around < high)]
+    return np.unique(np.concatenate([base, kept]))
+
+
+def response_of(thing: Drawable, omega: FloatArray, hold: Hold | None = None) -> FrequencyResponse:
     """The response that anything drawable has at ``omega`` (rad/s), up to its Nyquist limit.
 
-    Raises ValueError for anything else.
+    A model in continuous time is seen through the ``hold``. Raises ValueError for anything else.
     """
     if isinstance(thing, FrequencyResponse):
         return thing
     if isinstance(thing, Model | Estimate):
-        return thing.frequency_response(_below(omega, as_model(thing).dt))
+        model = as_model(thing)
+        between = None if model.own_hold or model.dt else hold
+        return thing.frequency_response(_below(omega, model.dt), between)
     import control
 
     if isinstance(thing, control.FrequencyResponseData):
