@@ -25,6 +25,7 @@ from .data import (
     Record as Record,
     channels as channels,
     check_record as check_record,
+    open as open,
     read as read,
     read_response as read_response,
     write as write,

@@ -7,12 +7,18 @@ from collections.abc import Iterable, Sequence
 from freqid.checks import InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
+from freqid.data.streams import Stream
 
 DataSet = Record | FrequencyResponse
 
 
 def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
     """One data set or several, as a tuple; ValueError where there is none, or something else."""
+    if isinstance(data, Stream):
+        raise InputError(
+            "a stream is not in memory: fit its response, fit(model, h1(stream, segment), "
+            "weights='noise'), or stream.load()"
+        )
     if hasattr(data, "frdata"):
         data = FrequencyResponse.from_control(data)
     if not isinstance(data, DataSet | Iterable):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from freqid.data import (
     FrequencyResponse,
     Record,
     Reference,
+    Stream,
     as_band,
     as_records,
     chosen,
@@ -22,9 +23,12 @@ from freqid.data import (
 from freqid.frf.measured import measured
 from freqid.frf.segments import Averaging, Detrend, Window, independent
 
+# samples whose segments are transformed at once
+_PIECE = 1 << 19
+
 
 def h1(
-    records: Record | Sequence[Record],
+    records: Record | Sequence[Record] | Stream,
     segment: int | None = None,
     *,
     band: tuple[float, float] | None = None,
@@ -36,7 +40,8 @@ def h1(
     """S_yu S_uu⁻¹: the least-squares response where the noise is on the output.
 
     Args:
-        records: one, or repeats and experiments of one plant with one sample time.
+        records: one, or repeats and experiments of one plant with one sample time; or a stream
+            (see ``open``), which takes one pass and a ``segment``.
         segment: samples of each segment; by default an eighth of a single record, and the whole of
             each of several.
         band: in Hz, None for all above zero.
@@ -65,7 +70,7 @@ def h1(
 
 
 def h2(
-    records: Record | Sequence[Record],
+    records: Record | Sequence[Record] | Stream,
     segment: int | None = None,
     *,
     band: tuple[float, float] | None = None,
@@ -89,7 +94,7 @@ def h2(
 
 
 def hv(
-    records: Record | Sequence[Record],
+    records: Record | Sequence[Record] | Stream,
     segment: int | None = None,
     *,
     band: tuple[float, float] | None = None,
@@ -146,34 +151,38 @@ class _Spectral:
     yu: ComplexArray
     yy: ComplexArray
     averages: float
-    first: Record
+    first: Record | Stream
     reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
 
 
 def _spectral(
-    records: Record | Sequence[Record], averaging: Averaging, reference: Reference | None = None
+    records: Record | Sequence[Record] | Stream,
+    averaging: Averaging,
+    reference: Reference | None = None,
 ) -> _Spectral:
-    sets = as_records(records)
+    sets: Sequence[Record | Stream]
+    sets = [records] if isinstance(records, Stream) else as_records(records)
     first, m = sets[0], sets[0].n_inputs
     length, step = averaging.cut(sets)
-    signals = references_of(sets, reference)
+    signals = None
+    if reference is not None and reference is not False:
+        if isinstance(records, Stream):
+            raise InputError("reference: a stream has none; load() it")
+        signals = references_of([r for r in sets if isinstance(r, Record)], reference)
     pairs = ["uu", "yu", "yy"] + (["yr", "ur", "rr"] if signals is not None else [])
     total: dict[str, ComplexArray] = {}
     count = 0
-    for i, r in enumerate(sets):
-        n = (r.n_samples - length) // step + 1
-        channels = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}
-        if signals is not None:
-            channels["r"] = signals[i].T
-        for pair in pairs:
-            a, b = channels[pair[0]], channels[pair[1]]
-            # scipy's csd(x, y) is E[x* y]: the pair (b, a) gives E[a b*]
-            f, S = scipy.signal.csd(
-                b[None, :], a[:, None], 1 / first.dt, averaging.window, length, length - step,
-                detrend=averaging.detrend,
-            )  # fmt: skip
-            total[pair] = total.get(pair, 0) + n * np.moveaxis(S, -1, 0)
-        count += n
+    for i, record in enumerate(sets):
+        for n, channels in _pieces(record, length, step, None if signals is None else signals[i]):
+            for pair in pairs:
+                a, b = channels[pair[0]], channels[pair[1]]
+                # scipy's csd(x, y) is E[x* y]: the pair (b, a) gives E[a b*]
+                f, S = scipy.signal.csd(
+                    b[None, :], a[:, None], 1 / first.dt, averaging.window, length, length - step,
+                    detrend=averaging.detrend,
+                )  # fmt: skip
+                total[pair] = total.get(pair, 0) + n * np.moveaxis(S, -1, 0)
+            count += n
     keep = chosen(f, as_band(averaging.band, first.nyquist), positive=True)
     mean = {pair: S[keep] / count for pair, S in total.items()}
     averages = independent(averaging.window, length, step, count)
@@ -188,6 +197,24 @@ def _spectral(
         joint = mean["yr"], mean["ur"], mean["rr"]
         _related(mean["uu"], mean["ur"], mean["rr"], averages)
     return _Spectral(f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, joint)
+
+
+def _pieces(
+    r: Record | Stream, length: int, step: int, reference: FloatArray | None
+) -> Iterator[tuple[int, dict[str, FloatArray]]]:
+    """Whole segments, as many at a time as fit a block: their number, and channels (c, n)."""
+    if isinstance(r, Stream):
+        for n, u, y in r.pieces(length, step):
+            yield n, {"u": u.T, "y": y.T}
+        return
+    every = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}
+    if reference is not None:
+        every["r"] = reference.T
+    left, per = (r.n_samples - length) // step + 1, max(_PIECE // step, 1)
+    for first in range(0, left, per):
+        n = min(per, left - first)
+        part = slice(first * step, (first + n - 1) * step + length)
+        yield n, {name: x[:, part] for name, x in every.items()}
 
 
 def _related(uu: ComplexArray, ur: ComplexArray, rr: ComplexArray, averages: float) -> None:
@@ -206,7 +233,7 @@ def _powers(S: ComplexArray) -> FloatArray:
     return np.einsum("kii->ki", S).real
 
 
-def _excited(uu: ComplexArray, first: Record) -> None:
+def _excited(uu: ComplexArray, first: Record | Stream) -> None:
     """ValueError for inputs that stand still, or move together."""
     power = _powers(uu)
     if not (power.max(axis=0) > 0).all():

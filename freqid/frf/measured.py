@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data import FrequencyResponse, Record
+from freqid.data import FrequencyResponse, Record, Stream
 
 
 def measured(
-    record: Record,
+    record: Record | Stream,
     frequency: FloatArray,
     response: ComplexArray,
     variance: FloatArray | None,

@@ -10,7 +10,7 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, whole
-from freqid.data import Record
+from freqid.data import Record, Stream
 
 # segments of a single record where none are asked for
 _SEGMENTS = 8
@@ -32,9 +32,12 @@ class Averaging:
     overlap: float | None
     detrend: Detrend
 
-    def cut(self, sets: Sequence[Record]) -> tuple[int, int]:
+    def cut(self, sets: Sequence[Record | Stream]) -> tuple[int, int]:
         """Samples of a segment, and to the next; ValueError where they do not fit."""
-        shortest = min(r.n_samples for r in sets)
+        lengths = [r.n_samples for r in sets if r.n_samples is not None]
+        if self.segment is None and not lengths:
+            raise InputError("segment=None: a stream of unknown length needs one; give segment")
+        shortest = min(lengths, default=int(self.segment or 0))
         default = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
         length = whole("segment", default if self.segment is None else self.segment, least=2)
         if length > shortest:

@@ -9,7 +9,8 @@ import freqid as fq
 
 DT = 2e-3
 LAG = fq.first_order(b=100.0, a=60.0)
-PERIOD = fq.multisine((1, 60), 1, DT, 1, seed=1)
+# phases that no optimiser moves
+PERIOD = fq.multisine((1, 60), 1, DT, 1, crest="schroeder")
 
 
 def measured(seed, periods, level=0.1, plant=LAG):
@@ -48,8 +49,10 @@ def test_h1_of_the_same_data_is_biased():
         h1 = fq.h1(record.slice(1), 500, window="boxcar", band=(1, 60))
         both = [fq.fit(LAG, frf)["b"] / 100 for frf in (h1, fq.periodic(record, 1.0, skip=1))]
         gains.append(both)
-    assert np.mean(gains, axis=0)[0] < 0.985
-    assert abs(np.mean(gains, axis=0)[1] - 1) < 0.01
+    off = np.mean(gains, axis=0) - 1
+    chance = 4 * np.std(gains, axis=0) / np.sqrt(len(gains))
+    assert off[0] < -chance[0]
+    assert abs(off[1]) < max(chance[1], 0.005)
 
 
 def test_the_jacobian_is_that_of_the_cost():

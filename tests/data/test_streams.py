@@ -1,0 +1,123 @@
+"""Streams: the same responses in one pass, whatever the blocks."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+N, DT = 30_000, 1e-3
+RECORD = fq.simulate(fq.two_mass(), fq.white_noise(N, seed=1), DT).with_noise(0.1)
+ROWS = np.column_stack([RECORD.u, RECORD.y])
+
+
+def files(folder):
+    import pandas as pd
+
+    np.save(folder / "log.npy", ROWS.astype(np.float32))
+    fq.write(RECORD, folder / "log.parquet")
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "log.h5", "w") as file:
+        file["run/u"], file["run/y"], file["time"] = RECORD.u, RECORD.y, RECORD.time
+    assert len(pd.read_parquet(folder / "log.parquet")) == N
+    return folder
+
+
+@pytest.mark.parametrize("method", [fq.h1, fq.h2, fq.hv])
+@pytest.mark.parametrize("block", [700, 4096, 100_000])
+def test_blocks_change_nothing(method, block):
+    whole = method(RECORD, 1000, band=(5, 200))
+    stream = fq.open(ROWS, dt=DT, block=block)
+    seen = method(stream, 1000, band=(5, 200))
+    assert np.allclose(seen.response, whole.response, rtol=1e-9)
+    assert np.allclose(seen.variance, whole.variance, rtol=1e-8)
+    assert np.allclose(seen.coherence, whole.coherence, rtol=1e-9)
+    # a second pass is another start
+    assert np.array_equal(method(stream, 1000, band=(5, 200)).response, seen.response)
+
+
+def test_files(tmp_path):
+    files(tmp_path)
+    whole = fq.h1(RECORD, 1000)
+    for name, options in (("log.npy", {"dt": DT}), ("log.parquet", {}), ("log.h5", {})):
+        stream = fq.open(tmp_path / name, block=5000, **options)
+        assert stream.dt == pytest.approx(DT)
+        assert stream.n_samples == N
+        assert np.allclose(fq.h1(stream, 1000).response, whole.response, rtol=1e-5)
+    assert np.allclose(fq.open(tmp_path / "log.h5").load().y, RECORD.y)
+    assert fq.open(tmp_path / "log.h5").load(stop=100).n_samples == 100
+
+
+def test_generators_and_integers():
+    def blocks():
+        for start in range(0, N, 1234):
+            yield np.round(1000 * ROWS[start : start + 1234]).astype(np.int32)
+
+    stream = fq.open(blocks, dt=DT, scale=1e-3)
+    assert np.allclose(fq.h1(stream, 500).response, fq.h1(RECORD, 500).response, rtol=0.02)
+    with pytest.raises(ValueError, match="give segment"):
+        fq.h1(stream)
+    once = fq.open(blocks(), dt=DT)
+    fq.h1(once, 500)
+    with pytest.raises(ValueError, match="used up"):
+        fq.h1(once, 500)
+
+
+def test_dask_arrays():
+    da = pytest.importorskip("dask.array")
+    stream = fq.open(da.from_array(ROWS, chunks=(4000, 2)), dt=DT)
+    assert np.allclose(fq.h1(stream, 500).response, fq.h1(RECORD, 500).response)
+
+
+def test_from_a_stream_to_parameters():
+    stream = fq.open(ROWS, dt=DT)
+    plant = fq.two_mass()
+    est = fq.fit(plant, fq.h1(stream, 5000, band=(5, 100)), weights="noise")
+    assert est["k"] == pytest.approx(plant["k"], rel=0.02)
+    with pytest.raises(ValueError, match="not in memory"):
+        fq.fit(plant, stream)
+
+
+def test_memory_is_bounded():
+    """Twenty million samples that never are there at once."""
+    count = 40
+
+    def blocks():
+        rng = np.random.default_rng(0)
+        for _ in range(count):
+            u = rng.standard_normal((50_000, 1))
+            yield np.concatenate([u, 0.5 * u], axis=1)
+
+    stream = fq.open(blocks, dt=DT)
+    tracemalloc.start()
+    frf = fq.h1(stream, 2000)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.allclose(frf.response, 0.5)
+    assert peak < 120e6
+
+
+def test_what_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no sample time"):
+        fq.open(ROWS)
+    with pytest.raises(ValueError, match="inputs='v'"):
+        fq.open(ROWS, inputs="v", dt=DT)
+    with pytest.raises(FileNotFoundError):
+        fq.open(tmp_path / "none.npy")
+    with pytest.raises(ValueError, match="shape"):
+        fq.open(ROWS[:, 0], dt=DT)
+    with pytest.raises(ValueError, match="longer than"):
+        fq.h1(fq.open(ROWS[:100], dt=DT), 500)
+    bad = ROWS.copy()
+    bad[17_000, 1] = np.nan
+    with pytest.raises(ValueError, match="sample 17000 is NaN"):
+        fq.h1(fq.open(bad, dt=DT, block=5000), 500)
+    with pytest.raises(ValueError, match=r"sample 300 has shape \(5, 3\)"):
+        fq.h1(fq.open([ROWS[:300], np.zeros((5, 3))], dt=DT), 100)
+    (tmp_path / "cut.npy").write_bytes(b"\x93NUMPY")
+    with pytest.raises(ValueError, match=r"cut\.npy"):
+        fq.open(tmp_path / "cut.npy", dt=DT)
+    (tmp_path / "a.csv").write_text("1")
+    with pytest.raises(ValueError, match=r"suffix='\.csv'"):
+        fq.open(tmp_path / "a.csv")
