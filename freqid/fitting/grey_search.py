@@ -16,7 +16,7 @@ from freqid.fitting.black_box.late import in_step, whole_samples
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
-from freqid.fitting.cost.placed_structure import PlacedStructure
+from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions
@@ -36,8 +36,8 @@ _ROUND_LINES = 60
 _DIRECT = 40
 # samples of an unknown delay that are tried
 _DELAYS = 20
-# places at which black boxes are asked for, and the lines that each takes at least
-_PLACES, _LEAST_LINES = 16, 100
+# lines that each of several black boxes takes at least
+_LEAST_LINES = 100
 # a start that costs so many times more on a part of the lines costs more on all
 _FAR = 1.1
 # local noise, and a cost, of this part of the data's energy are those of their rounding
@@ -174,7 +174,7 @@ class BesidePlaces:
     ) -> BesidePlaces | None:
         """None where there are too many of them, or one has none."""
         groups = structure.groups
-        if len(groups) > _PLACES or structure.model.delay_sources:
+        if structure.black_boxes > MOST_UNKNOWNS or structure.model.delay_sources:
             return None
         count = max(lines // len(groups), _LEAST_LINES)
         try:

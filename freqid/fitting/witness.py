@@ -23,7 +23,7 @@ from freqid.data import Record, StampedRecord
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
-from freqid.fitting.cost.placed_structure import PlacedStructure
+from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
@@ -91,6 +91,13 @@ class Testimony:
             return Witness("complete", sentence, 0.0, 0.0, 1.0)
         if not self.minimum.solution.converged:
             return Witness("absent", "the descent has not come to a minimum")
+        placed = isinstance(structure, PlacedStructure)
+        if placed and structure.black_boxes > MOST_UNKNOWNS:  # type: ignore[attr-defined]
+            return Witness(
+                "absent",
+                f"black boxes of order {order} at {len(_groups(structure, readings))} places would "
+                "take minutes; hear it on a few of the experiments",
+            )
         boxes = [_beside(structure, readings, grey, g) for g in _groups(structure, readings)]
         cost = sum(b.cost for b in boxes)
         free = len(self.minimum.x) - int(self.minimum.determined.loose.sum())

@@ -21,6 +21,9 @@ from freqid.lti import (
 )
 from freqid.models import GreyBox, Parameter
 
+# unknowns of all black boxes together that are worth their time: some seconds
+MOST_UNKNOWNS = 300
+
 
 class PlacedStructure(GreyStructure):
     """A grey box whose experiments differ in conditions, in what is known, or in own values.
@@ -66,6 +69,12 @@ class PlacedStructure(GreyStructure):
         at = self.places[place]
         columns = tuple(self.columns[place].values()) if self.separate else ()
         return (*at.conditions.items(), *at.known.items(), *columns)
+
+    @property
+    def black_boxes(self) -> int:
+        """Unknowns of a black box of the plant's order beside each group of experiments."""
+        order = len(self.model.state_space().A)
+        return len(self.groups) * order * (self.model.n_inputs + self.model.n_outputs)
 
     @property
     def groups(self) -> list[list[int]]:
