@@ -36,6 +36,8 @@ _ROUND_LINES = 60
 _DIRECT = 40
 # samples of an unknown delay that are tried
 _DELAYS = 20
+# starts of experiments at many places beside which there are no black boxes
+_ALONE = 3
 # lines that each of several black boxes takes at least
 _LEAST_LINES = 100
 # a start that costs so many times more on a part of the lines costs more on all
@@ -83,6 +85,9 @@ def search_grey(
     hidden = partial(_hidden, structure, [r.hold for r in at_lines])
     aliased = (lambda x: False) if hidden(start) else hidden
     search = Search(scout, targets, floor, bound, rounds, aliased)
+    if beside is None and isinstance(structure, PlacedStructure):
+        # nothing says when it is enough, and each start is a fit of everything
+        search.most = _ALONE
     found = search.run(start, options.n_starts, options.seed)
     objective.n_evaluations = scout.n_evaluations
     if in_time:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -138,32 +137,31 @@ class Model(ABC):
                 f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
                 "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
             )
-        if isinstance(hold, InputHolds):
-            return self._by_input(at, hold)
-        between = BandLimited() if hold is None or self.dt else hold
-        z = on_circle(at * self.dt) if self.dt else points(at, between)
-        if self.late:
-            plant, late, _ = self.still().delayed(between, at, z)
-            G = transfer(plant, z) * late
-        else:
-            G = transfer(basis_of(self.state_space()).through(between), z)
+        G = self.responses_at(at, hold)
         hold = self.own_hold or hold
-        dt = self.dt or (hold.period if isinstance(hold, PeriodicHold) else 0.0)
+        each = InputHolds.each(hold, 1) if hold is not None else ()
+        periods = [h.period for h in each if isinstance(h, PeriodicHold)]
         return FrequencyResponse(
-            at / (2 * np.pi), G, dt=dt, hold=hold,
+            at / (2 * np.pi), G, dt=self.dt or max(periods, default=0.0), hold=hold,
             input_names=self.inputs, output_names=self.outputs,
         )  # fmt: skip
 
-    def _by_input(self, omega: FloatArray, holds: InputHolds) -> FrequencyResponse:
-        """The response where each input has a hold of its own."""
-        parts = {h: self.frequency_response(omega, h) for h, _ in holds.groups}
-        if len(holds.holds) != self.n_inputs:
-            raise InputError(f"hold has {len(holds.holds)} entries for {self.n_inputs} inputs")
-        columns = [parts[h].response[:, i] for i, h in enumerate(holds.holds)]
-        dt = max(part.dt for part in parts.values())
-        return dataclasses.replace(
-            next(iter(parts.values())), response=np.stack(columns, axis=1), dt=dt, hold=holds
-        )
+    def responses_at(self, omega: FloatArray, hold: Hold | None = None) -> ComplexArray:
+        """The same as numbers (outputs, inputs, K), at frequencies in any order, negative ones too.
+
+        Aliases of a line are such: an output slower than its input has several at each.
+        """
+        if isinstance(hold, InputHolds):
+            if len(hold.holds) != self.n_inputs:
+                raise InputError(f"hold has {len(hold.holds)} entries for {self.n_inputs} inputs")
+            parts = {h: self.responses_at(omega, h) for h, _ in hold.groups}
+            return np.stack([parts[h][:, i] for i, h in enumerate(hold.holds)], axis=1)
+        between = BandLimited() if hold is None or self.dt else hold
+        z = on_circle(omega * self.dt) if self.dt else points(omega, between)
+        if self.late:
+            plant, late, _ = self.still().delayed(between, omega, z)
+            return transfer(plant, z) * late
+        return transfer(basis_of(self.state_space()).through(between), z)
 
     def to_control(self, pade: int | None = None) -> control.StateSpace:
         """The model as a ``control.StateSpace``, continuous or discrete as it is.

@@ -180,3 +180,21 @@ def test_nothing_is_left_to_ask_of_data_without_noise():
     est = fq.fit(LAG, fq.simulate(LAG, u, DT))
     assert est.suspects.empty
     assert est.verdict.grade == "trust"
+
+
+@pytest.mark.parametrize("factor", [2, 4])
+def test_an_output_slower_than_its_input_is_asked_as_well(factor):
+    """Each line has several frequencies of the input, in no order."""
+    grades, p = [], []
+    for seed in range(12):
+        record = fq.simulate(LAG, fq.white_noise(2000, seed=seed), DT / factor)
+        slow = record.decimate(factor, keep_input=True).with_noise(0.1, seed=100 + seed)
+        est = fq.fit(LAG, slow)
+        grades.append(est.verdict.grade)
+        p.append(est.suspects.loc[["delay", "feedthrough", "offset"], "p_value"])
+    assert grades.count("trust") >= 11
+    assert np.min(p) > 1e-4
+    late = dataclasses.replace(LAG, input_delay=0.4 * DT)
+    record = fq.simulate(late, fq.white_noise(2000, seed=3), DT / factor)
+    slow = record.decimate(factor, keep_input=True).with_noise(0.1)
+    assert fq.fit(LAG, slow).suspects["p_value"]["delay"] < 1e-6

@@ -107,11 +107,12 @@ class StopRule:
     rounding: float
     floor: float
     bound: Bound | None
+    most: int = BUDGET
 
     @property
     def limit(self) -> int:
         """Starts at the most."""
-        return BUDGET if self.n_starts is None else self.n_starts
+        return self.most if self.n_starts is None else self.n_starts
 
     def sure(self, found: Found) -> bool:
         """Whether no better minimum can be left to find."""
@@ -165,7 +166,7 @@ class Search:
         self.objective, self.targets = objective, targets
         self.aliased = aliased
         self.rounds: Rounds = rounds or (lambda damping: [] if damping else targets)
-        self.floor, self.bound = floor, bound
+        self.floor, self.bound, self.most = floor, bound, BUDGET
         self._best_log_cost = np.inf
 
     def run(self, start: FloatArray, n_starts: int | None, seed: int) -> Found:
@@ -174,7 +175,7 @@ class Search:
         It never ends above the cost of the start itself.
         """
         rounding = self.objective.rounding
-        rule = StopRule(n_starts, rounding, self.floor, self.bound)
+        rule = StopRule(n_starts, rounding, self.floor, self.bound, self.most)
         found = self._first(start, rule)
         more = self._together if self.targets else self._one_by_one
         tried = found.n_starts

@@ -22,7 +22,7 @@ _AHEAD, _BEFORE = 6, 12
 
 
 def _responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
-    return model.frequency_response(omega, None if model.dt else hold).response
+    return model.responses_at(omega, None if model.dt else hold)
 
 
 @suspect("delay")
