@@ -23,7 +23,7 @@ from freqid.data.conditions import as_conditions
 from freqid.data.folding import low_pass, power_above
 from freqid.data.frames import record_of, samples_frame
 from freqid.data.printed import as_html, as_text
-from freqid.data.sampling import check_rates, less_trend, sample_at
+from freqid.data.sampling import check_rates, less_trend, noise_sizes, sample_at
 from freqid.data.selection import as_holds, channel, selected, with_input
 from freqid.data.signals import Signals
 from freqid.lti import Hold, ZeroOrderHold
@@ -183,15 +183,18 @@ class Record(Signals):
         order = whole("order", order, least=0)
         return replace(self, u=less_trend(self.u, order), y=less_trend(self.y, order))
 
-    def with_noise(self, std: float, seed: int = 0) -> Record:
-        """The record with white Gaussian noise of standard deviation ``std`` on every output.
+    def with_noise(
+        self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: float | None = None
+    ) -> Record:
+        """The record with white Gaussian noise on every output.
 
-        Raises ValueError for a negative or non-finite ``std``.
+        ``std`` is its standard deviation, one for all outputs or one for each; ``snr`` (dB) says
+        instead how much more power each output has than its noise, its mean left out. Raises
+        ValueError for a negative or non-finite ``std``, another number of them, or both or none.
         """
-        if finite("std", std) < 0:
-            raise InputError(f"std={std!r} must not be negative")
+        size = noise_sizes(self.outputs, std, snr)
         noise = np.random.default_rng(seed).standard_normal(self.y.shape)
-        return replace(self, y=self.y + std * noise)
+        return replace(self, y=self.y + size.reshape(self.y.shape[1:]) * noise)
 
     def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> Record:
         """The same samples with another hold remembered; names mean it at the input's period.

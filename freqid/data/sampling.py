@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, finite
 
 
 def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
@@ -26,6 +27,22 @@ def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
 def sample_at(position: float) -> int:
     """The first sample at or after a position; a sample time off by rounding is that sample."""
     return int(np.ceil(position - 1e-6))
+
+
+def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: float | None) -> FloatArray:
+    """Standard deviations of noise on outputs (N, outputs), (outputs,), as ``with_noise`` says."""
+    p = y.shape[1]
+    if (std is None) == (snr is None):
+        raise InputError(f"std={std!r}, snr={snr!r}: give one of them")
+    if snr is not None:
+        return y.std(axis=0) * 10 ** (-finite("snr", snr) / 20)
+    sizes = np.atleast_1d(np.asarray(std, dtype=float))
+    if sizes.shape not in ((1,), (p,)) or not np.isfinite(sizes).all() or (sizes < 0).any():
+        raise InputError(
+            f"std={std!r} must not be negative: expected a finite number, or one for each of {p} "
+            "outputs"
+        )
+    return np.broadcast_to(sizes, (p,))
 
 
 def less_trend(x: FloatArray, order: int) -> FloatArray:

@@ -22,6 +22,15 @@ class Signals:
     dt: float
     input_dt: float
 
+    def __add__(self, other: Any) -> list[Any]:
+        """Experiments one after the other, as ``fit`` takes them: ``first + second``."""
+        if isinstance(other, Signals):
+            return [self, other]
+        return [self, *other] if isinstance(other, list) else NotImplemented
+
+    def __radd__(self, other: Any) -> list[Any]:
+        return [*other, self] if isinstance(other, list) else NotImplemented
+
     @property
     def factor(self) -> int:
         """Input samples for each output sample."""

@@ -56,9 +56,12 @@ class StampedRecord(Record):
         """The record with what was set for it, by name."""
         return self._with(conditions={**self.conditions, **conditions})
 
-    def with_noise(self, std: float, seed: int = 0) -> StampedRecord:
+    def with_noise(
+        self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: float | None = None
+    ) -> StampedRecord:
         """The record with white Gaussian noise on every logged output."""
-        noisy = Record(self.y_logged, self.y_logged, dt=1.0, hold="zoh").with_noise(std, seed)
+        noisy = Record(self.y_logged, self.y_logged, dt=1.0, hold="zoh")
+        noisy = noisy.with_noise(std, seed, snr=snr)
         grid = np.interp  # each channel on its own
         y = np.column_stack(
             [grid(self.y_time[0] + self.time, self.y_time, c) for c in noisy.outputs.T]

@@ -271,3 +271,19 @@ def test_channels_by_name():
         record.with_input("c", [1.0, 2.0, 3.0])
     with pytest.raises(ValueError, match="channel already"):
         record.with_input("a", np.zeros(4))
+
+
+def test_noise_and_sums():
+    record = fq.Record(np.zeros(4000), np.random.default_rng(0).standard_normal((4000, 2)), 0.1)
+    each = record.with_noise([0.1, 3.0], seed=1)
+    assert np.allclose((each.y - record.y).std(axis=0), [0.1, 3.0], rtol=0.05)
+    quiet = record.with_noise(snr=20, seed=1)
+    assert np.allclose((quiet.y - record.y).std(axis=0), 0.1 * record.y.std(axis=0), rtol=0.05)
+    assert np.array_equal(record.with_noise(0.5).y, record.with_noise([0.5, 0.5]).y)
+    for std, snr in ((None, None), (0.1, 20), ([1, 2, 3], None), (-1, None), (np.nan, None)):
+        with pytest.raises(ValueError, match="std="):
+            record.with_noise(std, snr=snr)
+    assert record + each == [record, each]
+    assert record + each + quiet == [record, each, quiet]
+    with pytest.raises(TypeError):
+        record + 3
