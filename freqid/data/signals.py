@@ -12,6 +12,7 @@ from freqid.lti import Hold
 
 if TYPE_CHECKING:
     from freqid.data.record import Record
+    from freqid.plots import Panels
 
 
 class Signals:
@@ -22,13 +23,19 @@ class Signals:
     dt: float
     input_dt: float
 
-    def __add__(self, other: Any) -> list[Any]:
+    def plot(self, ax: Panels | None = None) -> Panels:
+        """Draw input above output in time; see ``freqid.plot_record``."""
+        from freqid.plots import plot_record
+
+        return plot_record(self, ax)  # type: ignore[arg-type]
+
+    def __add__(self, other: object) -> list[object]:
         """Experiments one after the other, as ``fit`` takes them: ``first + second``."""
         if isinstance(other, Signals):
             return [self, other]
         return [self, *other] if isinstance(other, list) else NotImplemented
 
-    def __radd__(self, other: Any) -> list[Any]:
+    def __radd__(self, other: object) -> list[object]:
         return [*other, self] if isinstance(other, list) else NotImplemented
 
     @property

@@ -283,6 +283,7 @@ def test_noise_and_sums():
     for std, snr in ((None, None), (0.1, 20), ([1, 2, 3], None), (-1, None), (np.nan, None)):
         with pytest.raises(ValueError, match="std="):
             record.with_noise(std, snr=snr)
+    assert len(record.plot()) == 2
     assert record + each == [record, each]
     assert record + each + quiet == [record, each, quiet]
     with pytest.raises(TypeError):
