@@ -31,8 +31,8 @@ class Clock:
     missing: int
 
     @classmethod
-    def of(cls, name: str, stamps: ArrayLike) -> Clock:
-        """ValueError unless the stamps (s) increase."""
+    def of(cls, name: str, stamps: ArrayLike, origin: float = 0.0) -> Clock:
+        """Of stamps (s), ``start`` told from the ``origin``; ValueError unless they increase."""
         t = np.array(stamps, dtype=float)
         if t.ndim != 1 or len(t) < 3 or not np.isfinite(t).all():
             raise InputError(f"{name} must be three finite times in s, (N,), or more")
@@ -48,7 +48,7 @@ class Clock:
         number = np.concatenate([[0], np.cumsum(steps)])
         kept = np.ones(len(t), bool)
         for _ in range(5):
-            period, start = np.polyfit(number[kept] - number[0], t[kept] - t[0], 1)
+            period, start = np.polyfit(number[kept], t[kept] - t[0], 1)
             left = t - t[0] - start - period * number
             size = 1.4826 * float(np.median(np.abs(left - np.median(left))))
             kept = np.abs(left) <= max(5 * size, 1e-12 * abs(period))
@@ -58,7 +58,7 @@ class Clock:
         rms = float(np.sqrt(np.mean(off**2)))
         missing = int(number[-1] + 1 - len(t))
         # the last digits are rounding of the stamps
-        period, start = float(f"{period:.13g}"), float(f"{t[0] + start:.13g}")
+        period, start = float(f"{period:.13g}"), float(f"{t[0] - origin + start:.13g}")
         return cls(t, number, start, period, rms, float(off.max()), missing)
 
     @property
@@ -66,6 +66,11 @@ class Clock:
         """Of the period, as a part of it."""
         spread = float(np.std(self.number)) * np.sqrt(len(self.number))
         return self.jitter / max(spread, 1e-300)
+
+    @property
+    def start_error(self) -> float:
+        """Standard error of the start in s: that of a line at its end."""
+        return 2 * self.jitter * self.period / np.sqrt(len(self.number))
 
     def sentence(self, name: str) -> str:
         """The clock in words."""

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import scipy.signal
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, choice, samples
@@ -23,8 +24,8 @@ from freqid.lti import Hold, as_hold
 _OFF = 0.1
 # how finely an offset of the clocks is told, and the samples that a grid may have
 _FINEST, _LARGEST = 40, 2e7
-# part of a sample of the grid that an offset may be off
-_EXACT = 0.01
+# part of a step that an offset may be off by rounding, and periods without an input that are said
+_EXACT, _WIDE = 1e-6, 3
 
 
 def record_from_logs(
@@ -40,7 +41,8 @@ def record_from_logs(
 ) -> Record:
     """The work of ``Record.from_logs``."""
     inputs, outputs = samples("u", u), samples("y", y)
-    clocks = Clock.of("u_time", u_time), Clock.of("y_time", y_time)
+    origin = _origin(u_time)
+    clocks = Clock.of("u_time", u_time, origin), Clock.of("y_time", y_time, origin)
     for name, x, clock in (("u", inputs, clocks[0]), ("y", outputs, clocks[1])):
         if len(x) != len(clock.stamps):
             raise InputError(f"{name} has {len(x)} samples and {len(clock.stamps)} time stamps")
@@ -60,6 +62,12 @@ def record_from_logs(
         f"the output comes every {ratio:.9g} (± {ratio * error:.2g}) input samples, the first "
         f"{y_clock.start - u_clock.start:.6g} s after the first input"
     )
+    widest = float(np.diff(u_clock.stamps).max()) / u_clock.period
+    if widest > _WIDE:
+        notes.append(
+            f"the input was not logged for up to {widest:.3g} of its periods: it is taken to have "
+            f"{'kept its value' if kind == 'zoh' else 'run straight'} meanwhile"
+        )
     fraction = simple_ratio(y_clock, u_clock, _OFF)
     poor = [c for c in clocks if c.worst > _OFF or c.missing]
     if fraction is not None and not poor:
@@ -69,22 +77,36 @@ def record_from_logs(
     regular = _resampled(u_clock, inputs, y_clock, outputs, kind, notes, named, resample)
     if resample:
         return regular
-    fields = dict(regular.__dict__)
-    fields["notes"] = (
-        *notes,
-        "the stamps fit no common grid: a fit takes the samples at their own times",
-    )
+    # an input that is held lasts a period, one that is drawn ends with its last stamp
+    last = u_clock.stamps[-1] + (u_clock.period if kind == "zoh" else 0.0)
+    there = (y_clock.stamps >= u_clock.stamps[0]) & (y_clock.stamps <= last)
+    if there.sum() < 3:
+        raise InputError("the clocks overlap in fewer than three output samples")
+    if not there.all():
+        notes.append(f"{int((~there).sum())} output samples without an input were left out")
+    if kind == "bl":
+        notes.append("the band-limited input is drawn by straight lines between its stamps")
+    notes.append("the stamps fit no common grid: a fit takes the samples at their own times")
     return StampedRecord(
-        **fields, u_time=u_clock.stamps, u_logged=inputs.reshape(len(inputs), -1),
-        y_time=y_clock.stamps, y_logged=outputs.reshape(len(outputs), -1),
+        **{**regular.__dict__, "notes": tuple(notes)},
+        u_time=u_clock.stamps, u_logged=inputs.reshape(len(inputs), -1),
+        y_time=y_clock.stamps[there], y_logged=outputs.reshape(len(outputs), -1)[there],
     )  # fmt: skip
+
+
+def _origin(u_time: ArrayLike) -> float:
+    """The first stamp: times are told from there, where they have their digits."""
+    first = np.ravel(np.asarray(u_time, dtype=float))[:1]
+    return float(first[0]) if len(first) and np.isfinite(first[0]) else 0.0
 
 
 class _Grid:
     """A common grid: the input every ``repeat`` of its steps, the output every ``factor``."""
 
-    def __init__(self, step: float, repeat: int, factor: int, first: int, kind: str) -> None:
-        self.step, self.repeat, self.factor = step, repeat, factor
+    def __init__(
+        self, step: float, repeat: int, factor: int, first: int, kind: str, off: float = 0.0
+    ) -> None:
+        self.step, self.repeat, self.factor, self.off = step, repeat, factor, off
         # grid number of the first output, counted from the first input
         self.first, self.kind = first, kind
 
@@ -97,9 +119,16 @@ class _Grid:
             if (u.number[-1] + 1) * repeat * finer > _LARGEST:
                 return None
             at = (y.start - u.start) / step
-            if abs(at - round(at)) < max(_EXACT, 3 * (u.jitter + y.jitter) * h / step):
+            # as well as jittered stamps tell where a clock begins
+            error = np.hypot(u.start_error, y.start_error) / step
+            if abs(at - round(at)) < max(_EXACT, 4 * error):
                 return cls(step, repeat * finer, factor * finer, round(at), kind)
-        return None
+        if max(u.jitter, y.jitter) < _EXACT:
+            return None
+        # jittered stamps are no times to change an input at: the nearest step of the finest grid
+        return cls(
+            step, repeat * finer, factor * finer, round(at), kind, abs(at - round(at)) * step
+        )
 
     def record(
         self, u: FloatArray, y: FloatArray, notes: Sequence[str], named: Mapping[str, Any]
@@ -115,7 +144,11 @@ class _Grid:
         said = [*notes]
         if dropped:
             said.append(f"{dropped} output samples without an input were left out")
-        if self.repeat > 1:
+        if self.off:
+            said.append(f"the offset of the clocks is rounded by {self.off:.2g} s")
+        if self.repeat > 1 and self.kind == "bl":
+            said.append("the input was interpolated as a band-limited, periodic one")
+        elif self.repeat > 1:
             said.append(f"each input sample fills {self.repeat} steps of the common grid")
         return Record(
             fast[start : start + length * self.factor], y[skip : skip + length],
@@ -126,6 +159,8 @@ class _Grid:
     def _drawn(self, u: FloatArray) -> FloatArray:
         if self.kind == "zoh" or self.repeat == 1:
             return np.repeat(u, self.repeat, axis=0)
+        if self.kind == "bl":
+            return np.asarray(scipy.signal.resample(u, len(u) * self.repeat, axis=0))
         at = np.arange(len(u) * self.repeat) / self.repeat
         columns = u.reshape(len(u), -1).T
         drawn = np.column_stack([np.interp(at, np.arange(len(u)), c) for c in columns])

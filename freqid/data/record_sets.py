@@ -9,16 +9,24 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError
 from freqid.data.record import Record
+from freqid.data.stamped_record import StampedRecord
 
 # of a closed loop: True for the records' own, samples for one record, or those of each of several
 Reference = bool | FloatArray | Sequence[FloatArray] | Sequence[float]
 
 
 def as_records(records: Record | Sequence[Record]) -> list[Record]:
-    """The records as a list; ValueError unless they are of one plant and one sample time."""
+    """The records as a list; ValueError unless they are of one plant and one sample time.
+
+    Records at other conditions are of other plants.
+    """
     sets = [records] if isinstance(records, Record) else list(records)
     if not sets or not all(isinstance(r, Record) for r in sets):
         raise InputError("records must be a Record or a list of Records, at least one")
+    if any(isinstance(r, StampedRecord) for r in sets):
+        raise InputError(
+            "the stamps of a record fit no grid: take record.regular(), which is resampled"
+        )
     first = sets[0]
     for number, r in enumerate(sets):
         if abs(r.dt / first.dt - 1) > 1e-9 or r.factor != first.factor:
@@ -29,6 +37,11 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
             raise InputError(
                 f"records[{number}] has {r.n_inputs} inputs and {r.n_outputs} outputs, the first "
                 f"{first.n_inputs} and {first.n_outputs}; they must agree"
+            )
+        if r.conditions != first.conditions:
+            raise InputError(
+                f"records[{number}] was made at {dict(r.conditions)} and the first at "
+                f"{dict(first.conditions)}: they met different plants; take them one by one"
             )
         for name, x in zip(
             (*r.input_names, *r.output_names), (*r.inputs.T, *r.outputs.T), strict=True

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError
 from freqid.data.record import Record
+from freqid.data.selection import as_holds
+from freqid.lti import Hold
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class StampedRecord(Record):
@@ -62,17 +68,50 @@ class StampedRecord(Record):
         """The record with white Gaussian noise on every logged output."""
         noisy = Record(self.y_logged, self.y_logged, dt=1.0, hold="zoh")
         noisy = noisy.with_noise(std, seed, snr=snr)
-        grid = np.interp  # each channel on its own
-        y = np.column_stack(
-            [grid(self.y_time[0] + self.time, self.y_time, c) for c in noisy.outputs.T]
-        )
+        at = self.y_time[0] + self.time
+        y = np.column_stack([np.interp(at, self.y_time, c) for c in noisy.outputs.T])
         return self._with(y=y.reshape(self.y.shape), y_logged=noisy.outputs)
+
+    def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> StampedRecord:
+        """The record with another hold remembered: what the input did between its stamps."""
+        return self._with(hold=as_holds(hold, self.input_dt, self.hold, self.input_names))
+
+    def select(
+        self,
+        inputs: Sequence[str] | str | None = None,
+        outputs: Sequence[str] | str | None = None,
+    ) -> StampedRecord:
+        """The record with some of its channels, in the order given."""
+        part = self.regular().select(inputs, outputs)
+        u = [self.input_names.index(n) for n in part.input_names]
+        y = [self.output_names.index(n) for n in part.output_names]
+        return self._from(part, u_logged=self.u_logged[:, u], y_logged=self.y_logged[:, y])
 
     def decimate(
         self, factor: int, keep_input: bool = False, antialias: bool = False
     ) -> StampedRecord:
         """Not of a stamped record: take every so many of the log's rows, or ``regular()``."""
         raise InputError("a stamped record has no rate to decimate; use record.regular()")
+
+    def detrend(self, order: int = 0) -> StampedRecord:
+        """Not of a stamped record: detrend what is logged before, or ``regular()``."""
+        raise InputError("detrend the samples before from_logs, or use record.regular()")
+
+    def with_input(
+        self, name: str, samples: ArrayLike, hold: Hold | str | None = None, unit: str | None = None
+    ) -> StampedRecord:
+        """Not of a stamped record: give all inputs to ``from_logs``, or use ``regular()``."""
+        raise InputError("give all inputs to from_logs, or use record.regular()")
+
+    def to_frame(self) -> pd.DataFrame:
+        """Not of a stamped record: a frame has one time for all columns; ``regular()`` has."""
+        raise InputError("a frame has one time for all channels; use record.regular()")
+
+    def _from(self, part: Record, **stamped: Any) -> StampedRecord:
+        """A part of the regular record beside samples as they were logged."""
+        fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(Record)}
+        own = {n: getattr(self, n) for n in ("u_time", "u_logged", "y_time", "y_logged")}
+        return StampedRecord(**fields, **{**own, **stamped})
 
     def slice(self, start: float | None = None, stop: float | None = None) -> StampedRecord:
         """The samples from ``start`` up to ``stop``, in s from the first output."""
@@ -84,8 +123,7 @@ class StampedRecord(Record):
         first = max(int(np.searchsorted(self.u_time, low, side="right")) - 1, 0)
         u = np.zeros(len(self.u_time), bool)
         u[first:] = self.u_time[first:] < high
-        fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(Record)}
-        return StampedRecord(
-            **fields, u_time=self.u_time[u], u_logged=self.u_logged[u],
-            y_time=self.y_time[y], y_logged=self.y_logged[y],
+        return self._from(
+            part, u_time=self.u_time[u], u_logged=self.u_logged[u], y_time=self.y_time[y],
+            y_logged=self.y_logged[y],
         )  # fmt: skip

@@ -15,8 +15,10 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.noise_rounds import again, noise_weighted
+from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
+from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
 from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
@@ -121,8 +123,14 @@ def fit(
             "hold='estimate' and input_delay: a longer hold is a later input, so that one of them "
             "must be known; name the hold"
         )
+    check_stamped(model, sets, hold, {
+        "band": band, "weights": weights, "initial_state": initial_state, "offset": offset,
+        "loss": loss, "error": error, "reference": reference,
+    })  # fmt: skip
     models = _noise_models(weights, data, sets)
-    seen, models, notes = _through_references(model, sets, models, reference, weights is None)
+    own = (separate,) if isinstance(separate, str) else tuple(separate)
+    plain = weights is None
+    seen, models, notes = _through_references(model, sets, models, reference, plain, bool(own))
     readings: Sequence[Reading] = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late, i
@@ -132,13 +140,12 @@ def fit(
     if error == "log":
         readings = [_logarithmic(r, model) for r in readings]
     if offset is not None:
-        readings = [_with_offset(r) for r in readings]
-    own = (separate,) if isinstance(separate, str) else tuple(separate)
+        readings = [with_offset(r) for r in readings]
     options = SearchOptions(count, seed, start, estimated, own)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
     if offset is not None:
-        notes += _offsets(est, readings)
+        notes += offsets(est, readings)
     given = {
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
@@ -175,8 +182,12 @@ def _through_references(
     models: list[NoiseModel],
     reference: object,
     plain: bool,
+    apart: bool,
 ) -> tuple[list[DataSet], list[NoiseModel], list[str]]:
-    """The data, those with a reference as it explains them, their noise, and notes on both."""
+    """The data, those with a reference as it explains them, their noise, and notes on both.
+
+    Experiments that have values of their own are loops ``apart``.
+    """
     has = [isinstance(d, Record) and d.reference is not None for d in sets]
     if reference is True and not all(has):
         raise InputError(
@@ -198,8 +209,9 @@ def _through_references(
                 )
             notes.append("the input is faster than the reference, which is not used")
             continue
-        # experiments of one rate and the same channels are of one loop
-        loops.setdefault((d.dt, d.input_names, d.output_names), []).append(i)
+        # experiments of one rate, the same channels and conditions are of one loop
+        alike = (d.dt, d.input_names, d.output_names, tuple(sorted(d.conditions.items())))
+        loops.setdefault((*alike, i if apart else None), []).append(i)
     for members in loops.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
         explained, note = through_reference(records, _order(model), reference is True)
@@ -228,33 +240,6 @@ def _logarithmic(reading: Reading, model: object) -> Reading:
     known = reading.data.variance is not None and reading.noise.plain
     noise = as_noise_model("noise", reading.data) if known else reading.noise
     return reading.with_(logarithmic=True, noise=noise)
-
-
-def _with_offset(reading: Reading) -> Reading:
-    if not isinstance(reading.data, Record) or reading.in_time or reading.skip_zero:
-        raise InputError(
-            "offset='estimate' needs records, domain='frequency', no initial state at rest, and a "
-            "plant without an integrator, whose line at zero tells nothing"
-        )
-    if reading.band is not None and reading.band.low > 0:
-        raise InputError(
-            f"offset='estimate': band={reading.band} leaves out the line at zero, where an offset "
-            "is; take all lines, or leave the offset out: it does no harm there"
-        )
-    return reading.with_(offset=True)
-
-
-def _offsets(est: Estimate, readings: Sequence[Reading]) -> list[str]:
-    """The offsets that were found, in sentences."""
-    notes = []
-    for number, (r, free) in enumerate(zip(readings, est.minimum.point.initial, strict=True), 1):
-        assert isinstance(r.data, Record)
-        assert free is not None
-        names = r.data.output_names
-        sizes = [f"{n} {x:.4g}" for n, x in zip(names, free[-len(names) :], strict=True)]
-        where = f" in experiment {number}" if len(readings) > 1 else ""
-        notes.append(f"offset estimated{where}: {', '.join(sizes)}")
-    return notes
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import numpy as np
 from freqid.checks import InputError
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.witness import Testimony
@@ -58,7 +59,9 @@ def noise_weighted(
 
 def again(est: Estimate, options: SearchOptions) -> SearchOptions:
     """A fit that begins from an estimate; a black box begins by itself."""
+    # values of all experiments, and those that each has for itself
     near = {n: est[n] for n in getattr(est.model, "values", {})}
+    near |= {n: est[n] for n in est.names if "[" in n} if near else {}
     return dataclasses.replace(options, n_starts=1, start=near or None, refit=True)
 
 
@@ -67,5 +70,5 @@ def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:
     if not reading.noise.to_be_learnt:
         return reading
     seen = reading.with_(hold=est.hold) if estimated_hold else reading
-    left = errors_of(est.model, seen)
+    left = errors_of(met_by(est, reading), seen)
     return reading.with_(noise=reading.noise.learnt(left.error, left.n_samples))

@@ -166,7 +166,8 @@ class Reading:
     def experiment(self, plane: Plane | None = None) -> Experiment:
         """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
         if isinstance(self.data, StampedRecord):
-            return self._stamped(plane)
+            free = self.initial_state == "estimate"
+            return StampedExperiment(self.data, self.hold, free, self.place)
         if self.in_time:
             return self._samples(plane)
         if self.logarithmic:
@@ -206,20 +207,6 @@ class Reading:
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
         made = dataclasses.replace(made, place=self.place)
         return made.with_offsets(s.n_samples) if self.offset else made
-
-    def _stamped(self, plane: Plane | None) -> StampedExperiment:
-        assert isinstance(self.data, StampedRecord)
-        if plane is not None:
-            raise InputError(
-                "the stamps of this record fit no grid, as a sampled model needs: fit a GreyBox, "
-                "or take record.regular(), which is resampled"
-            )
-        if self.band is not None or not self.noise.plain or self.initial_state == "steady":
-            raise InputError(
-                "a record with stamps of its own is fitted whole, in time: leave out band, weights "
-                "and initial_state='steady', or take record.regular(), which is resampled"
-            )
-        return StampedExperiment(self.data, self.initial_state == "estimate", self.place)
 
     def _logarithm(self) -> LogResponse:
         assert isinstance(self.data, FrequencyResponse)

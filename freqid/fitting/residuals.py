@@ -8,7 +8,7 @@ import numpy as np
 import scipy.fft
 
 from freqid.checks import ComplexArray, FloatArray, InputError, steps
-from freqid.data import Band, Record, channel_counts
+from freqid.data import Band, Record, StampedRecord, channel_counts
 from freqid.fitting.reading import Reading, read_for
 from freqid.lti import Hold, Plane, eliminate
 from freqid.models import Model
@@ -56,6 +56,24 @@ def line_errors(
         skip_zero=model.integrates, delayed=late,
     )  # fmt: skip
     return errors_of(model, reading)
+
+
+def errors_at_stamps(model: Model, record: StampedRecord, hold: Hold | str | None) -> FloatArray:
+    """Errors ŷ − y (N, outputs) of a model at the times of a log, the initial state fitted."""
+    if model.dt or model.late:
+        raise InputError(
+            "samples at times of their own need a model in continuous time without delays; take "
+            "record.regular(), which is resampled"
+        )
+    reading = Reading.of(record, hold)
+    (experiment,) = read_for((model.n_outputs, model.n_inputs), [reading])
+    evaluation = experiment.at(model.still())
+    rows = evaluation.residual
+    if evaluation.transient is not None:
+        Q, _ = eliminate(evaluation.transient, rows)
+        rows = rows - (Q @ rows) @ Q
+    errors: FloatArray = rows.reshape(-1, model.n_outputs)
+    return errors
 
 
 def errors_of(model: Model, reading: Reading) -> LineErrors:

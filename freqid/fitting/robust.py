@@ -15,6 +15,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError
 from freqid.data import Record
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.uncertainty.minimum import Spread
@@ -65,7 +66,7 @@ def _cut(est: Estimate, readings: Sequence[Reading]) -> tuple[list[Reading], flo
     for r in readings:
         record = r.data
         assert isinstance(record, Record)
-        error = errors_of(est.model, r).in_time()
+        error = errors_of(met_by(est, r), r).in_time()
         scale = np.median(np.abs(error), axis=0) / _MEDIAN
         limit = _CUT * np.where(scale > 0, scale, np.inf)
         held = np.clip(error, -limit, limit)

@@ -14,13 +14,14 @@ from freqid.data import (
     DataSet,
     FrequencyResponse,
     Record,
+    StampedRecord,
     as_band,
     chosen,
     input_dt,
 )
-from freqid.fitting import Estimate, line_errors
+from freqid.fitting import Estimate, errors_at_stamps, line_errors, met
 from freqid.lti import Hold, PeriodicHold, as_hold
-from freqid.models import ModelLike, as_model
+from freqid.models import Model, ModelLike, as_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,9 +97,11 @@ def compare(
             f"record={type(record).__name__} is neither a Record nor a FrequencyResponse; compare "
             "them one by one"
         )
+    if isinstance(record, StampedRecord):
+        return _at_stamps(met(model, record), record, own_hold(model, hold, record), band)
     limits = as_band(band, record.nyquist)
     choice("initial_state", initial_state, ("estimate", "steady"))
-    given, hold = as_model(model).met_at(record.conditions), own_hold(model, hold, record)
+    given, hold = met(model, record), own_hold(model, hold, record)
     residual = -line_errors(given, record, hold, None, initial_state).in_time()
     y = record.outputs[: len(residual)]
     if limits is not None:
@@ -119,6 +122,25 @@ def compare(
     return Comparison(record, y, simulated, residual.reshape(shape), percent, used)
 
 
+def _at_stamps(
+    model: Model,
+    record: StampedRecord,
+    hold: Hold | str | None,
+    band: tuple[float, float] | None,
+) -> Comparison:
+    """The comparison at the times of a log; the signals are drawn on the record's regular grid."""
+    if band is not None:
+        raise InputError("band needs a grid; take record.regular(), which is resampled")
+    left = -errors_at_stamps(model, record, hold)
+    y = record.y_logged
+    percent = 100 * (1 - np.linalg.norm(left, axis=0) / np.linalg.norm(y - y.mean(axis=0), axis=0))
+    at = record.y_time[0] + record.time
+    drawn = np.column_stack([np.interp(at, record.y_time, c) for c in left.T])
+    residual = drawn.reshape(record.y.shape)
+    used = record.hold if hold is None or isinstance(hold, str) else hold
+    return Comparison(record, record.outputs, record.y - residual, residual, percent, used)
+
+
 def _with_response(
     model: ModelLike,
     frf: FrequencyResponse,
@@ -126,9 +148,9 @@ def _with_response(
     band: tuple[float, float] | None,
 ) -> Comparison:
     """The model's response beside a measured one, each output in per cent."""
+    given, found = met(model, frf), own_hold(model, hold, frf)
     if band is not None:
         frf = frf.select(band)
-    given, found = as_model(model).met_at(frf.conditions), own_hold(model, hold, frf)
     if isinstance(found, str):
         found = as_hold(found, frf.dt or 1.0, frf.hold)
     if found is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,8 @@ def hold_bias(
     """
     import pandas as pd
 
+    if any("[" in n for n in est.names) and isinstance(est.model, GreyBox):
+        raise InputError("hold_bias knows no parameters that each experiment has for itself")
     band, weights = band or est.band, est.weights if weights is None else weights
     if not isinstance(est.model, GreyBox):
         spec = est.model.spec
@@ -62,6 +64,15 @@ def hold_bias(
     )
 
 
+def _shared(options: Mapping[str, Any]) -> None:
+    """ValueError for parameters that each experiment has for itself: another one has others."""
+    if options.get("separate"):
+        raise InputError(
+            f"separate={options['separate']!r}: a parameter of each experiment for itself says "
+            "nothing of another one; leave separate out"
+        )
+
+
 def _mode_values(est: Estimate) -> pd.DataFrame:
     """Frequency and damping of each mode, value and std, under names that count them."""
     import pandas as pd
@@ -84,6 +95,7 @@ def cross_validate(model: object, records: Sequence[Record], **options: Any) -> 
     """
     import pandas as pd
 
+    _shared(options)
     sets = list(records)
     if len(sets) < 2:
         raise InputError(f"records holds {len(sets)}; cross-validation needs two or more repeats")
@@ -110,6 +122,7 @@ def bootstrap(
     """
     import pandas as pd
 
+    _shared(options)
     sets, count = list(records), whole("n", n)
     if len(sets) < 3:
         raise InputError(f"records holds {len(sets)}; a bootstrap needs three or more repeats")

@@ -8,10 +8,18 @@ import numpy as np
 import scipy.stats
 
 from freqid.checks import FloatArray, InputError, whole
-from freqid.data import Band, DataSet, FrequencyResponse, PeriodicResponse, Record, as_band
-from freqid.fitting import Estimate, line_errors
+from freqid.data import (
+    Band,
+    DataSet,
+    FrequencyResponse,
+    PeriodicResponse,
+    Record,
+    StampedRecord,
+    as_band,
+)
+from freqid.fitting import Estimate, line_errors, met
 from freqid.lti import Hold
-from freqid.models import ModelLike, as_model
+from freqid.models import ModelLike
 from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
 
 if TYPE_CHECKING:
@@ -58,6 +66,11 @@ def residual_test(
     import pandas as pd
 
     lags = whole("lags", lags)
+    if isinstance(record, StampedRecord):
+        raise InputError(
+            "the tests need samples on a grid: compare() works on the stamps, record.regular() is "
+            "resampled"
+        )
     if isinstance(record, FrequencyResponse):
         return _of_response(compare(model, record, hold=hold, band=band))
     if not isinstance(record, Record):
@@ -66,7 +79,7 @@ def residual_test(
         raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
     limits = as_band(band, record.nyquist)
     hold = own_hold(model, hold, record)
-    e = -line_errors(as_model(model).met_at(record.conditions), record, hold).in_time()
+    e = -line_errors(met(model, record), record, hold).in_time()
     u = record.inputs[:: record.factor][: len(e)]
     N = len(e)
     if limits is not None:

@@ -18,7 +18,7 @@ import scipy.linalg
 from freqid.checks import FloatArray, InputError
 from freqid.data import StampedRecord
 from freqid.fitting.cost.experiments import Evaluation
-from freqid.lti import Linearisation, Realisation
+from freqid.lti import Hold, InputHolds, Linearisation, Realisation
 
 # points of the interpolation, and ‖A‖Δ that it is good for
 _POINTS, _REACH = 28, 6.0
@@ -29,21 +29,20 @@ _BLOCK = 400
 class StampedExperiment:
     """Logged outputs against the model at their own times, the initial state free or at rest."""
 
-    def __init__(self, record: StampedRecord, free_state: bool, place: int = 0) -> None:
+    def __init__(self, record: StampedRecord, hold: Hold, free_state: bool, place: int = 0) -> None:
         self.free_state, self.place = free_state, place
-        begin = record.u_time[0]
-        there = record.y_time >= begin
-        if there.sum() < 3:
-            raise InputError("fewer than three outputs come after the first input")
-        self.y = record.y_logged[there].reshape(int(there.sum()), -1)
-        y_time = record.y_time[there]
-        u, u_time = record.u_logged, record.u_time
-        straight = record.hold.name != "zoh"
+        # times are told from the first input: stamps since 1970 have no digits to spare
+        origin = record.u_time[0]
+        u, u_time, y_time = record.u_logged, record.u_time - origin, record.y_time - origin
+        self.y = record.y_logged
         slope = np.zeros_like(u)
-        if straight:
-            slope[:-1] = np.diff(u, axis=0) / np.diff(u_time)[:, None]
-        changes = u_time[(u_time > y_time[0]) & (u_time < y_time[-1])]
-        events = np.unique(np.concatenate([y_time, changes]))
+        for i, own in enumerate(InputHolds.each(hold, u.shape[1])):
+            if own.name != "zoh":
+                slope[:-1, i] = np.diff(u[:, i]) / np.diff(u_time)
+        # at rest when the input begins, or in any state when the output does
+        begin = y_time[0] if free_state else min(0.0, y_time[0])
+        changes = u_time[(u_time >= begin) & (u_time < y_time[-1])]
+        events = np.unique(np.concatenate([[begin], y_time, changes]))
         at = np.searchsorted(u_time, events, side="right") - 1
         self.events, self.slope = events, slope[at]
         self.u = u[at] + slope[at] * (events - u_time[at])[:, None]

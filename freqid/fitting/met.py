@@ -1,0 +1,45 @@
+"""The model of an estimate as one experiment met it: at its conditions, with its own values."""
+
+from __future__ import annotations
+
+import re
+
+from freqid.checks import InputError
+from freqid.data import DataSet
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.estimate import Estimate
+from freqid.fitting.reading import Reading
+from freqid.models import Model, ModelLike, as_model
+
+
+def met_by(est: Estimate, reading: Reading) -> Model:
+    """The model that explains one of the readings that were fitted."""
+    minimum = est.minimum
+    if isinstance(minimum.structure, GreyStructure):
+        return minimum.structure.at(minimum.x, reading.place)
+    model: Model = est.model
+    return model
+
+
+def met(model: ModelLike, data: DataSet) -> Model:
+    """A model as the experiment of ``data`` meets it, one that was fitted or another.
+
+    Raises ValueError for an experiment that was not fitted where a parameter has a value of its own
+    for each, and the data do not say theirs.
+    """
+    if not isinstance(model, Estimate):
+        return as_model(model).met_at(data.conditions)
+    own = {found[1] for n in model.names if (found := re.fullmatch(r"(.+)\[\d+\]", n))}
+    own &= set(getattr(model.model, "values", {}))
+    for place, fitted in enumerate(model.data):
+        if fitted is data and model.problem is not None and own:
+            structure = model.problem.structure
+            assert isinstance(structure, GreyStructure)
+            return structure.at(model.problem.x, place)
+    for name in sorted(own - set(data.conditions)):
+        raise InputError(
+            f"{name} has a value for each experiment that was fitted, and this is none of them: "
+            f"say its own with data.with_conditions({name}=...)"
+        )
+    given: Model = model.model
+    return given.met_at(data.conditions)
