@@ -12,6 +12,8 @@ from freqid.checks import FloatArray, InputError, IntArray
 
 # denominators of a ratio that two clocks are believed to have, smallest first
 _DENOMINATORS = 64
+# part of a period that stamps of a calm clock are off by, and how fast a phase follows the others
+_CALM, _FOLLOWING = 0.4, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +45,7 @@ class Clock:
                 f"{name} goes back or stands still at row {at + 1} ({t[at]:g} s, then "
                 f"{t[at + 1]:g} s); sort or repair the rows"
             )
-        period = float(np.median(gaps))
-        steps = np.maximum(np.round(gaps / period), 1).astype(int)
-        number = np.concatenate([[0], np.cumsum(steps)])
+        number = _numbered(t - t[0], gaps)
         kept = np.ones(len(t), bool)
         for _ in range(5):
             period, start = np.polyfit(number[kept], t[kept] - t[0], 1)
@@ -78,6 +78,35 @@ class Clock:
         if self.worst > 2 * self.jitter:
             said += f", at most {100 * self.worst:.3g} %"
         return said + (f", {self.missing} samples missing" if self.missing else "")
+
+
+def _numbered(t: FloatArray, gaps: FloatArray) -> IntArray:
+    """Number of the tick of each stamp: gaps in periods, or where these jitter, ticks followed."""
+    period = float(np.median(gaps))
+    steps = np.maximum(np.round(gaps / period), 1).astype(int)
+    if float(np.abs(gaps / period - steps).max()) < _CALM:
+        return np.concatenate([[0], np.cumsum(steps)])
+    # nothing missing: then no stamp is a whole period off the line through all of them
+    number = np.arange(len(t))
+    line = np.polyfit(number, t, 1)
+    if float(np.abs(t - np.polyval(line, number)).max()) < _CALM * line[0]:
+        return number
+    for _ in range(2):
+        number = _followed(t, period)
+        period = float(np.polyfit(number, t, 1)[0])
+    return number
+
+
+def _followed(t: FloatArray, period: float) -> IntArray:
+    """Ticks counted by a phase that follows the stamps slowly, so that jitter averages out."""
+    number, phase, ticks = 0, 0.0, [0]
+    for stamp in t[1:].tolist():
+        count = max(round((stamp - phase) / period), 1)
+        number += count
+        phase += count * period
+        phase += _FOLLOWING * (stamp - phase)
+        ticks.append(number)
+    return np.array(ticks)
 
 
 def simple_ratio(slow: Clock, fast: Clock, tolerance: float) -> Fraction | None:

@@ -8,11 +8,11 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 from freqid.checks import InputError, unknown
 from freqid.data.logged import kind_of, logged_record
-from freqid.data.readers.kinds import LOGS, READERS, WRITERS
+from freqid.data.readers.kinds import LOGS, READERS, WRITERS, existing
 from freqid.data.readers.table import named
 from freqid.data.record import Record
 from freqid.data.time_column import with_time
@@ -74,6 +74,10 @@ def read(
     """
     path = Path(path)
     if kind_of(path) in LOGS:
+        _no_table(path, {
+            "dt": dt, "reference": reference, "time": time, "sep": sep, "decimal": decimal,
+            "columns": columns,
+        })  # fmt: skip
         try:
             return _cut(
                 logged_record(path, inputs, outputs, hold, units, resample), start, stop, detrend
@@ -87,8 +91,8 @@ def read(
         told = {**frame.attrs.get("units", {}), **(units or {})}
         frame, said = with_time(frame, time, told, dt)
         record = Record.from_frame(
-            frame, _known(inputs, frame), _known(outputs, frame), dt, hold, reference,
-            units=told, resample=resample,
+            frame, _known(inputs, frame), _known(outputs, frame), dt, hold,
+            _known(reference, frame), units=told, resample=resample,
         )  # fmt: skip
         notes = (*frame.attrs.get("notes", ()), *said, *record.notes)
         return _cut(dataclasses.replace(record, notes=notes), start, stop, detrend)
@@ -106,8 +110,7 @@ def frame_of(
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(f"{path}: {unknown('suffix', path.suffix, [*READERS, *LOGS])}")
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     if path.stat().st_size == 0:
         raise InputError(f"{path} is empty; expected columns of samples under a line of names")
     asked = {k: v for k, v in (("sep", sep), ("decimal", decimal)) if v is not None}
@@ -125,6 +128,26 @@ def frame_of(
         frame.columns = list(columns)
         frame.attrs.pop("notes", None)
     return frame
+
+
+def _no_table(path: Path, given: Mapping[str, object]) -> None:
+    """ValueError for what is asked of a log and means columns of a table."""
+    for name, value in given.items():
+        if value is not None:
+            raise InputError(
+                f"{path}: {name}={value!r} is for tables; the channels of a log have names and "
+                "times of their own: leave it out"
+            )
+
+
+@overload
+def _known(names: str | None, frame: pd.DataFrame) -> str | None: ...
+
+
+@overload
+def _known(
+    names: Sequence[str] | str | None, frame: pd.DataFrame
+) -> Sequence[str] | str | None: ...
 
 
 def _known(names: Sequence[str] | str | None, frame: pd.DataFrame) -> Sequence[str] | str | None:

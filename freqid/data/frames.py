@@ -8,17 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, positive, unknown
-from freqid.lti import Hold, ZeroOrderHold
+from freqid.data.remembered import is_kept, kept_columns, kept_conditions, kept_hold
+from freqid.lti import Hold
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from freqid.data.record import Record
-
-
-def _hold_columns() -> dict[str, type[Hold]]:
-    """The columns by which a file remembers its hold."""
-    return {kind.at(1.0).column[0]: kind for kind in Hold.named.values()}
 
 
 def record_of(
@@ -27,7 +23,7 @@ def record_of(
     inputs: Sequence[str] | str | None,
     outputs: Sequence[str] | str | None,
     dt: float | None,
-    hold: Hold | str | None,
+    hold: Hold | str | Mapping[str, Hold | str] | None,
     reference: str | None,
     units: Mapping[str, str] | None,
     resample: bool,
@@ -39,7 +35,7 @@ def record_of(
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     step = _sample_time(frame, dt)
-    signals = [c for c in frame.columns if c not in ("time", *_hold_columns())]
+    signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
     u_names, y_names = _channels(signals, inputs, outputs, reference)
     u, y = (_numbers(frame, names) for names in (u_names, y_names))
     commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
@@ -51,13 +47,14 @@ def record_of(
         u[:, 0] if len(u_names) == 1 else u,
         y[:, 0] if len(y_names) == 1 else y,
         dt=step * factor,
-        hold=_remembered(frame) if hold is None else hold,
+        hold=kept_hold(frame, u_names) if hold is None else hold,
         input_dt=step,
         input_names=u_names,
         output_names=y_names,
         units={k: v for k, v in (units or {}).items() if k in named},
         reference=None if commanded is None else commanded[::factor],
         notes=tuple(notes),
+        conditions=kept_conditions(frame),
     )
 
 
@@ -72,9 +69,7 @@ def samples_frame(record: Record) -> pd.DataFrame:
     for name, values in slow.items():
         columns[name] = np.full(len(record.u), np.nan)
         columns[name][:: record.factor] = values
-    if record.hold != ZeroOrderHold(record.input_dt):
-        name, value = record.hold.column
-        columns[name] = value
+    columns |= kept_columns(record)
     # twelve digits hide the rounding of k * dt and keep the times exactly regular on paper
     return pd.DataFrame(columns, index=pd.Index(np.round(record.input_time, 12), name="time"))
 
@@ -211,15 +206,3 @@ def _slow_output(y: FloatArray) -> int:
     regular = np.array_equal(rows, np.arange(0, len(y), factor))
     blank = bool(np.isnan(y[~there]).all())
     return factor if regular and blank else 1
-
-
-def _remembered(frame: pd.DataFrame) -> Hold | None:
-    for column, kind in _hold_columns().items():
-        if column in frame.columns:
-            if frame[column].dtype == bool:
-                return kind.at(1.0)
-            periods = np.unique(_numbers(frame, [column]))
-            if len(periods) != 1:
-                raise InputError(f"column {column!r} must hold one period; it holds {len(periods)}")
-            return kind.at(positive(column, float(periods[0]), "s"))
-    return None

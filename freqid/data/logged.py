@@ -10,7 +10,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, unknown
 from freqid.data.logs import record_from_logs
-from freqid.data.readers.kinds import LOGS, READERS, Channel
+from freqid.data.readers.kinds import LOGS, READERS, Channel, existing
 from freqid.data.record import Record
 from freqid.lti import Hold
 
@@ -60,8 +60,7 @@ def log_of(path: str | Path) -> Mapping[str, Channel]:
             raise InputError(f"{path}: {error}") from None
     if kind not in READERS:
         raise InputError(f"{path}: {unknown('suffix', kind, [*READERS, *LOGS])}")
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     try:
         frame = READERS[kind](path)
     except InputError as error:

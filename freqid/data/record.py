@@ -208,7 +208,8 @@ class Record(Signals):
 
         An output slower than the input has NaN between its samples. A hold other than the
         zero-order hold at the input's own period is kept in one column more, ``zoh_period``,
-        ``foh_period`` or ``band_limited``, so that a file written from here remembers it.
+        ``foh_period`` or ``band_limited``, followed by the input's name where each has its own,
+        and each condition in a column ``condition q``: a file written from here remembers both.
 
         >>> Record([0.0, 1.0], [0.0, 0.5], dt=0.1).to_frame().columns.tolist()
         ['u', 'y']

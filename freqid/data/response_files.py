@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from freqid.checks import Array, ComplexArray, FloatArray, InputError
 from freqid.data.files import frame_of
 from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.readers.kinds import damaged, first_line, missing
+from freqid.data.readers.kinds import damaged, existing, first_line, missing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,13 +163,26 @@ def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> Co
     magnitude = _numbers(frame, size)
     if "db" in (units.get(size, "") + " " + size).casefold():
         magnitude = 10 ** (magnitude / 20)
+    elif (magnitude < 0).any():
+        raise InputError(
+            f"column {size!r} is below zero, as magnitudes in dB are; name it {size} [dB], or real "
+            "and imag"
+        )
     if phase is None:
         raise InputError(
             f"the columns {', '.join(names)} hold no phase: a fit needs it; export it too"
         )
     turn = _numbers(frame, phase)
     text = (units.get(phase, "") + " " + phase).casefold()
-    if "rad" not in text:
+    # "Grad" is German for degrees
+    radians = re.search(r"(?<![a-z])rad", text)
+    told = radians or re.search(r"deg|°|grad", text)
+    if not told and len(turn) > 2 and np.abs(turn).max() <= 2 * np.pi and turn.any():
+        raise InputError(
+            f"column {phase!r} may be in degrees or in radians; name it {phase} [deg] or "
+            f"{phase} [rad]"
+        )
+    if not radians:
         turn = np.deg2rad(turn)
     return magnitude * np.exp(1j * turn)
 
@@ -179,8 +192,7 @@ def _touchstone(path: Path) -> FrequencyResponse:
         import skrf
     except ImportError:
         raise missing("Touchstone", "scikit-rf", "rf") from None
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     try:
         network = skrf.Network(str(path))
     except Exception as error:
@@ -194,8 +206,7 @@ def _universal(path: Path) -> FrequencyResponse:
         import pyuff
     except ImportError:
         raise missing("UFF58", "pyuff", "uff") from None
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     try:
         sets = pyuff.UFF(str(path)).read_sets()
     except Exception as error:
@@ -226,8 +237,7 @@ def _universal(path: Path) -> FrequencyResponse:
 def _matlab(path: Path) -> FrequencyResponse:
     import scipy.io
 
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     try:
         content = scipy.io.loadmat(path, squeeze_me=True)
     except (ValueError, TypeError, OSError, IndexError, NotImplementedError) as error:

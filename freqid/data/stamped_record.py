@@ -52,11 +52,10 @@ class StampedRecord(Record):
 
     def regular(self) -> Record:
         """The record on its regular grid alone, without the stamps."""
-        own = ("u_time", "u_logged", "y_time", "y_logged")
-        return Record(**{k: v for k, v in self.__dict__.items() if k not in own})
+        return Record(**_fields(self))
 
     def _with(self, **changes: Any) -> StampedRecord:
-        return StampedRecord(**{**self.__dict__, **changes})
+        return self._from(self, **changes)
 
     def with_conditions(self, **conditions: float) -> StampedRecord:
         """The record with what was set for it, by name."""
@@ -109,9 +108,8 @@ class StampedRecord(Record):
 
     def _from(self, part: Record, **stamped: Any) -> StampedRecord:
         """A part of the regular record beside samples as they were logged."""
-        fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(Record)}
         own = {n: getattr(self, n) for n in ("u_time", "u_logged", "y_time", "y_logged")}
-        return StampedRecord(**fields, **{**own, **stamped})
+        return StampedRecord(**{**_fields(part), **own, **stamped})
 
     def slice(self, start: float | None = None, stop: float | None = None) -> StampedRecord:
         """The samples from ``start`` up to ``stop``, in s from the first output."""
@@ -127,3 +125,8 @@ class StampedRecord(Record):
             part, u_time=self.u_time[u], u_logged=self.u_logged[u], y_time=self.y_time[y],
             y_logged=self.y_logged[y],
         )  # fmt: skip
+
+
+def _fields(record: Record) -> dict[str, Any]:
+    """What a record on a grid is made of."""
+    return {f.name: getattr(record, f.name) for f in dataclasses.fields(Record)}

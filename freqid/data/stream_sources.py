@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, channel_names, positive, unknown, whole
-from freqid.data.readers.kinds import damaged, missing
+from freqid.checks import Array, FloatArray, InputError, channel_names, positive, unknown, whole
+from freqid.data.readers.kinds import damaged, existing, missing
+from freqid.data.remembered import is_kept, kept_hold
+from freqid.data.selection import as_holds
 from freqid.data.streams import BLOCK, Stream
-from freqid.lti import Hold, ZeroOrderHold, as_hold
+from freqid.lti import Hold, ZeroOrderHold
 
 # an array of some library, a path, or blocks: what it can do is asked of it
 Source = Any
+
+# part of a step that the ends of a time may be off
+_EVEN = 1e-2
 
 
 def open(
@@ -23,7 +28,7 @@ def open(
     inputs: Sequence[str] | str | None = None,
     outputs: Sequence[str] | str | None = None,
     dt: float | None = None,
-    hold: Hold | str | None = None,
+    hold: Hold | str | Mapping[str, Hold | str] | None = None,
     *,
     columns: Sequence[str] | None = None,
     scale: float = 1.0,
@@ -37,7 +42,7 @@ def open(
             starts such an iterable anew for each pass.
         inputs, outputs: channels by name; of two, the first is the input.
         dt: sample time in s, where the file has none (a data set or column ``time`` or ``dt``).
-        hold: what the input did; a zero-order hold where not given.
+        hold: what the input did, where the file does not remember it; a zero-order hold else.
         columns: names of the channels of arrays and blocks, u and y where not given.
         scale: what integer samples are multiplied by.
         block: samples of a block.
@@ -78,7 +83,8 @@ def open(
                 continue
             yield np.asarray(wide[:, pick], dtype=float) * scale
 
-    held = as_hold(hold, step, ZeroOrderHold(step))
+    said = found.hold if hold is None else hold
+    held = as_holds(said, step, ZeroOrderHold(step), tuple(u_names))
     return Stream(blocks, step, held, tuple(u_names), tuple(y_names), found.n_samples, found.origin)
 
 
@@ -91,6 +97,8 @@ class _Found:
     n_samples: int | None
     dt: float | None
     origin: str
+    # what the file says of the hold, of all inputs or by name
+    hold: Hold | Mapping[str, Hold] | None = None
 
 
 def _of_array(array: Source, columns: Sequence[str] | None, block: int, origin: str) -> _Found:
@@ -131,8 +139,7 @@ def _of_blocks(source: Source, columns: Sequence[str] | None) -> _Found:
 
 
 def _of_file(path: Path, block: int) -> _Found:
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     kind = path.suffix.lower()
     if kind == ".npy":
         try:
@@ -170,7 +177,9 @@ def _of_hdf5(path: Path, block: int) -> _Found:
             dt = scalars.get("dt", scalars.get("Ts"))
             if times:
                 t = file[times[0]]
-                dt = float(t[-1] - t[0]) / (len(t) - 1)
+                dt = _even(str(path), t[:2], t[-2:], len(t))
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{path}: {damaged('HDF5', error)}") from None
     full = [n for n in sizes if n not in times]
@@ -200,17 +209,43 @@ def _of_parquet(path: Path, block: int) -> _Found:
         # pyarrow has errors of many kinds for a file that is not what it says
         raise InputError(f"{path}: {damaged('Parquet', error)}") from None
     every = [str(n) for n in file.schema_arrow.names]
-    names = [n for n in every if n not in ("time", "zoh_period", "foh_period", "band_limited")]
-    count, dt = file.metadata.num_rows, None
+    names = [n for n in every if n != "time" and not is_kept(n)]
+    count, dt, hold = file.metadata.num_rows, None, None
+    kept = [n for n in every if n != "time" and is_kept(n)]
+    if kept:
+        hold = kept_hold(next(file.iter_batches(batch_size=1, columns=kept)).to_pandas(), names)
     if "time" in every and count > 1:
-        first = next(file.iter_batches(batch_size=2, columns=["time"])).column(0).to_numpy()
-        dt = float(f"{float(first[1] - first[0]):.9g}")
+        # both ends say whether the time is even, which only all of it could prove
+        groups = file.num_row_groups
+        ends = [file.read_row_group(g, columns=["time"]).column(0) for g in (0, groups - 1)]
+        first, last = ends[0][:2].to_numpy(), ends[1][-2:].to_numpy()
+        dt = _even(str(path), first, last, count)
 
     def blocks() -> Iterator[Source]:
         for batch in pq.ParquetFile(path).iter_batches(batch_size=block, columns=names):
             yield np.column_stack([c.to_numpy(zero_copy_only=False) for c in batch.columns])
 
-    return _Found(blocks, names, count, dt, str(path))
+    return _Found(blocks, names, count, dt, str(path), hold)
+
+
+def _even(origin: str, first: Array, last: Array, count: int) -> float:
+    """The sample time in s of a time column, by its ends; ValueError where they do not agree."""
+    ends = [np.asarray(first), np.asarray(last)]
+    if ends[0].dtype.kind in "mM":
+        nanoseconds = [e.astype(ends[0].dtype.kind + "8[ns]").astype("int64") for e in ends]
+        ends = [1e-9 * (e - nanoseconds[0][0]) for e in nanoseconds]
+    elif ends[0].dtype.kind not in "fiu":
+        raise InputError(f"{origin}: the time holds neither numbers of seconds nor dates")
+    a, z = (e.astype(float) for e in ends)
+    step = float(z[-1] - a[0]) / (count - 1)
+    steps = [float(e[-1] - e[0]) for e in (a, z) if len(e) > 1]
+    if not np.isfinite(step) or step <= 0 or any(abs(s - step) > _EVEN * step for s in steps):
+        raise InputError(
+            f"{origin}: the time is not even: its first step is {steps[0]:g} s and the mean one "
+            f"{step:g} s; repair it, or take the time away and give dt in s"
+        )
+    # a time printed with few digits carries their rounding
+    return float(f"{step:.9g}")
 
 
 def _chosen(

@@ -34,6 +34,8 @@ _NAMES = {
 _EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
 # steps that differ by no more than this part make an unnamed column a time
 _EVEN = 1e-3
+# a name that ends in a unit, and steps in s that nobody samples a machine with
+_SUFFIX, _SLOW = r"_(s|ms|us|ns)$", 1.0
 
 
 def with_time(
@@ -52,7 +54,14 @@ def with_time(
         raise InputError(f"time={name!r}: the column 'time' is another; rename it")
     rest.insert(0, "time", seconds)
     plain = name == "time" and said == "s"
-    return rest, [] if plain else [f"column {name!r} was taken for the time, in {said}"]
+    notes = [] if plain else [f"column {name!r} was taken for the time, in {said}"]
+    told = units.get(name) or re.search(_SUFFIX, name.casefold())
+    step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
+    if said == "s" and not told and step >= _SLOW:
+        notes.append(
+            f"its steps are {step:g} s: give units={{{name!r}: 'ms'}} where they are milliseconds"
+        )
+    return rest, notes
 
 
 def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | None:
@@ -118,7 +127,7 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
             )
         return in_seconds(name, converted, unit)
     values = column.to_numpy(dtype=float)
-    suffix = re.search(r"_(s|ms|us|ns)$", name.casefold())
+    suffix = re.search(_SUFFIX, name.casefold())
     wanted = unit or (suffix[1] if suffix else "")
     if wanted:
         if wanted.casefold() not in UNITS:

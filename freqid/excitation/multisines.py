@@ -45,7 +45,8 @@ def multisine(
             Measurement 40, 1991) find.
         seed: of the random phases. ``rms``: of each signal.
         powers: of the lines, relative to one another; equal where not given.
-        n_inputs: signals that are independent of one another, as many as inputs.
+        n_inputs: signals whose phases are independent of one another, as many as inputs; not with
+            ``"schroeder"``, which knows one.
         orthogonal: as many experiments as inputs, (inputs, N, inputs): the same lines with phases
             turned by the columns of the DFT matrix, which tell the inputs apart with the least
             variance (Dobrowiecki, Schoukens and Guillaume, IEEE Trans. Instrumentation and
@@ -69,6 +70,11 @@ def multisine(
     choice("crest", crest, ("minimise", "schroeder", "random"))
     choice("grid", grid, tuple(_GRIDS))
     count = whole("n_inputs", n_inputs)
+    if crest == "schroeder" and count > 1 and not orthogonal:
+        raise InputError(
+            f"crest='schroeder', n_inputs={count}: it makes one signal, the others would be it "
+            "again; take crest='minimise' or 'random', or orthogonal=True"
+        )
     rng = np.random.default_rng(whole("seed", seed, least=0))
     k = _GRIDS[grid](multisine_lines(band, period))
     if not len(k):
@@ -81,7 +87,9 @@ def multisine(
             f"band=({band[0]:g}, {band[1]:g}) Hz must stay below {0.5 / dt:g} Hz, the Nyquist limit"
         )
     lines = _Lines(k, _amplitudes(powers, len(k)))
-    phases = np.array([_phases(lines, N, crest, rng, first=i == 0) for i in range(count)])
+    phases = np.array(
+        [_phases(lines, N, crest, rng, first=i == 0 or crest == "schroeder") for i in range(count)]
+    )
     turns = np.zeros((1, count))
     if orthogonal:
         turns = 2 * np.pi * np.outer(np.arange(count), np.arange(count)) / count
@@ -116,10 +124,8 @@ def _phases(lines: _Lines, N: int, crest: str, rng: np.random.Generator, first: 
     """Phases of one signal; those of a second one begin elsewhere."""
     if crest == "random":
         return rng.uniform(0, 2 * np.pi, len(lines.k))
-    phases = lines.schroeder()
-    if not first:
-        # the same sweep from another moment on is another signal, with the same crest
-        phases = phases + 2 * np.pi * lines.k * rng.uniform()
+    # a sweep from another moment on is the same but for a delay: a further signal begins by chance
+    phases = lines.schroeder() if first else rng.uniform(0, 2 * np.pi, len(lines.k))
     if crest == "minimise" and len(lines.k) > 1:
         return _least_crest(lines, N, phases, rng)
     return phases
@@ -164,7 +170,9 @@ def _least_crest(lines: _Lines, N: int, first: FloatArray, rng: np.random.Genera
     k = lines.k
     # peaks between the samples do not exist for a converter; a coarser grid shows those that do
     grid = min(N, scipy.fft.next_fast_len(16 * int(k[-1]), real=True))
-    starts = [first, *rng.uniform(0, 2 * np.pi, (_STARTS - 1, len(k)))]
+    # few lines are cheap, and their least peak takes luck
+    count = _STARTS + _MORE // grid
+    starts = [first, *rng.uniform(0, 2 * np.pi, (count - 1, len(k)))]
 
     def crest(phases: FloatArray) -> float:
         return float(np.abs(lines.signal(phases, N)).max())

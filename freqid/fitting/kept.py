@@ -16,6 +16,7 @@ from freqid.data import DataSet, Record, whole_file
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.grades import Verdict
+from freqid.fitting.met import remembered
 from freqid.fitting.search.verdict import Witness
 from freqid.models import GreyBox, hold_of_dict, hold_to_dict, model_of_dict, model_to_dict
 
@@ -42,7 +43,7 @@ def written(est: Estimate) -> Written:
     """Everything that is kept of an estimate."""
     import freqid
 
-    table = est.parameters
+    table, (said, step) = est.parameters, remembered(est)
     return {
         **est.to_dict(),
         "schema": SCHEMA,
@@ -62,6 +63,8 @@ def written(est: Estimate) -> Written:
         "n_starts": est.n_starts,
         "n_agreed": est.n_agreed,
         "held": hold_to_dict(est.hold),
+        "remembered": None if said is None else hold_to_dict(said),
+        "input_dt": step,
         "band": est.band,
         "weights": est.weights if isinstance(est.weights, str) else None,
         "call": est.call,
@@ -130,7 +133,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         band=None if kept["band"] is None else tuple(kept["band"]), weights=kept["weights"],
         call=str(kept["call"]), notes=list(kept["notes"]),
     )  # fmt: skip
-    witness, verdict = kept["witness"], kept["verdict"]
+    witness, verdict, said = kept["witness"], kept["verdict"], kept.get("remembered")
     table = pd.DataFrame(
         {
             "value": values, "std": np.sqrt(np.diag(covariance)),
@@ -147,6 +150,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"])
                   for w in kept["findings"]],
         parameters=table,
+        remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip
     return est
 

@@ -5,11 +5,20 @@ from __future__ import annotations
 import re
 
 from freqid.checks import InputError
-from freqid.data import DataSet
+from freqid.data import DataSet, input_dt
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
+from freqid.lti import Hold
 from freqid.models import Model, ModelLike, as_model
+
+
+def remembered(est: Estimate) -> tuple[Hold | None, float | None]:
+    """The hold that the fitted data remembered, and their input's sample time in s."""
+    if est.data:
+        return est.data[0].hold, input_dt(est.data[0])
+    kept: tuple[Hold | None, float | None] = est.__dict__.get("remembered", (None, None))
+    return kept
 
 
 def met_by(est: Estimate, reading: Reading) -> Model:

@@ -19,7 +19,7 @@ from freqid.data import (
     chosen,
     input_dt,
 )
-from freqid.fitting import Estimate, errors_at_stamps, line_errors, met
+from freqid.fitting import Estimate, errors_at_stamps, line_errors, met, remembered
 from freqid.lti import Hold, PeriodicHold, as_hold
 from freqid.models import Model, ModelLike, as_model
 
@@ -175,13 +175,11 @@ def own_hold(model: ModelLike, hold: Hold | str | None, data: DataSet) -> Hold |
     inside = as_model(model).own_hold
     if hold is not None or inside is not None:
         return hold if hold is not None else inside
-    if not isinstance(model, Estimate) or not model.data:
+    if not isinstance(model, Estimate):
         return None
-    fitted = model.data[0]
-    remembered = fitted.hold
-    if model.hold == remembered or remembered is None or "hold_period" in model.names:
+    said, step = remembered(model)
+    if model.hold == said or said is None or "hold_period" in model.names:
         return model.hold if "hold_period" in model.names else None
-    step = input_dt(fitted)
     if isinstance(model.hold, PeriodicHold) and step and abs(model.hold.period / step - 1) < 1e-9:
         return type(model.hold)(input_dt(data) or model.hold.period)
     return model.hold

@@ -80,7 +80,7 @@ def test_from_a_stream_to_parameters():
 
 
 def test_memory_is_bounded():
-    """Twenty million samples that never are there at once."""
+    """Two million samples of 32 MB that never are there at once."""
     count = 40
 
     def blocks():

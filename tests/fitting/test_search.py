@@ -184,6 +184,7 @@ def test_the_witness_refuses_the_wrong_hold(plant, slow, hold, verdict):
 def test_the_witness_refuses_a_structure_that_is_too_stiff(plant, fast):
     record = fast.with_noise(0.05, seed=1)
     wrong = fq.fit(plant.with_values(d=30).fix("d"), record, band=(10, 80))
+    assert wrong.witness.verdict == "lacking"
     assert wrong.verdict.grade != "trust"
     assert "another mode" in [w.kind for w in wrong.warnings], wrong.warnings
     right = fq.fit(plant.fix("d"), record, band=(10, 80))

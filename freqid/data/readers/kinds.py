@@ -60,6 +60,13 @@ def _registered(
     return register
 
 
+def existing(path: Path) -> Path:
+    """The path; FileNotFoundError where no file is."""
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    return path
+
+
 def missing(kind: str, package: str, extra: str) -> InputError:
     """The error of a file that needs a package that is not installed."""
     return InputError(f"is {kind}, which needs {package}: pip install 'freqid[{extra}]'")

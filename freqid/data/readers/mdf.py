@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.readers.kinds import Channel, damaged, missing, reads_log
+from freqid.data.readers.kinds import Channel, damaged, existing, missing, reads_log
 
 
 def _collected() -> None:
@@ -29,8 +29,7 @@ def read_mdf(path: Path) -> dict[str, Channel]:
         from asammdf import MDF
     except ImportError:
         raise missing("MDF4", "asammdf", "mdf") from None
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     found: dict[str, Channel] = {}
     try:
         with MDF(path) as file:

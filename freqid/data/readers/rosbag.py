@@ -14,13 +14,17 @@ from freqid.data.readers.kinds import Channel, damaged, missing, reads_log
 
 # entries of an array that become channels of their own
 _LONGEST = 64
+# ns, and from where on a time is one since 1970
+_SECOND, _CALENDAR = 10**9, 10**17
 
 
 @reads_log(".bag", ".mcap", ".db3")
 def read_bag(path: Path) -> dict[str, Channel]:
     """Every number of every message by topic and field, ``joint_states.velocity[2]``.
 
-    Times are those of the messages' headers, where they have one, and else those of the log.
+    Times are those of the messages' headers, where they have one, and else those of the log; in s,
+    of a clock that counts from 1970 from a whole second before the first, as a float has no digits
+    for both.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -32,7 +36,7 @@ def read_bag(path: Path) -> dict[str, Channel]:
     # a ROS 2 bag is a folder of which any file may be named
     in_folder = path.suffix != ".bag" and (path.parent / "metadata.yaml").is_file()
     where = path.parent if in_folder else path
-    rows: dict[str, tuple[list[float], dict[str, list[float]]]] = {}
+    rows: dict[str, tuple[list[int], dict[str, list[float]]]] = {}
     try:
         usual = get_typestore(Stores.LATEST)
         with AnyReader([where], default_typestore=usual) as bag:
@@ -47,23 +51,26 @@ def read_bag(path: Path) -> dict[str, Channel]:
         # rosbags has errors of many kinds for a file that is not what it says
         raise damaged("a ROS bag", error) from None
     found = {}
-    for topic, (times, fields) in rows.items():
+    base = min((min(times) for times, _ in rows.values()), default=0) // _SECOND * _SECOND
+    base = base if base > _CALENDAR else 0
+    for topic, (counts, fields) in rows.items():
+        seconds = 1e-9 * np.array([count - base for count in counts], dtype=float)
         for name, values in fields.items():
             # an array that changes its length is no channel
-            if len(values) == len(times):
-                found[f"{topic}.{name}"] = Channel(np.array(times), np.array(values))
+            if len(values) == len(counts):
+                found[f"{topic}.{name}"] = Channel(seconds, np.array(values))
     if not found:
         raise InputError("holds no numbers")
     return found
 
 
-def _time(message: Any, stamp: int) -> float:
-    """Time in s, exact to a nanosecond as long as a float is."""
+def _time(message: Any, stamp: int) -> int:
+    """Time in ns."""
     header = getattr(getattr(message, "header", None), "stamp", None)
     seconds = getattr(header, "sec", 0) or 0
     if seconds or getattr(header, "nanosec", 0):
-        return float(seconds) + 1e-9 * float(header.nanosec)  # type: ignore[union-attr]
-    return stamp * 1e-9
+        return int(seconds) * _SECOND + int(header.nanosec)  # type: ignore[union-attr]
+    return stamp
 
 
 def _numbers(value: Any, name: str) -> Iterator[tuple[str, float]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.readers.kinds import Channel, damaged, missing, reads_log
+from freqid.data.readers.kinds import Channel, damaged, existing, missing, reads_log
 
 
 @reads_log(".ulg", ".ulog")
@@ -17,8 +17,7 @@ def read_ulog(path: Path) -> dict[str, Channel]:
         from pyulog import ULog
     except ImportError:
         raise missing("a PX4 log", "pyulog", "ulog") from None
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
+    existing(path)
     try:
         log = ULog(str(path))
     except Exception as error:

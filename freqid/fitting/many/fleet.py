@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -16,10 +15,10 @@ from freqid.checks import InputError, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
+from freqid.fitting.many.identity import fingerprint
 from freqid.fitting.many.progress import Bar
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
-from freqid.models import GreyBox, model_to_dict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,8 +88,10 @@ def fit_many(
         raise InputError("records=[] holds nothing to be fitted")
     task = _Task(model, _checked(fit_options), dict(reading or {}), verdicts)
     names = list(named)
+    # a text is a path, whose file may change
+    known = {n: Path(s) if isinstance(s, str) else s for n, s in named.items()}
     groups = [names[i : i + size] for i in range(0, len(names), size)]
-    store = None if path is None else TableStore(path, _identity(task, named, size), "other fits")
+    store = None if path is None else TableStore(path, fingerprint(task, known, size), "other fits")
     if store is not None and (whole_table := store.whole()) is not None:
         return whole_table
     tables: dict[int, pd.DataFrame] = {}
@@ -180,7 +181,8 @@ def _row(task: _Task, name: str, source: Source) -> Row:
             row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
             row |= {"warnings": "; ".join(est.warnings)}
         row["error"] = ""
-    except (ValueError, OSError, ArithmeticError, np.linalg.LinAlgError) as error:
+    except Exception as error:
+        # one bad record, or a plant that fails there, must not take the other rows along
         row["error"] = f"{type(error).__name__}: {error}"
     row["seconds"] = time.perf_counter() - begin
     return row
@@ -200,31 +202,3 @@ def _columns(table: pd.DataFrame) -> list[str]:
     ]
     parameters = [c for c in table.columns if c not in ("name", *last)]
     return ["name", *parameters, *(c for c in last if c in table.columns)]
-
-
-def _identity(task: _Task, named: Mapping[str, Source], size: int) -> str:
-    """A fingerprint of what is asked: model, options and data."""
-    seen = hashlib.sha256()
-    model = task.model
-    if isinstance(model, GreyBox):
-        # the function by what it returns, its parameters by what a fit starts from
-        lin = model.linearise(model.values, [p.name for p in model.free_parameters])
-        for matrix in (*lin.at, *lin.derivative):
-            seen.update(np.ascontiguousarray(matrix).tobytes())
-        seen.update(repr(model_to_dict(model)["parameters"]).encode())
-    else:
-        seen.update(repr(model).encode())
-    seen.update(repr((sorted(task.options.items(), key=lambda o: o[0]), size)).encode())
-    seen.update(repr((sorted(task.reading.items()), task.verdicts)).encode())
-    for name, source in named.items():
-        seen.update(name.encode())
-        if isinstance(source, Record):
-            for array in (source.u, source.y):
-                seen.update(np.ascontiguousarray(array).tobytes())
-            seen.update(repr((source.dt, source.hold, source.conditions)).encode())
-        elif isinstance(source, FrequencyResponse):
-            seen.update(np.ascontiguousarray(source.response).tobytes())
-        elif Path(source).is_file():
-            stat = Path(source).stat()
-            seen.update(repr((stat.st_size, stat.st_mtime_ns)).encode())
-    return seen.hexdigest()

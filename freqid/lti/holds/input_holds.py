@@ -17,10 +17,9 @@ class InputHolds(Hold):
 
     @property
     def column(self) -> tuple[str, float | bool]:
-        """No single column remembers several holds."""
+        """No single column remembers several holds: a file has one for each input."""
         raise InputError(
-            "inputs with holds of their own cannot be kept in a file; give the record one with "
-            "with_hold(hold) before it is written"
+            "inputs with holds of their own have no column together; take that of each of .holds"
         )
 
     @staticmethod
