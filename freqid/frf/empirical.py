@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import FrequencyResponse, Record
+from freqid.data import FrequencyResponse, Record, as_records
 from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra
 
@@ -31,17 +31,12 @@ def etfe(
     >>> fq.etfe(fq.simulate(fq.two_mass(), u, dt=0.5e-3), band=(10, 80))
     <FrequencyResponse 1x1: 701 lines, 10-80 Hz, dt=0.0005 s>
     """
-    sets = [record] if isinstance(record, Record) else list(record)
+    sets = as_records(record)
     first, count = sets[0], len(sets)
     if count < first.n_inputs:
         raise InputError(
             f"record has {first.n_inputs} inputs and there are {count} experiments; the ratio of "
             "DFTs needs as many experiments as inputs: give a list, or fit a model"
-        )
-    if any(abs(r.dt / first.dt - 1) > 1e-9 or r.factor != first.factor for r in sets):
-        raise InputError(
-            f"records have sample times {sorted({r.dt for r in sets})} s, or inputs of other "
-            "rates; they must agree"
         )
     if len({r.n_samples for r in sets}) > 1:
         raise InputError(

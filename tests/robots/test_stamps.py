@@ -1,0 +1,137 @@
+"""Records whose stamps fit no grid, in whatever takes a record."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+from tests.robots.test_logs import simulated
+
+LAG = fq.first_order(b=50, a=20)
+
+
+def logged(seed=0, epoch=0.0, straight=False, noise=0.0, late=0.2, before=0.0):
+    """Both clocks jitter by 30 % of a period; the output begins ``late`` and ends before."""
+    rng = np.random.default_rng(seed)
+    u = fq.white_noise(1200, seed=seed)
+    u_time = 1e-2 * (np.arange(1200) + 0.3 * rng.random(1200))
+    y_time = late + 1.3e-2 * (np.arange(840) + 0.3 * rng.random(840))
+    y = simulated(LAG, u_time, u, y_time[y_time >= u_time[0]], straight)
+    y = np.concatenate([np.zeros((y_time < u_time[0]).sum()), y])
+    y = y + noise * rng.standard_normal(len(y))
+    return u_time + epoch, u, y_time + epoch, y
+
+
+def off(est, plant=LAG):
+    return max(abs(est[n] / plant[n] - 1) for n in ("a", "b"))
+
+
+def test_a_fit_takes_another_hold_where_it_is_told_one():
+    record = fq.Record.from_logs(*logged(straight=True))
+    assert off(fq.fit(LAG, record, hold="foh", start={"a": 30})) < 1e-8
+    assert off(fq.fit(LAG, record.with_hold("foh"), start={"a": 30})) < 1e-8
+    assert off(fq.fit(LAG, record, start={"a": 30})) > 1e-2
+
+
+def test_rest_is_when_the_input_begins():
+    record = fq.Record.from_logs(*logged())
+    assert off(fq.fit(LAG, record, initial_state="zero", start={"a": 30})) < 1e-8
+
+
+def test_times_since_1970():
+    record = fq.Record.from_logs(*logged(epoch=1.7e9))
+    # a float holds them to 0.24 µs
+    assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-4
+    u, h = fq.white_noise(1200, seed=1), 5e-4
+    fine = fq.simulate(LAG, np.repeat(u, 10), h)
+    for first in (0, 2, 7):
+        stamps = 1.7e9 + 5e-3 * np.arange(1200), 1.7e9 + fine.time[first::16]
+        record = fq.Record.from_logs(stamps[0], u, stamps[1], fine.y[first::16])
+        assert type(record) is fq.Record
+        assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-3, first
+
+
+def test_outputs_without_an_input_are_left_out():
+    early = fq.Record.from_logs(*logged(late=-0.5))
+    assert any("without an input were left out" in note for note in early.notes)
+    assert off(fq.fit(LAG, early, start={"a": 30})) < 1e-8
+    u_time, u, y_time, y = logged()
+    kept = u_time < 6
+    short = fq.Record.from_logs(u_time[kept], u[kept], y_time, y)
+    assert short.y_time[-1] < 6.02
+    assert off(fq.fit(LAG, short, start={"a": 30})) < 1e-8
+
+
+def test_a_logger_that_stopped_for_a_while_is_said():
+    u_time, u, y_time, y = logged()
+    kept = (u_time < 3) | (u_time > 3.2)
+    record = fq.Record.from_logs(u_time[kept], u[kept], y_time, y)
+    assert any("was not logged for up to 2" in note for note in record.notes)
+
+
+def test_a_jittering_clock_keeps_its_rate():
+    """Gaps of 0.2 to 1.8 periods are no missing samples."""
+    rng = np.random.default_rng(5)
+    for lost in (0.0, 0.1):
+        kept = rng.random(4000) >= lost
+        kept[[0, -1]] = True
+        t = (2e-3 * (np.arange(4000) + rng.uniform(-0.4, 0.4, 4000)))[kept]
+        other = 1e-2 * np.arange(700)
+        record = fq.Record.from_logs(t, rng.standard_normal(len(t)), other, np.sin(other))
+        said = record.notes[0]
+        assert float(said.split(": ")[1].split(" Hz")[0]) == pytest.approx(500, rel=1e-3), said
+        missing = int(said.split(", ")[-1].split(" ")[0]) if "missing" in said else 0
+        assert missing == 4000 - kept.sum()
+
+
+def test_comparisons_are_at_the_stamps(tmp_path):
+    record = fq.Record.from_logs(*logged(noise=0.02))
+    est = fq.fit(LAG, record)
+    compared = fq.compare(est, record).fit_percent[0]
+    assert compared == pytest.approx(est.fit_percent, abs=1.5)
+    assert compared > 90
+    with pytest.raises(ValueError, match="regular"):
+        fq.residual_test(est, record)
+    for estimator in (fq.etfe, fq.h1, fq.local_polynomial):
+        with pytest.raises(ValueError, match="regular"):
+            estimator(record)
+    est.report(tmp_path / "stamps.html")
+    assert (tmp_path / "stamps.html").stat().st_size > 10_000
+    record.plot()
+
+
+def test_a_record_stays_itself_whatever_looked_at_it():
+    record = fq.Record.from_logs(*logged())
+    fq.check_record(record)
+    fq.plot_record(record)
+    changed = record.with_conditions(a=20.0).slice(1.0, 5.0)
+    assert off(fq.fit(fq.first_order(b=30, a=20), changed)) < 1e-8
+    noisy = record.with_noise(0.1, seed=1)
+    assert np.std(noisy.y_logged - record.y_logged) == pytest.approx(0.1, rel=0.1)
+    assert np.std(noisy.y - record.y) < 0.15
+    for refused in (record.detrend, record.to_frame, lambda: record.with_input("v", record.u)):
+        with pytest.raises(ValueError, match="regular"):
+            refused()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"offset": "estimate"}, {"loss": "huber"}, {"weights": "noise"}, {"hold": "estimate"},
+        {"initial_state": "steady"}, {"error": "log"},
+    ],
+)  # fmt: skip
+def test_what_samples_at_their_own_times_cannot_have(options):
+    record = fq.Record.from_logs(*logged())
+    with pytest.raises(ValueError, match=r"regular|responses"):
+        fq.fit(LAG, record, **options)
+
+
+def test_a_band_limited_input_between_its_samples():
+    """Periodic and band-limited, logged at 200 Hz beside an output at 500 Hz: one grid."""
+    f, t = np.array([3.0, 17.0, 41.0]), np.arange(2000) * 1e-3
+    G = LAG.frequency_response(2 * np.pi * f).response[0, 0]
+    u = np.cos(2 * np.pi * np.outer(t, f)).sum(axis=1)
+    y = (np.exp(2j * np.pi * np.outer(t, f)) @ G).real
+    record = fq.Record.from_logs(t[::5], u[::5], t[::2], y[::2], hold="bl")
+    assert any("band-limited" in note for note in record.notes)
+    assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-6
