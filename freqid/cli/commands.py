@@ -15,11 +15,20 @@ from freqid.cli.options import Band, Columns, Dt
 from freqid.cli.terminal import folder, may_write, progress, show, write_picture, write_table
 
 
-def reproduce(out: Path = Path("out")) -> None:
-    """Every figure, table and equation of the paper, into a folder and on the screen."""
+def reproduce(out: Path = Path("out"), *, force: bool = False) -> None:
+    """Every figure, table and equation of the paper, into a folder and on the screen.
+
+    Parameters
+    ----------
+    out
+        folder for them.
+    force
+        overwrite files that are there already.
+    """
     from freqid.paper import draw, save
 
-    folder(out)
+    pictures = [f"fig{n:02d}.{kind}" for n in range(1, 11) for kind in ("png", "pdf")]
+    folder(out, ["table2.csv", "equations.csv", *pictures], force)
     with progress() as bar:
         task = bar.add_task("Table 2", total=None)
         table = fq.paper.table2()
@@ -45,11 +54,19 @@ def reproduce(out: Path = Path("out")) -> None:
     print(f"Figures 1 to 10 (.png, .pdf), table2.csv and equations.csv are in {out}/")
 
 
-def demo(out: Path = Path("data")) -> None:
-    """Write the paper's chirp experiment as CSV at both rates."""
-    folder(out)
-    s = fq.paper.study_records()
-    for name, record in (("chirp_fast.csv", s[0]), ("chirp_slow.csv", s[1])):
+def demo(out: Path = Path("data"), *, force: bool = False) -> None:
+    """Write the paper's chirp experiment as CSV at both rates.
+
+    Parameters
+    ----------
+    out
+        folder for them.
+    force
+        overwrite files that are there already.
+    """
+    names = ["chirp_fast.csv", "chirp_slow.csv"]
+    folder(out, names, force)
+    for name, record in zip(names, fq.paper.study_records(), strict=False):
         fq.write(record, out / name)
         print(f"{out / name}: {record!r}")
 

@@ -233,6 +233,7 @@ def bias(
     parameter: str | None = None,
     out: Path | None = None,
     plot: Path = Path("bias.png"),
+    force: bool = False,
 ) -> int:
     """What a chirp, decimated, makes of a model's parameters: computed, without data.
 
@@ -254,7 +255,11 @@ def bias(
         CSV file for the table.
     plot
         heat map over upper frequency and factor, one panel a hold.
+    force
+        overwrite files that are there already.
     """
+    for path in (out, plot):
+        may_write(path, [], force)
     names = ["zoh", "foh", "remembered"] if hold is None else hold
     for name in names:
         choice("--hold", name, (*holds.Hold.named, "remembered"))

@@ -43,10 +43,12 @@ def may_write(path: Path | None, read: Sequence[Path], force: bool) -> None:
         raise InputError(f"{path} is there already; give another name, or --force")
 
 
-def folder(out: Path) -> None:
-    """Make the folder; ValueError where a file stands."""
+def folder(out: Path, names: Sequence[str], force: bool) -> None:
+    """Make the folder for files of these names; ValueError where a file stands, or one of them."""
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; give a folder")
+    for name in names:
+        may_write(out / name, [], force)
     out.mkdir(parents=True, exist_ok=True)
 
 

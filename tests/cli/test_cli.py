@@ -121,6 +121,24 @@ def test_bias_prints_the_table_and_draws_the_map(tmp_path):
     assert len((tmp_path / "bias.csv").read_text().splitlines()) == 1 + 2 * 3 * 5
 
 
+def test_files_that_are_there_are_kept_unless_forced(chirp, tmp_path):
+    commands = {
+        "bias.png": ["bias", "--model", "first-order", "--chirp", 10, 80, "--factor", 2],
+        "chirp_slow.csv": ["demo", "--out", "."],
+        "fig07.pdf": ["reproduce", "--out", "."],
+        "frf.csv": ["frf", chirp / "fast.csv", "--out", "frf.csv"],
+    }
+    for name, words in commands.items():
+        (tmp_path / name).write_text("mine")
+        done = run(*words, cwd=tmp_path)
+        assert done.returncode == 2
+        assert "is there already" in done.stderr
+        assert "--force" in done.stderr
+        assert (tmp_path / name).read_text() == "mine"
+    assert run(*commands["chirp_slow.csv"], "--force", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "chirp_slow.csv").stat().st_size > 1000
+
+
 def test_bias_refuses_bad_input(tmp_path):
     for wrong in (["80", "10", "--factor", "2"], ["10", "2000", "--factor", "2"],
                   ["10", "80", "--factor", "2.5"]):  # fmt: skip

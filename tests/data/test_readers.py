@@ -98,6 +98,20 @@ def test_what_is_written_remembers_its_hold(record, tmp_path, kind):
     assert np.array_equal(back.y, slow.y)
 
 
+@pytest.mark.parametrize("kind", ["csv", "parquet", "npz"])
+def test_what_is_written_remembers_conditions_and_each_inputs_hold(record, tmp_path, kind):
+    made = fq.Record(
+        np.column_stack([record.u, np.sign(record.y)]), record.y, 2e-3,
+        hold={"torque": "zoh", "coulomb": "bl"}, input_names=["torque", "coulomb"],
+    ).with_conditions(q=0.3, load=-5.0).decimate(2, keep_input=True)  # fmt: skip
+    fq.write(made, tmp_path / f"arm.{kind}")
+    back = fq.read(tmp_path / f"arm.{kind}", ["torque", "coulomb"], "y")
+    assert back.conditions == {"q": 0.3, "load": -5.0}
+    assert back.hold == made.hold
+    picked = fq.Record.from_frame(made.to_frame().drop(columns="coulomb"), "torque", "y")
+    assert picked.hold == fq.ZeroOrderHold(2e-3)
+
+
 def test_matrices_become_channels(tmp_path):
     scipy.io.savemat(tmp_path / "m.mat", {"u": np.ones((9, 2)), "y": np.arange(9.0), "dt": 0.1})
     back = fq.read(tmp_path / "m.mat", inputs=["u1", "u2"], outputs="y")
@@ -134,6 +148,15 @@ def test_gaps_jitter_and_blanks_are_errors_unless_resampled(tmp_path):
     shuffled.to_csv(tmp_path / "back.csv", index=False)
     with pytest.raises(ValueError, match="increase"):
         fq.read(tmp_path / "back.csv", resample=True)
+
+
+def test_steps_of_seconds_are_said(tmp_path):
+    path = tmp_path / "t.csv"
+    pd.DataFrame({"time": 10 * np.arange(50), "u": 1.0, "y": np.arange(50.0)}).to_csv(path)
+    assert any("units={'time': 'ms'}" in note for note in fq.read(path, "u", "y").notes)
+    told = fq.read(path, "u", "y", units={"time": "ms"})
+    assert told.dt == pytest.approx(0.01)
+    assert not any("units=" in note for note in told.notes)
 
 
 def test_pickles_are_not_opened(tmp_path):

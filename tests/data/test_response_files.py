@@ -138,6 +138,14 @@ def test_refused(tmp_path):
     path.write_text("f [furlong],re,im\n" + table([F, F, F]))
     with pytest.raises(ValueError, match="furlong"):
         fq.read_response(path)
+    path.write_text("f,magnitude,phase\n1,-3,-90\n2,-9,-120\n3,-20,-160\n")
+    with pytest.raises(ValueError, match=r"below zero.*magnitude \[dB\]"):
+        fq.read_response(path)
+    path.write_text("f,magnitude,phase\n1,3,-0.5\n2,2,-1.2\n3,1,-3\n")
+    with pytest.raises(ValueError, match=r"phase \[deg\] or phase \[rad\]"):
+        fq.read_response(path)
+    path.write_text("f,magnitude,phase [Grad]\n1,3,-0.5\n2,2,-1.2\n3,1,-180\n")
+    assert fq.read_response(path).response[0, 0, 2] == pytest.approx(-1)
     with pytest.raises(FileNotFoundError):
         fq.read_response(tmp_path / "none.s1p")
     with pytest.raises(ValueError, match="twice"):

@@ -49,6 +49,23 @@ def test_files(tmp_path):
     assert fq.open(tmp_path / "log.h5").load(stop=100).n_samples == 100
 
 
+def test_a_file_tells_its_hold_and_its_time(tmp_path):
+    import pandas as pd
+
+    fq.write(RECORD.with_hold("foh"), tmp_path / "log.parquet")
+    assert fq.open(tmp_path / "log.parquet").hold == fq.FirstOrderHold(DT)
+    frame = pd.DataFrame({"time": RECORD.time, "u": RECORD.u, "y": RECORD.y})
+    dated = frame.assign(time=pd.Timestamp("2026-01-02") + pd.to_timedelta(frame["time"], "s"))
+    dated.to_parquet(tmp_path / "dated.parquet")
+    assert fq.open(tmp_path / "dated.parquet", "u", "y").dt == pytest.approx(DT)
+    frame.drop(index=range(50, 900)).to_parquet(tmp_path / "gap.parquet")
+    with pytest.raises(ValueError, match="time is not even"):
+        fq.open(tmp_path / "gap.parquet", "u", "y")
+    frame.assign(time="noon").to_parquet(tmp_path / "noon.parquet")
+    with pytest.raises(ValueError, match=r"noon\.parquet: the time holds neither"):
+        fq.open(tmp_path / "noon.parquet", "u", "y")
+
+
 def test_generators_and_integers():
     def blocks():
         for start in range(0, N, 1234):

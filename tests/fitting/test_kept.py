@@ -62,6 +62,16 @@ def test_what_is_kept(kind, tmp_path):
     assert fq.load(tmp_path / "again.json").verdict == est.verdict
 
 
+def test_a_hold_that_was_assumed_is_assumed_again(tmp_path):
+    """A fit that took the slow period for the hold's compares as it did."""
+    slow = RECORD.decimate(5)
+    est = fq.fit(fq.two_mass(), slow, hold="zoh")
+    est.save(tmp_path / "wrong.json")
+    kept = fq.load(tmp_path / "wrong.json")
+    for other in (slow, RECORD):
+        assert np.array_equal(fq.compare(kept, other).simulated, fq.compare(est, other).simulated)
+
+
 def test_the_file_is_strict_json(tmp_path):
     ESTIMATES["wrong"].save(tmp_path / "est.json")
 

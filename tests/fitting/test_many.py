@@ -1,5 +1,6 @@
 """Many fits: rows, failures, resumption, lost workers, alarms, pictures."""
 
+import dataclasses
 import os
 import signal
 from pathlib import Path
@@ -119,6 +120,59 @@ def test_an_interrupted_job_goes_on(tmp_path, monkeypatch):
     assert len(again) == 6
     assert path.exists()
     assert [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
+
+
+def test_any_change_is_another_job(tmp_path):
+    records, path = runs(3, samples=100), tmp_path / "t.parquet"
+    asked = {"n_jobs": 1, "verdicts": False}
+    fq.fit_many(LAG, records, path, **asked)
+    r = records[1]
+    changed = [
+        (LAG.with_values(a=70), records, {}),
+        (LAG.with_bounds(a=(1, 1000)), records, {}),
+        (LAG, [records[0], r.with_hold("foh"), records[2]], {}),
+        (LAG, [records[0], r.with_conditions(a=60.0), records[2]], {}),
+        (LAG, [records[0], dataclasses.replace(r, reference=r.u), records[2]], {}),
+        (LAG, [records[0], r.with_noise(1e-9), records[2]], {}),
+        (LAG, records, {"band": (1, 100)}),
+        (LAG, records, {"weights": [np.ones((1, 51))]}),
+        (LAG, records, {"reading": {"dt": 1.0}}),
+    ]
+    for model, data, options in changed:
+        with pytest.raises(ValueError, match="other fits"):
+            fq.fit_many(model, data, path, **asked, **options)
+    first = fq.fit_many(LAG, records, tmp_path / "w.parquet", weights=[np.ones((1, 51))], **asked)
+    weights = [np.linspace(1, 2, 51)[None]]
+    with pytest.raises(ValueError, match="other fits"):
+        fq.fit_many(LAG, records, tmp_path / "w.parquet", weights=weights, **asked)
+    again = fq.fit_many(LAG, records, tmp_path / "w.parquet", weights=[np.ones((1, 51))], **asked)
+    pd.testing.assert_frame_equal(first, again)
+
+
+def test_a_plant_that_differs_elsewhere_is_another(tmp_path):
+    def plant(power):
+        def matrices(a):
+            return [[-(60 * (a / 60) ** power)]], [[1.0]], [[1.0]], None
+
+        return fq.GreyBox(matrices, [fq.Parameter("a", 60.0)])
+
+    records, path = runs(2, samples=100), tmp_path / "t.parquet"
+    fq.fit_many(plant(1), records, path, n_jobs=1, verdicts=False)
+    with pytest.raises(ValueError, match="other fits"):
+        fq.fit_many(plant(3), records, path, n_jobs=1, verdicts=False)
+
+
+def test_a_plant_that_fails_is_a_row():
+    def matrices(a, load):
+        if load > 1:
+            raise RuntimeError("no licence")
+        return [[-a]], [[100.0]], [[1.0]], None
+
+    plant = fq.GreyBox(matrices, [fq.Parameter("a", 60.0)], conditions={"load": 0.0})
+    first, second = runs(2)
+    table = fq.fit_many(plant, [first, second.with_conditions(load=2.0)], n_jobs=1)
+    assert table["error"][0] == ""
+    assert "no licence" in table["error"][1]
 
 
 def test_on_a_cluster(tmp_path):

@@ -124,6 +124,10 @@ def test_ulog(measured):
     assert (record.y_logged[:, 0] == raw["vehicle_angular_velocity"]["xyz[0]"][seen]).all()
     assert any("without an input were left out" in note for note in record.notes)
     assert any("missing" in note for note in record.notes)
+    with pytest.raises(ValueError, match="time='t' is for tables"):
+        fq.read(path, "actuator_controls_0.control[0]", gyro, time="t")
+    with pytest.raises(ValueError, match=r"dt=0\.01 is for tables"):
+        fq.read(path, "actuator_controls_0.control[0]", gyro, dt=0.01)
     with pytest.raises(ValueError, match="name outputs="):
         fq.read(path, "actuator_controls_0.control[0]")
     with pytest.raises(ValueError, match="several clocks"):
