@@ -12,14 +12,20 @@ from typing import TYPE_CHECKING, overload
 
 from freqid.checks import InputError, unknown
 from freqid.data.logged import kind_of, logged_record
-from freqid.data.readers.kinds import LOGS, READERS, WRITERS, existing
-from freqid.data.readers.table import named
+from freqid.data.readers.kinds import LOGS, WRITERS
+from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
+from freqid.data.remembered import kept_in_files
+from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+# what a record says of samples that are not numbers, where none is there yet
+_REPAIR = "cut the record there with slice() or repair the samples first"
 
 
 def read(
@@ -88,8 +94,14 @@ def read(
     frame = frame_of(path, sep, decimal, columns)
     found = frame.attrs.get("found", f"columns {', '.join(map(str, frame.columns))}")
     try:
+        for name in units or {}:
+            if name not in (*frame.columns, "time", "reference"):
+                raise InputError(unknown("units", name, [str(c) for c in frame.columns]))
         told = {**frame.attrs.get("units", {}), **(units or {})}
         frame, said = with_time(frame, time, told, dt)
+        if stop is not None and "time" in frame.columns:
+            # what is cut off may be damaged
+            frame = frame[~(frame["time"] > frame["time"].iloc[0] + stop)]
         record = Record.from_frame(
             frame, _known(inputs, frame), _known(outputs, frame), dt, hold,
             _known(reference, frame), units=told, resample=resample,
@@ -97,37 +109,8 @@ def read(
         notes = (*frame.attrs.get("notes", ()), *said, *record.notes)
         return _cut(dataclasses.replace(record, notes=notes), start, stop, detrend)
     except InputError as error:
-        raise InputError(f"{path}: {error} (found {found})") from None
-
-
-def frame_of(
-    path: Path,
-    sep: str | None = None,
-    decimal: str | None = None,
-    columns: Sequence[str] | None = None,
-) -> pd.DataFrame:
-    """The table of a file, not yet told what is what."""
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(f"{path}: {unknown('suffix', path.suffix, [*READERS, *LOGS])}")
-    existing(path)
-    if path.stat().st_size == 0:
-        raise InputError(f"{path} is empty; expected columns of samples under a line of names")
-    asked = {k: v for k, v in (("sep", sep), ("decimal", decimal)) if v is not None}
-    if asked and reader is not READERS[".csv"]:
-        raise InputError(f"{path}: {next(iter(asked))}= is for text tables")
-    try:
-        frame = reader(path, **asked)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    if columns is not None:
-        if len(columns) != frame.shape[1]:
-            raise InputError(
-                f"{path}: columns names {len(columns)} and the table has {frame.shape[1]}"
-            )
-        frame.columns = list(columns)
-        frame.attrs.pop("notes", None)
-    return frame
+        text = str(error).replace(_REPAIR, "stop= cuts the file before, resample=True fills gaps")
+        raise InputError(f"{path}: {text} (found {found})") from None
 
 
 def _no_table(path: Path, given: Mapping[str, object]) -> None:
@@ -169,14 +152,17 @@ def _cut(record: Record, start: float | None, stop: float | None, detrend: int |
 def write(record: Record, path: str | Path) -> None:
     """Write a record to the file ``path`` that ``read`` reads: .csv, .parquet or .npz.
 
-    Raises ValueError for another suffix.
+    Holds, conditions, units (``torque [N m]``) and what decimation has folded are kept in the file.
+    Folders that are missing are made. Raises ValueError for another suffix.
     """
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in WRITERS:
         raise InputError(f"{path}: {unknown('suffix', path.suffix, WRITERS)}")
+    frame = record.to_frame().assign(**kept_in_files(record))
+    frame.columns = [named_with(str(c), record.units.get(str(c), "")) for c in frame.columns]
     with whole_file(path) as beside:
-        WRITERS[kind](record.to_frame(), beside)
+        WRITERS[kind](frame, beside)
 
 
 @contextmanager

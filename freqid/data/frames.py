@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, positive, unknown
-from freqid.data.remembered import is_kept, kept_columns, kept_conditions, kept_hold
+from freqid.data.regular_time import on_a_grid, printed_period
+from freqid.data.remembered import (
+    is_kept,
+    kept_aliased,
+    kept_channels,
+    kept_columns,
+    kept_conditions,
+    kept_hold,
+)
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -29,14 +37,17 @@ def record_of(
     resample: bool,
 ) -> Record:
     """The record of that kind that a frame holds: columns to channels, time to periods."""
-    notes: list[str] = []
-    if resample:
-        frame, notes = _regular(frame)
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
-    step = _sample_time(frame, dt)
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
-    u_names, y_names = _channels(signals, inputs, outputs, reference)
+    told = kept_channels(frame, signals, reference)
+    u_names, y_names = _channels(signals, inputs, outputs, reference, told)
+    between = kept_hold(frame, u_names) if hold is None else hold
+    notes: list[str] = []
+    if resample:
+        held = set(u_names) if between is None or between == "zoh" else set()
+        frame, notes = _resampled(frame, signals, held)
+    step = _sample_time(frame, dt, notes)
     u, y = (_numbers(frame, names) for names in (u_names, y_names))
     commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
 
@@ -47,13 +58,14 @@ def record_of(
         u[:, 0] if len(u_names) == 1 else u,
         y[:, 0] if len(y_names) == 1 else y,
         dt=step * factor,
-        hold=kept_hold(frame, u_names) if hold is None else hold,
+        hold=between,
         input_dt=step,
         input_names=u_names,
         output_names=y_names,
         units={k: v for k, v in (units or {}).items() if k in named},
         reference=None if commanded is None else commanded[::factor],
         notes=tuple(notes),
+        aliased=kept_aliased(frame),
         conditions=kept_conditions(frame),
     )
 
@@ -74,46 +86,21 @@ def samples_frame(record: Record) -> pd.DataFrame:
     return pd.DataFrame(columns, index=pd.Index(np.round(record.input_time, 12), name="time"))
 
 
-def _regular(frame: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
-    """The frame on a regular time, blanks filled, by straight lines; and what was done, in words.
-
-    The step is the median one. Raises ValueError for a frame without a time, or whose times do not
-    increase.
-    """
+def _resampled(
+    frame: pd.DataFrame, signals: Sequence[str], held: Collection[str]
+) -> tuple[pd.DataFrame, list[str]]:
+    """The frame on a regular time, and what was done to it, in words."""
     import pandas as pd
 
     times = _times(frame)
     if times is None:
         raise InputError("resample=True needs a column or index called 'time'")
-    gaps = np.diff(times)
-    if not np.isfinite(times).all() or (gaps <= 0).any():
-        raise InputError("column 'time' must increase; sort or repair the rows")
-    step = float(f"{np.median(gaps):.6g}")
-    grid = times[0] + step * np.arange(round((times[-1] - times[0]) / step) + 1)
-    notes = []
-    wide = int((gaps > 1.5 * step).sum())
-    if wide:
-        notes.append(f"{wide} gaps in time were filled by straight lines, the widest of "
-                     f"{gaps.max():g} s")  # fmt: skip
-    jitter = np.abs(gaps[gaps <= 1.5 * step] - step).max(initial=0)
-    if jitter > 1e-6 * step:
-        notes.append(f"jitter of up to {jitter:g} s was taken off by straight lines")
-    new: dict[str, Any] = {"time": grid}
-    for name in frame.columns:
-        if name == "time":
-            continue
-        x = _numbers(frame, [name])[:, 0]
-        there = np.isfinite(x)
-        if not there.any():
-            raise InputError(f"column {name!r} has no samples at all; leave it out")
-        missing = len(x) - int(there.sum())
-        if missing:
-            notes.append(f"{missing} missing samples of {name!r} were filled by straight lines")
-        new[str(name)] = np.interp(grid, times[there], x[there])
-    return pd.DataFrame(new), notes
+    new, notes = on_a_grid(times, {s: _numbers(frame, [s])[:, 0] for s in signals}, held)
+    kept = {str(c): frame[c].iloc[0] for c in frame.columns if is_kept(c)}
+    return pd.DataFrame(new).assign(**kept), notes
 
 
-def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
+def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> float:
     times = _times(frame)
     if times is None:
         if dt is None:
@@ -123,6 +110,14 @@ def _sample_time(frame: pd.DataFrame, dt: float | None) -> float:
         return positive("dt", dt, "s")
     gaps = np.diff(times)
     step = float(times[-1] - times[0]) / (len(times) - 1)
+    printed = printed_period(times)
+    if printed is not None:
+        period, digit = printed
+        notes.append(f"the times are rounded to {digit:g} s: taken as even, every {period:.9g} s")
+        if dt is None:
+            return period
+        if abs(positive("dt", dt, "s") / period - 1) < 1e-3:
+            return float(dt)
     if not np.isfinite(times).all() or (gaps <= 0).any():
         row = int(np.argmax(~(gaps > 0))) + 1
         raise InputError(f"column 'time' does not increase in row {row}; sort or repair the rows")
@@ -163,6 +158,7 @@ def _channels(
     inputs: Sequence[str] | str | None,
     outputs: Sequence[str] | str | None,
     reference: str | None,
+    told: tuple[list[str], list[str]] | None,
 ) -> tuple[list[str], list[str]]:
     given: list[list[str] | None] = []
     for argument, value in (("inputs", inputs), ("outputs", outputs), ("reference", reference)):
@@ -175,6 +171,8 @@ def _channels(
         given.append(names)
     u, y, r = given
     rest = [s for s in signals if s not in (u or []) + (y or []) + (r or [])]
+    if u is None and y is None and told is not None:
+        return told
     if u is None and y is None:
         if set(rest) >= {"u", "y"}:
             return ["u"], ["y"]

@@ -10,8 +10,11 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, unknown
 from freqid.data.logs import record_from_logs
-from freqid.data.readers.kinds import LOGS, READERS, Channel, existing
+from freqid.data.readers.kinds import LOGS, Channel
 from freqid.data.record import Record
+from freqid.data.remembered import is_kept
+from freqid.data.tables import frame_of
+from freqid.data.time_column import with_time
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -58,21 +61,21 @@ def log_of(path: str | Path) -> Mapping[str, Channel]:
             return LOGS[kind](path)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
-    if kind not in READERS:
-        raise InputError(f"{path}: {unknown('suffix', kind, [*READERS, *LOGS])}")
-    existing(path)
+    frame = frame_of(path)
+    units = frame.attrs.get("units", {})
     try:
-        frame = READERS[kind](path)
+        frame, _ = with_time(frame, None, units, None)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     times = frame["time"].to_numpy() if "time" in frame else np.full(len(frame), np.nan)
     found = {}
     for name in frame.columns:
         x = frame[name].to_numpy()
-        if name == "time" or x.dtype.kind not in "fiub":
+        if name == "time" or is_kept(name) or x.dtype.kind not in "fiub":
             continue
         there = np.isfinite(x.astype(float))
-        found[str(name)] = Channel(times[there], x[there].astype(float))
+        unit = units.get(str(name), "")
+        found[str(name)] = Channel(times[there], x[there].astype(float), unit)
     return found
 
 

@@ -1,8 +1,8 @@
-"""What a file keeps of a record beside its samples: the hold of its inputs and its conditions."""
+"""What a file keeps of a record beside its samples: holds, conditions, folded power."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,17 +16,21 @@ if TYPE_CHECKING:
 
 # a column "condition q" holds what q was set to
 _CONDITION = "condition "
+# the part of the power that decimation has folded, and how many of several channels are inputs
+_ALIASED, _INPUTS = "aliased share", "input count"
+_ROUNDING = 1e-9
 
 
 def is_kept(column: object) -> bool:
     """Whether a column is about the record and no signal."""
     name = str(column)
-    return name.startswith(_CONDITION) or name.split(" ")[0] in _holds()
+    other = name in (_ALIASED, _INPUTS) or name.startswith(_CONDITION)
+    return other or name.split(" ")[0] in _holds()
 
 
-def kept_columns(record: Record) -> dict[str, Any]:
-    """Columns of one value each: holds that a name does not say, and conditions."""
-    kept: dict[str, Any] = {}
+def kept_columns(record: Record) -> dict[str, float | bool]:
+    """Columns of one value each, of what is not as usual."""
+    kept: dict[str, float | bool] = {}
     if isinstance(record.hold, InputHolds):
         for name, own in zip(record.input_names, record.hold.holds, strict=True):
             column, value = own.column
@@ -35,6 +39,16 @@ def kept_columns(record: Record) -> dict[str, Any]:
         column, value = record.hold.column
         kept[column] = value
     return kept | {f"{_CONDITION}{name}": value for name, value in record.conditions.items()}
+
+
+def kept_in_files(record: Record) -> dict[str, float | bool]:
+    """Columns that a file has beside those of ``to_frame``."""
+    kept: dict[str, float | bool] = {}
+    if record.n_inputs + record.n_outputs > 2:
+        kept[_INPUTS] = record.n_inputs
+    if record.aliased > _ROUNDING:
+        kept[_ALIASED] = record.aliased
+    return kept
 
 
 def kept_hold(frame: pd.DataFrame, inputs: list[str]) -> Hold | dict[str, Hold] | None:
@@ -55,6 +69,21 @@ def kept_conditions(frame: pd.DataFrame) -> dict[str, float]:
     """The conditions that a table remembers."""
     names = [str(c) for c in frame.columns if str(c).startswith(_CONDITION)]
     return {n.removeprefix(_CONDITION): _one(frame, n) for n in names}
+
+
+def kept_aliased(frame: pd.DataFrame) -> float:
+    """The part of the power that had been folded when the table was written."""
+    return _one(frame, _ALIASED) if _ALIASED in frame.columns else 0.0
+
+
+def kept_channels(
+    frame: pd.DataFrame, signals: list[str], reference: str | None
+) -> tuple[list[str], list[str]] | None:
+    """Inputs and outputs of a table that was written from a record; None of another."""
+    if _INPUTS not in frame.columns:
+        return None
+    count, own = round(_one(frame, _INPUTS)), [s for s in signals if s != reference]
+    return own[:count], own[count:]
 
 
 def _holds() -> dict[str, type[Hold]]:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError
-from freqid.data.files import frame_of
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.kinds import damaged, existing, first_line, missing
+from freqid.data.tables import frame_of
 
 if TYPE_CHECKING:
     import pandas as pd

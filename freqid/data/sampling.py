@@ -35,12 +35,14 @@ def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: float | None) -> Floa
     if (std is None) == (snr is None):
         raise InputError(f"std={std!r}, snr={snr!r}: give one of them")
     if snr is not None:
+        if not y.std(axis=0).all():
+            raise InputError(f"snr={snr!r}: an output is constant; give std, the noise's own size")
         return y.std(axis=0) * 10 ** (-finite("snr", snr) / 20)
     sizes = np.atleast_1d(np.asarray(std, dtype=float))
     if sizes.shape not in ((1,), (p,)) or not np.isfinite(sizes).all() or (sizes < 0).any():
         raise InputError(
-            f"std={std!r} must not be negative: expected a finite number, or one for each of {p} "
-            "outputs"
+            f"std={std!r}: expected a finite number that must not be negative, or one for each of "
+            f"{p} outputs"
         )
     return np.broadcast_to(sizes, (p,))
 

@@ -30,7 +30,10 @@ class Signals:
         return plot_record(self, ax)  # type: ignore[arg-type]
 
     def __add__(self, other: object) -> list[object]:
-        """Experiments one after the other, as ``fit`` takes them: ``first + second``."""
+        """Experiments one after the other, as ``fit`` takes them: ``first + second`` is a list.
+
+        They may differ in rate, length and conditions; what takes the list says where it minds.
+        """
         if isinstance(other, Signals):
             return [self, other]
         return [self, *other] if isinstance(other, list) else NotImplemented

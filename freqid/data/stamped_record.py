@@ -121,6 +121,8 @@ class StampedRecord(Record):
         first = max(int(np.searchsorted(self.u_time, low, side="right")) - 1, 0)
         u = np.zeros(len(self.u_time), bool)
         u[first:] = self.u_time[first:] < high
+        # a straight line inside ends at the first sample after
+        u[min(first + int(u[first:].sum()), len(u) - 1)] = True
         return self._from(
             part, u_time=self.u_time[u], u_logged=self.u_logged[u], y_time=self.y_time[y],
             y_logged=self.y_logged[y],

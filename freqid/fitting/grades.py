@@ -81,8 +81,9 @@ def _supported(est: Estimate, std: np.ndarray) -> str:
             relative = np.abs(std / est.values)
         if np.isfinite(relative).any():
             worst = int(np.nanargmax(np.where(np.isfinite(relative), relative, np.nan)))
-            text += f"; the least certain parameter, {est.names[worst]}, is known to "
-            text += f"{100 * relative[worst]:.2g} %"
+            name, size = est.names[worst], f"{100 * relative[worst]:.2g} %"
+            text += f"; the least certain parameter, {name}, is known to {size}"
+            text += ": the data do not tell it from zero" if relative[worst] > 0.5 else ""
     if est.witness.verdict == "complete":
         text += f"; {est.witness.sentence}"
     return text

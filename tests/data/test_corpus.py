@@ -1,6 +1,7 @@
 """Files as programs and loggers write them: each is read right, or refused with the cure."""
 
 import bz2
+import dataclasses
 import gzip
 import lzma
 
@@ -207,3 +208,82 @@ def test_the_error_lists_what_was_found(tmp_path):
     path.write_text("a;b;c;d\n" + rows(";", columns=[U, Y, U, Y]))
     with pytest.raises(ValueError, match="found columns a, b, c, d, parted by ';'"):
         fq.read(path, "a", "b")
+
+
+def test_quotients_are_names_and_units(tmp_path):
+    """Headings as DIN 1338 and ISO 80000 write them."""
+    path = tmp_path / "din.csv"
+    path.write_text(
+        "time/ms,M/Nm,v/(rad/s)\n" + "".join(f"{2 * k},{k % 3},{k}\n" for k in range(20))
+    )
+    record = fq.read(path)
+    assert record.dt == pytest.approx(2e-3)
+    assert record.units == {"M": "Nm", "v": "rad/s"}
+    with pytest.raises(ValueError, match=r"units='tyme'.*did you mean 'time'"):
+        fq.read(path, units={"tyme": "ms"})
+
+
+def test_quoted_decimal_commas(tmp_path):
+    path = tmp_path / "sheet.csv"
+    rows = "".join(f'"{0.002 * k:.3f}","{k % 3 / 2}","{0.01 * k:.2f}"\n'.replace(".", ",")
+                   for k in range(30))  # fmt: skip
+    path.write_text('"t","u","y"\n' + rows)
+    record = fq.read(path)
+    assert record.dt == pytest.approx(2e-3)
+    assert record.y[-1] == pytest.approx(0.29)
+
+
+@pytest.mark.parametrize("rate", [60, 128, 400, 600, 800, 2000])
+@pytest.mark.parametrize("how", [np.round, np.floor])
+def test_times_rounded_to_milliseconds(rate, how, tmp_path):
+    """The commonest log of all: k/rate in whole ms; at 2 kHz two rows share a stamp."""
+    lag = fq.first_order(b=50, a=20)
+    true = fq.simulate(lag, fq.white_noise(3 * rate, seed=1), 1 / rate)
+    frame = pd.DataFrame({"t_ms": how(1e3 * true.time + 0.3).astype(int), "u": true.u, "y": true.y})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    for options in ({}, {"resample": True}, {"dt": 1 / rate}):
+        record = fq.read(tmp_path / "log.csv", **options)
+        assert record.dt == pytest.approx(1 / rate, rel=1e-8)
+        assert np.allclose(record.y, true.y, rtol=0, atol=1e-9)
+        assert any("rounded to 0.001 s" in n for n in record.notes) or options
+        assert fq.fit(lag, record)["b"] == pytest.approx(50, rel=1e-6)
+    # a row that is missing is no rounding, where a period is longer than a digit
+    if rate < 500:
+        frame.drop(index=range(40, 90)).to_csv(tmp_path / "gap.csv", index=False)
+        with pytest.raises(ValueError, match="not uniform"):
+            fq.read(tmp_path / "gap.csv")
+
+
+def test_what_is_cut_off_may_be_damaged(tmp_path):
+    t = 0.01 * np.arange(100)
+    frame = pd.DataFrame({"time": t, "u": np.sin(9 * t), "y": np.cos(9 * t)})
+    frame.loc[60, "y"] = np.nan
+    frame.to_csv(tmp_path / "r.csv", index=False)
+    with pytest.raises(ValueError, match="stop= cuts the file before, resample=True fills"):
+        fq.read(tmp_path / "r.csv")
+    assert fq.read(tmp_path / "r.csv", stop=0.5).n_samples == 50
+
+
+def test_units_names_and_folded_power_survive(tmp_path):
+    lag = fq.first_order(b=50, a=20)
+    slow = fq.simulate(lag, fq.white_noise(4000), 1e-3, input_names=["joint 1 [rad]"])
+    slow = dataclasses.replace(slow.decimate(10), units={"y": "m/s"})
+    for kind in ("csv", "parquet", "npz"):
+        fq.write(slow, tmp_path / f"r.{kind}")
+        back = fq.read(tmp_path / f"r.{kind}")
+        assert back.input_names == ("joint 1 [rad]",)
+        assert back.units == {"y": "m/s"}
+        assert back.aliased == pytest.approx(slow.aliased)
+        assert fq.fit(lag, back).verdict.grade == fq.fit(lag, slow).verdict.grade != "trust"
+    two = fq.Record(np.ones((9, 2)), np.arange(18.0).reshape(9, 2), 0.1)
+    fq.write(two, tmp_path / "two.csv")
+    assert fq.read(tmp_path / "two.csv").input_names == ("u1", "u2")
+
+
+def test_channels_know_their_units(tmp_path):
+    (tmp_path / "d.csv").write_text(
+        "t [ms];M [N m];v\n" + "".join(f"{k};1;{k}\n" for k in range(9))
+    )
+    found = fq.channels(tmp_path / "d.csv")
+    assert found["unit"].to_dict() == {"M": "N m", "v": ""}
+    assert found["rate"]["v"] == pytest.approx(1000)

@@ -162,6 +162,21 @@ def test_a_plant_that_differs_elsewhere_is_another(tmp_path):
         fq.fit_many(plant(3), records, path, n_jobs=1, verdicts=False)
 
 
+def test_a_table_inside_a_plant_is_part_of_it(tmp_path):
+    table = {0: 1.0, 1: 2.0, 2: 3.0}
+
+    def matrices(a, mode):
+        return [[-a * table[mode]]], [[100.0]], [[1.0]], None
+
+    plant = fq.GreyBox(matrices, [fq.Parameter("a", 60.0)], conditions={"mode": 0})
+    records = [r.with_conditions(mode=m) for m, r in enumerate(runs(3))]
+    fq.fit_many(plant, records, tmp_path / "t.parquet", n_jobs=1, verdicts=False)
+    fq.fit_many(plant, records, tmp_path / "t.parquet", n_jobs=1, verdicts=False)
+    table[2] = 6.0
+    with pytest.raises(ValueError, match="other fits"):
+        fq.fit_many(plant, records, tmp_path / "t.parquet", n_jobs=1, verdicts=False)
+
+
 def test_a_plant_that_fails_is_a_row():
     def matrices(a, load):
         if load > 1:

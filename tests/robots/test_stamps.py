@@ -135,3 +135,16 @@ def test_a_band_limited_input_between_its_samples():
     record = fq.Record.from_logs(t[::5], u[::5], t[::2], y[::2], hold="bl")
     assert any("band-limited" in note for note in record.notes)
     assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-6
+
+
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
+def test_a_part_has_the_input_to_its_end(hold):
+    """Slow stamps of an input that runs straight to the next, which comes after the cut."""
+    rng = np.random.default_rng(2)
+    u = fq.white_noise(60, seed=2)
+    u_time = 5e-2 * (np.arange(60) + 0.2 * rng.random(60))
+    y_time = 0.02 + 5e-3 * (np.arange(560) + 0.2 * rng.random(560))
+    y = simulated(LAG, u_time, u, y_time, straight=hold == "foh")
+    record = fq.Record.from_logs(u_time, u, y_time, y, hold=hold)
+    for part in (record, record.slice(0.5, 2.03), record.slice(0.3), record.slice(None, 1.337)):
+        assert off(fq.fit(LAG, part, start={"a": 30})) < 1e-7

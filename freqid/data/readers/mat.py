@@ -18,13 +18,14 @@ if TYPE_CHECKING:
 def read_mat(path: Path) -> pd.DataFrame:
     """The variables of a MAT file as columns; ValueError for a damaged one."""
     import scipy.io
+    from scipy.io.matlab import MatReadError
 
     try:
         content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True)
     except NotImplementedError:
         # version 7.3 is HDF5
         return READERS[".h5"](path)
-    except (ValueError, TypeError, OSError, IndexError) as error:
+    except (ValueError, TypeError, OSError, IndexError, MatReadError) as error:
         raise damaged("a MAT file", error) from None
     arrays: dict[str, Any] = {}
     for name, value in content.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,10 @@ _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
+_UNIT = (
+    r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2"
+    r"|m/s²|g|Hz|Pa|bar|K|°C|%|counts?)"
+)
 _BLANK = {"true", "false", "", "nan", "na", "n/a", "null", "none", "-nan", "inf", "-inf"}
 _STAMP = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([T ]?\d{0,2}:?\d{0,2}:?\d{0,2}[.,]?\d*)?.*")
 
@@ -35,10 +40,11 @@ class Layout:
 def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) -> Layout:
     """The layout of a text table; ValueError where no lines of numbers can be found."""
     shown = [_uncommented(line) for line in lines]
+    quoted = any('"' in line for line in shown[-60:])
     best: tuple[float, int, Layout] | None = None
     for mark in [separator] if separator else _SEPARATORS:
         for sign in [decimal] if decimal else (".", ","):
-            if mark == sign:
+            if mark == sign and not quoted:
                 continue
             found = _tried(shown, mark, sign)
             if found is not None and (best is None or found[:2] > best[:2]):
@@ -56,7 +62,11 @@ def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) 
 
 def parted(line: str, separator: str) -> list[str]:
     """Cells of a line."""
-    cells = line.split() if separator == " " else line.rstrip("\r\n").split(separator)
+    if separator != " " and '"' in line:
+        # a quoted cell may hold the separator
+        cells = next(csv.reader([line.rstrip("\r\n")], delimiter=separator), [])
+    else:
+        cells = line.split() if separator == " " else line.rstrip("\r\n").split(separator)
     return [c.strip().strip('"').strip("'") for c in cells]
 
 
@@ -92,10 +102,20 @@ def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[
 
 def named(text: str) -> tuple[str, str]:
     """A name and the unit in brackets behind it."""
-    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", text.strip())
+    plain = text.strip()
+    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", plain)
     if found and found[1] and not re.fullmatch(r"\d+", found[2]):
-        return found[1].strip(), found[2].strip()
-    return text.strip(), ""
+        # DIN 1338 and ISO 80000 write "v/(m/s)"
+        return found[1].rstrip(" /"), found[2].strip() if found[2].strip() != "-" else ""
+    quotient = re.fullmatch(rf"(.+?)\s*/\s*{_UNIT}", plain)
+    if quotient and not re.fullmatch(_UNIT, plain):
+        return quotient[1], quotient[2]
+    return plain, ""
+
+
+def named_with(text: str, unit: str) -> str:
+    """A name with its unit behind it, as ``named`` tells them apart."""
+    return f"{text} [{unit or '-'}]" if unit or named(text) != (text, "") else text
 
 
 def _are_names(cells: Sequence[str]) -> bool:
@@ -108,8 +128,8 @@ def _are_units(cells: Sequence[str]) -> bool:
     words = [c.strip() for c in cells if c.strip()]
     if all(re.fullmatch(r"[\[(].*[\])]", w) or w == "-" for w in words):
         return True
-    known = r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2|g|Hz|Pa|bar|K|°C|%|-|counts?)"  # noqa: E501
-    return bool(words) and sum(bool(re.fullmatch(known, w)) for w in words) >= 0.6 * len(words)
+    known = sum(w == "-" or bool(re.fullmatch(_UNIT, w)) for w in words)
+    return bool(words) and known >= 0.6 * len(words)
 
 
 def _uncommented(line: str) -> str:

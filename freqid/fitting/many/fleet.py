@@ -15,10 +15,11 @@ from freqid.checks import InputError, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
-from freqid.fitting.many.identity import fingerprint
+from freqid.fitting.many.identity import at_conditions, fingerprint
 from freqid.fitting.many.progress import Bar
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,8 +91,14 @@ def fit_many(
     names = list(named)
     # a text is a path, whose file may change
     known = {n: Path(s) if isinstance(s, str) else s for n, s in named.items()}
+    met = [s.conditions for s in named.values() if not isinstance(s, (str, Path))]
+    seen = at_conditions(model, met) if isinstance(model, GreyBox) else ()
     groups = [names[i : i + size] for i in range(0, len(names), size)]
-    store = None if path is None else TableStore(path, fingerprint(task, known, size), "other fits")
+    store = (
+        None
+        if path is None
+        else TableStore(path, fingerprint(task, known, size, seen), "other fits")
+    )
     if store is not None and (whole_table := store.whole()) is not None:
         return whole_table
     tables: dict[int, pd.DataFrame] = {}

@@ -13,6 +13,8 @@ from freqid.models import GreyBox, model_to_dict
 
 # steps of the values and conditions at which a plant's function shows what it is
 _STEPS = (0.0, 0.1, -0.07)
+# what says of itself all that it is
+_PLAIN = (bool, int, float, complex, str, bytes, np.ndarray)
 
 
 def fingerprint(*things: object) -> str:
@@ -50,19 +52,56 @@ def _add(seen: hashlib._Hash, thing: object) -> None:
         seen.update(repr(thing).encode())
 
 
+def at_conditions(plant: GreyBox, conditions: Sequence[Mapping[str, float]]) -> list[object]:
+    """What a plant's function returns at the conditions of the records."""
+    known = [*plant.conditions, *plant.values]
+    met = {tuple(sorted((n, v) for n, v in c.items() if n in known)) for c in conditions}
+    shown: list[object] = []
+    for each in sorted(met):
+        shown += _returned(plant, dict(each), {})
+    return shown
+
+
 def _shown(plant: GreyBox) -> list[object]:
-    """A plant's function by what it returns around its values, its parameters as they are."""
+    """A plant's function by its code and what it returns around its values."""
     written = model_to_dict(plant)
     shown: list[object] = [written[n] for n in ("parameters", "ties", "conditions", "input_delay")]
+    shown += _code(plant.matrices)
     for step in _STEPS:
-        moved = {n: v * (1 + step) + step * (v == 0) for n, v in plant.values.items()}
-        set_ = {n: v * (1 + step) + step * (v == 0) for n, v in plant.conditions.items()}
-        free = [p.name for p in plant.free_parameters]
+        moved, set_ = (
+            {n: v * (1 + step) + step * (v == 0) for n, v in of.items()}
+            for of in (plant.values, plant.conditions)
+        )
+        shown += _returned(plant, set_, moved)
+    return shown
+
+
+def _returned(
+    plant: GreyBox, conditions: Mapping[str, float], values: Mapping[str, float]
+) -> list[object]:
+    try:
+        met = plant.with_conditions(**conditions)
+        lin = met.linearise({**met.values, **values}, [p.name for p in met.free_parameters])
+    except Exception as error:
+        # a plant may not exist there, and a user's function may raise anything
+        return [type(error).__name__]
+    return [*lin.at, *lin.derivative]
+
+
+def _code(function: object, depth: int = 3) -> list[object]:
+    """What a function written in Python is: its code and what it closes over, as far as both are
+    plain. Objects are left out whose text differs from process to process.
+    """
+    code = getattr(function, "__code__", None)
+    if code is None or not depth:
+        return []
+    shown: list[object] = [code.co_code, code.co_names]
+    shown += [c for c in code.co_consts if isinstance(c, _PLAIN)]
+    for cell in getattr(function, "__closure__", None) or ():
         try:
-            lin = plant.with_conditions(**set_).linearise({**plant.values, **moved}, free)
-        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-            # a plant may not exist there
-            shown.append(type(error).__name__)
-        else:
-            shown += [*lin.at, *lin.derivative]
+            inside = cell.cell_contents
+        except ValueError:
+            # a name that is not bound yet
+            continue
+        shown += [inside] if isinstance(inside, _PLAIN) else _code(inside, depth - 1)
     return shown

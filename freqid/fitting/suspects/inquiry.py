@@ -220,7 +220,7 @@ class Inquiry:
         if a.name == "hold rejected":
             holds = {repr(r.hold) for r in self.readings}
             what = f"the data contradict {', '.join(sorted(holds))}"
-            what += f"; {a.detail} explains them better"
+            what += f"; {a.detail} explains them better" if a.detail else ""
         elif a.name == "delay" and a.detail:
             what = a.detail
         else:
