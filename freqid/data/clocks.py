@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, IntArray
+from freqid.data.printed_times import printed_period
 
 # denominators of a ratio that two clocks are believed to have, smallest first
 _DENOMINATORS = 64
 # part of a period that stamps of a calm clock are off by, and how fast a phase follows the others
 _CALM, _FOLLOWING = 0.4, 0.1
+# part of a period that stamps of even ticks are off by, of stamps and of the program that made them
+_STEADY = 0.1
+# a period's and a start's part that rounding hides at best
+_DIGITS, _EXACT = 1e-13, 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +26,8 @@ class Clock:
     """A line through stamps: sample ``number`` k comes at ``start`` + k·``period`` (s).
 
     ``jitter`` is the rms distance of the stamps from the line and ``worst`` the largest, both in
-    periods; ``missing`` counts samples that never came.
+    periods; ``missing`` counts samples that never came; ``digit`` in s is what stamps of an even
+    clock were rounded to, 0 where they were not.
     """
 
     stamps: FloatArray
@@ -31,14 +37,18 @@ class Clock:
     jitter: float
     worst: float
     missing: int
+    digit: float = 0.0
 
     @classmethod
-    def of(cls, name: str, stamps: ArrayLike, origin: float = 0.0) -> Clock:
-        """Of stamps (s), ``start`` told from the ``origin``; ValueError unless they increase."""
+    def of(cls, name: str, stamps: ArrayLike) -> Clock:
+        """Of stamps in s; ValueError unless they increase."""
         t = np.array(stamps, dtype=float)
         if t.ndim != 1 or len(t) < 3 or not np.isfinite(t).all():
             raise InputError(f"{name} must be three finite times in s, (N,), or more")
         gaps = np.diff(t)
+        printed = printed_period(t)
+        if printed is not None:
+            return cls._rounded(t, *printed)
         if (gaps <= 0).any():
             at = int(np.argmax(gaps <= 0))
             raise InputError(
@@ -58,23 +68,47 @@ class Clock:
         rms = float(np.sqrt(np.mean(off**2)))
         missing = int(number[-1] + 1 - len(t))
         # the last digits are rounding of the stamps
-        period, start = float(f"{period:.13g}"), float(f"{t[0] - origin + start:.13g}")
+        period, start = float(f"{period:.13g}"), float(f"{t[0] + start:.13g}")
         return cls(t, number, start, period, rms, float(off.max()), missing)
+
+    @classmethod
+    def _rounded(cls, t: FloatArray, period: float, digit: float) -> Clock:
+        """An even clock whose stamps have few digits."""
+        number = np.arange(len(t))
+        left = t - period * number
+        # halfway between the extremes, which rounding to a digit keeps within one
+        start = float(left.min() + left.max()) / 2
+        off = np.abs(left - start) / period
+        rms = float(np.sqrt(np.mean(off**2)))
+        return cls(t, number, start, period, rms, float(off.max()), 0, digit)
+
+    @property
+    def calm(self) -> bool:
+        """Whether its stamps are off by so little that its ticks are even."""
+        return bool(self.digit) or self.worst <= _STEADY
+
+    @property
+    def times(self) -> FloatArray:
+        """When the samples were: at even ticks, or of a clock that jitters when its stamps say."""
+        return self.start + self.period * self.number if self.calm else self.stamps
 
     @property
     def standard_error(self) -> float:
         """Of the period, as a part of it."""
         spread = float(np.std(self.number)) * np.sqrt(len(self.number))
-        return self.jitter / max(spread, 1e-300)
+        return max(self.jitter / max(spread, 1e-300), _DIGITS)
 
     @property
     def start_error(self) -> float:
         """Standard error of the start in s: that of a line at its end."""
-        return 2 * self.jitter * self.period / np.sqrt(len(self.number))
+        return max(2 * self.jitter / np.sqrt(len(self.number)), _EXACT) * self.period
 
     def sentence(self, name: str) -> str:
         """The clock in words."""
-        said = f"{name}: {1 / self.period:.9g} Hz, jitter {100 * self.jitter:.3g} % of a period"
+        said = f"{name}: {1 / self.period:.9g} Hz, "
+        if self.digit:
+            return said + f"stamps rounded to {self.digit:g} s"
+        said += f"jitter {100 * self.jitter:.3g} % of a period"
         if self.worst > 2 * self.jitter:
             said += f", at most {100 * self.worst:.3g} %"
         return said + (f", {self.missing} samples missing" if self.missing else "")
@@ -111,14 +145,16 @@ def _followed(t: FloatArray, period: float) -> IntArray:
     return np.array(ticks)
 
 
-def simple_ratio(slow: Clock, fast: Clock, tolerance: float) -> Fraction | None:
-    """slow.period / fast.period as a fraction that is off by less than ``tolerance`` periods of the
-    faster clock at the record's end; None where there is none.
+def simple_ratio(slow: Clock, fast: Clock) -> Fraction | None:
+    """slow.period / fast.period as the simplest fraction that the stamps do not contradict; None
+    where there is none: a clock that drifts by a hundredth of a period is told from one that not.
     """
     ratio, length = slow.period / fast.period, max(int(slow.number[-1]), 1)
-    finer = min(1.0, ratio)
+    error = 4 * ratio * np.hypot(slow.standard_error, fast.standard_error)
+    # and no drift is believed that is nothing, or not, that is a tenth of a period
+    allowed = np.clip(error * length, _EXACT, _STEADY * min(1.0, ratio))
     for denominator in range(1, _DENOMINATORS + 1):
         found = Fraction(round(ratio * denominator), denominator)
-        if found > 0 and abs(float(found) - ratio) * length < tolerance * finer:
+        if found > 0 and abs(float(found) - ratio) * length < allowed:
             return found
     return None

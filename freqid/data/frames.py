@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, positive, unknown
-from freqid.data.regular_time import on_a_grid, printed_period
+from freqid.data.printed_times import printed_period
+from freqid.data.regular_time import on_a_grid
 from freqid.data.remembered import (
     is_kept,
     kept_aliased,

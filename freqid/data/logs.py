@@ -18,14 +18,15 @@ from freqid.checks import FloatArray, InputError, choice, samples
 from freqid.data.clocks import Clock, simple_ratio
 from freqid.data.record import Record
 from freqid.data.stamped_record import StampedRecord
+from freqid.data.stamps import common_seconds
 from freqid.lti import Hold, as_hold
 
-# parts of a sample by which stamps may be off a grid, and clocks apart at the end
-_OFF = 0.1
 # how finely an offset of the clocks is told, and the samples that a grid may have
 _FINEST, _LARGEST = 40, 2e7
 # part of a step that an offset may be off by rounding, and periods without an input that are said
 _EXACT, _WIDE = 1e-6, 3
+# of a coarse grid's step, however badly the stamps tell it
+_NEAR = 0.1
 
 
 def record_from_logs(
@@ -41,36 +42,45 @@ def record_from_logs(
 ) -> Record:
     """The work of ``Record.from_logs``."""
     inputs, outputs = samples("u", u), samples("y", y)
-    origin = _origin(u_time)
-    clocks = Clock.of("u_time", u_time, origin), Clock.of("y_time", y_time, origin)
+    u_seconds, y_seconds, told = common_seconds(u_time, y_time)
+    clocks = Clock.of("u_time", u_seconds), Clock.of("y_time", y_seconds)
     for name, x, clock in (("u", inputs, clocks[0]), ("y", outputs, clocks[1])):
         if len(x) != len(clock.stamps):
             raise InputError(f"{name} has {len(x)} samples and {len(clock.stamps)} time stamps")
     named = {"input_names": input_names, "output_names": output_names, "units": units}
     u_clock, y_clock = clocks
-    if u_clock.stamps[-1] <= y_clock.stamps[0] or y_clock.stamps[-1] <= u_clock.stamps[0]:
+    u_at, y_at = u_clock.times, y_clock.times
+    both = max(u_at[0], y_at[0]), min(u_at[-1], y_at[-1])
+    shared = [int(((both[0] <= t) & (t <= both[1])).sum()) for t in (u_at, y_at)]
+    if min(shared) < 2:
         raise InputError(
-            f"the clocks do not overlap: u runs from {u_clock.stamps[0]:g} to "
-            f"{u_clock.stamps[-1]:g} s, y from {y_clock.stamps[0]:g} to {y_clock.stamps[-1]:g} s"
+            f"the clocks do not overlap by two samples of each: u runs from {u_at[0]:g} to "
+            f"{u_at[-1]:g} s, y from {y_at[0]:g} to {y_at[-1]:g} s; give both in seconds of one "
+            "clock"
         )
     kind = as_hold(hold, u_clock.period).name
     choice("hold", kind, ("zoh", "foh", "bl"))
-    notes = [u_clock.sentence("u_time"), y_clock.sentence("y_time")]
+    notes = [] if told is None else [told]
+    notes += [u_clock.sentence("u_time"), y_clock.sentence("y_time")]
     ratio = y_clock.period / u_clock.period
     error = np.hypot(u_clock.standard_error, y_clock.standard_error)
     notes.append(
         f"the output comes every {ratio:.9g} (± {ratio * error:.2g}) input samples, the first "
         f"{y_clock.start - u_clock.start:.6g} s after the first input"
     )
-    widest = float(np.diff(u_clock.stamps).max()) / u_clock.period
+    if any(2 * n < len(t) for n, t in zip(shared, (u_at, y_at), strict=True)):
+        notes.append(
+            f"the clocks share {shared[0]} of {len(u_at)} input samples and {shared[1]} of "
+            f"{len(y_at)} output samples: are both in seconds of one clock?"
+        )
+    widest = float(np.diff(u_at).max()) / u_clock.period
     if widest > _WIDE:
         notes.append(
             f"the input was not logged for up to {widest:.3g} of its periods: it is taken to have "
             f"{'kept its value' if kind == 'zoh' else 'run straight'} meanwhile"
         )
-    fraction = simple_ratio(y_clock, u_clock, _OFF)
-    poor = [c for c in clocks if c.worst > _OFF or c.missing]
-    if fraction is not None and not poor:
+    fraction = simple_ratio(y_clock, u_clock)
+    if fraction is not None and all(c.calm and not c.missing for c in clocks):
         grid = _Grid.of(u_clock, y_clock, fraction.denominator, fraction.numerator, kind)
         if grid is not None:
             return grid.record(inputs, outputs, notes, named)
@@ -78,8 +88,8 @@ def record_from_logs(
     if resample:
         return regular
     # an input that is held lasts a period, one that is drawn ends with its last stamp
-    last = u_clock.stamps[-1] + (u_clock.period if kind == "zoh" else 0.0)
-    there = (y_clock.stamps >= u_clock.stamps[0]) & (y_clock.stamps <= last)
+    last = u_at[-1] + (u_clock.period if kind == "zoh" else 0.0)
+    there = (y_at >= u_at[0]) & (y_at <= last)
     if there.sum() < 3:
         raise InputError("the clocks overlap in fewer than three output samples")
     if not there.all():
@@ -89,24 +99,16 @@ def record_from_logs(
     notes.append("the stamps fit no common grid: a fit takes the samples at their own times")
     return StampedRecord(
         **{**regular.__dict__, "notes": tuple(notes)},
-        u_time=u_clock.stamps, u_logged=inputs.reshape(len(inputs), -1),
-        y_time=y_clock.stamps[there], y_logged=outputs.reshape(len(outputs), -1)[there],
+        u_time=u_at, u_logged=inputs.reshape(len(inputs), -1), y_time=y_at[there],
+        y_logged=outputs.reshape(len(outputs), -1)[there],
     )  # fmt: skip
-
-
-def _origin(u_time: ArrayLike) -> float:
-    """The first stamp: times are told from there, where they have their digits."""
-    first = np.ravel(np.asarray(u_time, dtype=float))[:1]
-    return float(first[0]) if len(first) and np.isfinite(first[0]) else 0.0
 
 
 class _Grid:
     """A common grid: the input every ``repeat`` of its steps, the output every ``factor``."""
 
-    def __init__(
-        self, step: float, repeat: int, factor: int, first: int, kind: str, off: float = 0.0
-    ) -> None:
-        self.step, self.repeat, self.factor, self.off = step, repeat, factor, off
+    def __init__(self, step: float, repeat: int, factor: int, first: int, kind: str) -> None:
+        self.step, self.repeat, self.factor = step, repeat, factor
         # grid number of the first output, counted from the first input
         self.first, self.kind = first, kind
 
@@ -119,16 +121,11 @@ class _Grid:
             if (u.number[-1] + 1) * repeat * finer > _LARGEST:
                 return None
             at = (y.start - u.start) / step
-            # as well as jittered stamps tell where a clock begins
+            # as well as the stamps tell where a clock begins
             error = np.hypot(u.start_error, y.start_error) / step
-            if abs(at - round(at)) < max(_EXACT, 4 * error):
+            if abs(at - round(at)) < max(_EXACT, min(4 * error, _NEAR)):
                 return cls(step, repeat * finer, factor * finer, round(at), kind)
-        if max(u.jitter, y.jitter) < _EXACT:
-            return None
-        # jittered stamps are no times to change an input at: the nearest step of the finest grid
-        return cls(
-            step, repeat * finer, factor * finer, round(at), kind, abs(at - round(at)) * step
-        )
+        return None
 
     def record(
         self, u: FloatArray, y: FloatArray, notes: Sequence[str], named: Mapping[str, Any]
@@ -144,8 +141,6 @@ class _Grid:
         said = [*notes]
         if dropped:
             said.append(f"{dropped} output samples without an input were left out")
-        if self.off:
-            said.append(f"the offset of the clocks is rounded by {self.off:.2g} s")
         if self.repeat > 1 and self.kind == "bl":
             said.append("the input was interpolated as a band-limited, periodic one")
         elif self.repeat > 1:
@@ -178,8 +173,9 @@ def _resampled(
     asked: bool,
 ) -> Record:
     """Both on a grid of the output's own period: a held input is repeated, never drawn through."""
-    start = max(u_clock.stamps[0], y_clock.stamps[0])
-    end = min(u_clock.stamps[-1] + u_clock.period, y_clock.stamps[-1])
+    u_at, y_at = u_clock.times, y_clock.times
+    start = max(u_at[0], y_at[0])
+    end = min(u_at[-1] + u_clock.period, y_at[-1])
     every = max(round(y_clock.period / u_clock.period), 1)
     step = y_clock.period / every
     count = int(np.floor((end - start) / y_clock.period)) + 1
@@ -189,11 +185,11 @@ def _resampled(
     t_fast = start + step * np.arange(count * every)
     inputs, outputs = u.reshape(len(u), -1), y.reshape(len(y), -1)
     if kind == "zoh":
-        at = np.clip(np.searchsorted(u_clock.stamps, t_fast, side="right") - 1, 0, len(u) - 1)
+        at = np.clip(np.searchsorted(u_at, t_fast, side="right") - 1, 0, len(u) - 1)
         fast = inputs[at]
     else:
-        fast = np.column_stack([np.interp(t_fast, u_clock.stamps, c) for c in inputs.T])
-    slow = np.column_stack([np.interp(t_slow, y_clock.stamps, c) for c in outputs.T])
+        fast = np.column_stack([np.interp(t_fast, u_at, c) for c in inputs.T])
+    slow = np.column_stack([np.interp(t_slow, y_at, c) for c in outputs.T])
     said = (*notes, "resampled: the input was repeated, the output drawn by straight lines")
     return Record(
         fast.reshape(-1, *u.shape[1:]), slow.reshape(-1, *y.shape[1:]),

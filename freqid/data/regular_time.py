@@ -1,4 +1,4 @@
-"""Times of a table made regular: those printed with few digits, and those with gaps and jitter."""
+"""Times of a table made regular, gaps, jitter and blanks filled."""
 
 from __future__ import annotations
 
@@ -8,32 +8,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.data.clocks import Clock
-
-# digits that a rounded time may be off a line through all of them
-_HALF = 0.75
-# samples that tell a period, and the part of it that it must be known to
-_FEW, _KNOWN = 8, 1e-3
-
-
-def printed_period(times: FloatArray) -> tuple[float, float] | None:
-    """Period and digit in s of an even time that was printed with few digits; None of another.
-
-    Times k·T rounded to a digit lie within half a digit of a line; the period is that line's, or
-    that of a rate in few digits that is as near.
-    """
-    count = len(times)
-    if count < _FEW or not np.isfinite(times).all():
-        return None
-    number, t = np.arange(count), times - times[0]
-    period, start = np.polyfit(number, t, 1)
-    off = float(np.abs(t - start - period * number).max())
-    digit = _digit(t)
-    if digit is None or period <= 0 or off < 0.01 * period:
-        return None
-    known_to = digit / (count - 1)
-    if off > _HALF * digit or known_to > _KNOWN * period:
-        return None
-    return _plain(float(period), known_to), digit
+from freqid.data.printed_times import plain_period, printed_period
 
 
 def on_a_grid(
@@ -56,7 +31,7 @@ def on_a_grid(
         raise InputError("resample=True needs three rows or more")
     clock = Clock.of("time", times)
     known_to = max(clock.standard_error, 1e-9) * clock.period
-    step = rounded[0] if rounded else _plain(clock.period, known_to)
+    step = rounded[0] if rounded else plain_period(clock.period, known_to)
     begin = times[0] + clock.start
     grid = begin + step * np.arange(int(clock.number[-1]) + 1)
     wide = int((np.diff(clock.number) > 1).sum())
@@ -81,21 +56,3 @@ def on_a_grid(
         else:
             new[name] = np.interp(grid, times[there], x[there])
     return new, notes
-
-
-def _plain(period: float, known_to: float) -> float:
-    """A period as the inverse of a rate in few digits, where it is known no better."""
-    for digits in range(1, 10):
-        rate = float(f"{1 / period:.{digits}g}")
-        if abs(1 / rate - period) < known_to:
-            return 1 / rate
-    return period
-
-
-def _digit(times: FloatArray) -> float | None:
-    """The coarsest power of ten that all times are multiples of."""
-    for k in range(10):
-        scaled = times * 10.0**k
-        if np.abs(scaled - np.round(scaled)).max() < 1e-4:
-            return float(10.0**-k)
-    return None

@@ -102,13 +102,14 @@ class Signals:
         resample: bool = False,
         **named: Any,
     ) -> Record:
-        """A record of an input and an output that two clocks stamped, times in s.
+        """A record of an input and an output that two clocks stamped, times in s or dates.
 
-        Where the rates have a simple ratio both lie on a common grid, exactly. Elsewhere, in
-        jitter, drift or drop-outs, the samples are kept at their own times, which a ``fit`` takes
-        as they are; ``resample=True`` puts them on a grid instead. ``notes`` tell of the clocks;
-        ``named`` are input_names, output_names and units. Raises ValueError for stamps that go
-        back, clocks that do not overlap, or numbers of samples that disagree.
+        A clock whose stamps are off by less than a tenth of a period, or are rounded, ticks evenly.
+        Where the rates of such clocks have a simple ratio both lie on a common grid, exactly.
+        Elsewhere, in jitter, drift or drop-outs, the samples are kept at their own times, which a
+        ``fit`` takes as they are; ``resample=True`` puts them on a grid instead. ``notes`` tell of
+        the clocks; ``named`` are input_names, output_names and units. Raises ValueError for stamps
+        that go back, clocks that do not overlap, or numbers of samples that disagree.
 
         >>> import freqid as fq
         >>> t = np.arange(6) * 0.1

@@ -31,7 +31,7 @@ _NAMES = {
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
 }  # fmt: skip
 # a count since 1970 of this size is of seconds, milliseconds, …
-_EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
+EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
 # steps that differ by no more than this part make an unnamed column a time
 _EVEN = 1e-3
 # a name that ends in a unit, and steps in s that nobody samples a machine with
@@ -137,7 +137,7 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
         scale = UNITS[wanted.casefold()]
         return _scaled(values, scale), wanted
     size = float(np.nanmax(np.abs(values), initial=0))
-    for least, scale, text in _EPOCHS:
+    for least, scale, text in EPOCHS:
         if size > least:
             return _scaled(values - values[0], scale), f"{text} since 1970"
     return values, "s"

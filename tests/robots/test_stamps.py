@@ -1,6 +1,7 @@
 """Records whose stamps fit no grid, in whatever takes a record."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import freqid as fq
@@ -148,3 +149,67 @@ def test_a_part_has_the_input_to_its_end(hold):
     record = fq.Record.from_logs(u_time, u, y_time, y, hold=hold)
     for part in (record, record.slice(0.5, 2.03), record.slice(0.3), record.slice(None, 1.337)):
         assert off(fq.fit(LAG, part, start={"a": 30})) < 1e-7
+
+
+def even(rates=(1000, 250), drift=0.0, offset=0.0, seconds=4.0, seed=1):
+    """Two even clocks and the exact output."""
+    u = fq.white_noise(int(seconds * rates[0]), seed=seed)
+    u_time = np.arange(len(u)) / rates[0]
+    y_time = offset + np.arange(int((seconds - 0.1) * rates[1])) / rates[1] * (1 + drift)
+    return u_time, u, y_time, simulated(LAG, u_time, u, y_time)
+
+
+def test_clocks_rounded_to_milliseconds():
+    """700 Hz and 233 Hz in whole milliseconds: both even, on no common grid."""
+    u_time, u, y_time, y = even((700, 233))
+    record = fq.Record.from_logs(np.round(u_time, 3), u, np.round(y_time, 3), y)
+    assert "700 Hz, stamps rounded to 0.001 s" in record.notes[0]
+    assert not any("missing" in note for note in record.notes)
+    # where each clock begins is told to about the digit over the square root of the samples
+    assert off(fq.fit(LAG, record, start={"a": 30})) < 0.02
+
+
+@pytest.mark.parametrize(("drift", "seconds"), [(50e-6, 2), (2e-6, 4), (1e-5, 10)])
+def test_a_clock_that_drifts_by_little(drift, seconds):
+    """Stamps without jitter tell a drift of a hundredth of a period."""
+    record = fq.Record.from_logs(*even(drift=drift, seconds=seconds))
+    assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-8
+
+
+@pytest.mark.parametrize("epoch", [0.0, 1.7e9])
+def test_an_offset_that_is_no_part_of_a_period(epoch):
+    u_time, u, y_time, y = even((200, 125), offset=1.3137e-3)
+    record = fq.Record.from_logs(u_time + epoch, u, y_time + epoch, y)
+    assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-5
+
+
+def test_dates_and_counts_since_1970():
+    u_time, u, y_time, y = even()
+    start = pd.Timestamp("2026-03-01 10:00:00.5")
+    dated = [start + pd.to_timedelta(t, "s") for t in (u_time, y_time)]
+    given = {
+        "dates": dated,
+        "aware": [d.tz_localize("Europe/Berlin") for d in dated],
+        "numpy": [d.to_numpy() for d in dated],
+        "ns": [d.to_numpy().astype("M8[ns]").astype("int64") for d in dated],
+        "us": [d.to_numpy().astype("M8[us]").astype("int64") for d in dated],
+        "ms": [d.to_numpy().astype("M8[ms]").astype("int64") for d in dated],
+    }
+    for name, (u_stamps, y_stamps) in given.items():
+        record = fq.Record.from_logs(u_stamps, u, y_stamps, y)
+        assert record.dt == pytest.approx(4e-3), name
+        assert record.factor == 4, name
+        assert off(fq.fit(LAG, record, start={"a": 30})) < 1e-8, name
+    with pytest.raises(ValueError, match="ms since 1970 and y_time in s"):
+        fq.Record.from_logs(given["ms"][0], u, y_time, y)
+    apart = fq.Record.from_logs(1e3 * u_time, u, y_time, y)
+    assert any("share 4 of 4000 input samples" in note for note in apart.notes)
+
+
+def test_small_jitter_of_the_stamps_moves_no_sample():
+    """Two regular samplers whose programs stamp a little late: ticks are even."""
+    u_time, u, y_time, y = even((200, 125), offset=1.3137e-3)
+    rng = np.random.default_rng(3)
+    late = [t + 3e-4 * rng.random(len(t)) for t in (u_time, y_time)]
+    record = fq.Record.from_logs(late[0], u, late[1], y)
+    assert off(fq.fit(LAG, record, start={"a": 30})) < 0.02
