@@ -40,6 +40,7 @@ def read(
     sep: str | None = None,
     decimal: str | None = None,
     columns: Sequence[str] | None = None,
+    group: str | None = None,
     units: Mapping[str, str] | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -62,6 +63,7 @@ def read(
         time: the column of the time, where its name or its behaviour does not tell.
         sep, decimal: of a text table, where they cannot be found out.
         columns: names for a table that has none.
+        group: of a file that holds several tables: HDF5 group, MATLAB structure or sheet.
         units: of channels by name; that of the time is understood (s, ms, µs, ns, min, h).
             ``start``, ``stop`` in s cut the record, ``detrend`` takes a polynomial of that order
             off (see ``Record.detrend``).
@@ -82,7 +84,7 @@ def read(
     if kind_of(path) in LOGS:
         _no_table(path, {
             "dt": dt, "reference": reference, "time": time, "sep": sep, "decimal": decimal,
-            "columns": columns,
+            "columns": columns, "group": group,
         })  # fmt: skip
         try:
             return _cut(
@@ -91,7 +93,7 @@ def read(
         except InputError as error:
             text = str(error)
             raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-    frame = frame_of(path, sep, decimal, columns)
+    frame = frame_of(path, sep, decimal, columns, group)
     found = frame.attrs.get("found", f"columns {', '.join(map(str, frame.columns))}")
     try:
         for name in units or {}:

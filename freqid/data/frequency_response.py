@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names, whole
 from freqid.data.band import Band, chosen
 from freqid.data.conditions import as_conditions
+from freqid.data.remembered import response_columns
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -80,6 +81,8 @@ class FrequencyResponse:
             raise InputError("frequency must be finite and increasing, (K,), in Hz")
         G = np.array(response, dtype=complex)
         G = G.reshape(1, 1, -1) if G.ndim == 1 else G
+        if not np.isfinite(G).all():
+            raise InputError("response has values that are not finite; leave those lines out")
         if G.ndim != 3 or G.shape[2] != len(f):
             raise InputError(
                 f"response has shape {G.shape} for {len(f)} frequencies; "
@@ -206,6 +209,9 @@ class FrequencyResponse:
     def to_frame(self) -> pd.DataFrame:
         """One row for each frequency and channel pair: magnitude, phase (degrees), re, im, …
 
+        Sample time, hold, conditions and input spectrum have columns where there are any, from
+        which ``from_frame`` and ``read_response`` take them again.
+
         >>> FrequencyResponse([1.0], [1j]).to_frame()["phase"].iloc[0]
         np.float64(90.0)
         """
@@ -224,7 +230,9 @@ class FrequencyResponse:
         for name in ("variance", "coherence"):
             if getattr(self, name) is not None:
                 columns[name] = getattr(self, name).ravel()
-        return pd.DataFrame(columns)
+        if self.input_spectrum is not None:
+            columns["input_spectrum"] = np.tile(self.input_spectrum.ravel(), p)
+        return pd.DataFrame(columns | response_columns(self))
 
     def to_xarray(self) -> xarray.DataArray:
         """The response as an xarray.DataArray (output, input, frequency / Hz); needs xarray.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +15,17 @@ from freqid.data.stamped_record import StampedRecord
 Reference = bool | FloatArray | Sequence[FloatArray] | Sequence[float]
 
 
-def as_records(records: Record | Sequence[Record]) -> list[Record]:
+def as_records(records: Record | Sequence[Record], varying: bool = True) -> list[Record]:
     """The records as a list; ValueError unless they are of one plant and one sample time.
 
-    Records at other conditions are of other plants.
+    Records at other conditions are of other plants. The channels of a single one must be
+    ``varying``.
     """
+    if not isinstance(records, Iterable | Record):
+        raise InputError(
+            f"records={type(records).__name__} is neither a Record nor a list of Records; of a "
+            "stream take h1, h2 or hv, or load() it"
+        )
     sets = [records] if isinstance(records, Record) else list(records)
     if not sets or not all(isinstance(r, Record) for r in sets):
         raise InputError("records must be a Record or a list of Records, at least one")
@@ -46,7 +52,7 @@ def as_records(records: Record | Sequence[Record]) -> list[Record]:
         for name, x in zip(
             (*r.input_names, *r.output_names), (*r.inputs.T, *r.outputs.T), strict=True
         ):
-            if len(sets) == 1 and np.ptp(x) == 0:
+            if varying and len(sets) == 1 and np.ptp(x) == 0:
                 raise InputError(f"channel {name!r} is constant; leave it out or check the sensor")
     return sets
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from freqid.lti import Hold, InputHolds, ZeroOrderHold
 if TYPE_CHECKING:
     import pandas as pd
 
+    from freqid.data.frequency_response import FrequencyResponse
     from freqid.data.record import Record
 
 # a column "condition q" holds what q was set to
@@ -30,15 +32,42 @@ def is_kept(column: object) -> bool:
 
 def kept_columns(record: Record) -> dict[str, float | bool]:
     """Columns of one value each, of what is not as usual."""
-    kept: dict[str, float | bool] = {}
-    if isinstance(record.hold, InputHolds):
-        for name, own in zip(record.input_names, record.hold.holds, strict=True):
-            column, value = own.column
-            kept[f"{column} {name}"] = value
-    elif record.hold != ZeroOrderHold(record.input_dt):
-        column, value = record.hold.column
-        kept[column] = value
-    return kept | {f"{_CONDITION}{name}": value for name, value in record.conditions.items()}
+    usual = record.hold == ZeroOrderHold(record.input_dt)
+    kept = {} if usual else _hold_columns(record.hold, record.input_names)
+    return kept | condition_columns(record.conditions)
+
+
+def response_columns(frf: FrequencyResponse) -> dict[str, float | bool]:
+    """Columns of one value each: sample time, hold, lines that go together, conditions."""
+    kept: dict[str, float | bool] = {"dt": frf.dt} if frf.dt else {}
+    if frf.hold is not None:
+        kept |= _hold_columns(frf.hold, frf.input_names)
+    if frf.reach:
+        kept["reach"] = frf.reach
+    return kept | condition_columns(frf.conditions)
+
+
+def kept_of_response(frame: pd.DataFrame, inputs: list[str]) -> dict[str, object]:
+    """The same from a table, as arguments of a FrequencyResponse."""
+    hold = kept_hold(frame, inputs)
+    if isinstance(hold, dict):
+        hold = InputHolds.joined([hold[n] for n in inputs])
+    numbers = {n: _one(frame, n) for n in ("dt", "reach") if n in frame.columns}
+    if "reach" in numbers:
+        numbers["reach"] = round(numbers["reach"])
+    return {**numbers, "hold": hold, "conditions": kept_conditions(frame)}
+
+
+def condition_columns(conditions: Mapping[str, float]) -> dict[str, float | bool]:
+    return {f"{_CONDITION}{name}": value for name, value in conditions.items()}
+
+
+def _hold_columns(hold: Hold, inputs: Sequence[str]) -> dict[str, float | bool]:
+    """A hold by its name and period, each input's own where they have one."""
+    if not isinstance(hold, InputHolds):
+        return dict([hold.column])
+    own = zip(inputs, hold.holds, strict=True)
+    return {f"{h.column[0]} {name}": h.column[1] for name, h in own}
 
 
 def kept_in_files(record: Record) -> dict[str, float | bool]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from freqid.checks import Array, ComplexArray, FloatArray, InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.kinds import damaged, existing, first_line, missing
+from freqid.data.remembered import kept_of_response
 from freqid.data.tables import frame_of
 
 if TYPE_CHECKING:
@@ -120,8 +121,13 @@ def _long(frame: pd.DataFrame) -> FrequencyResponse:
                     raise InputError(f"{y} from {u} has {len(some)} rows and others {len(f)}")
                 whole[i, j] = some
         fields[name] = whole
+    if "input_spectrum" in frame.columns:
+        rows = frame[frame["output"] == outputs[0]]
+        spectra = [rows["input_spectrum"][rows["input"] == u].to_numpy(dtype=float) for u in inputs]
+        fields["input_spectrum"] = np.array(spectra)
     names = {"input_names": inputs, "output_names": outputs}
-    return FrequencyResponse(f, fields.pop("response"), **fields, **names)  # type: ignore[arg-type]
+    kept = kept_of_response(frame, [str(n) for n in inputs])
+    return FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
 
 
 def _one(names: list[str], pattern: str, units: dict[str, str]) -> str | None:
@@ -153,6 +159,12 @@ def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> Co
     if real and imaginary:
         return _numbers(frame, real) + 1j * _numbers(frame, imaginary)
     phase = _one(names, _PHASE, units)
+    turns = [n for n in names if re.search(rf"(^|[^a-z]){_PHASE}([^a-z]|$)", n.casefold())]
+    if len(turns) > 1:
+        raise InputError(
+            f"several responses side by side, with phases {', '.join(turns)}; keep the columns of "
+            "one, or write rows with the columns output and input"
+        )
     others = [n for n in names if n != phase]
     size = _one(others, _SIZE, units) or (others[0] if len(others) == 1 else None)
     if size is None:
@@ -177,6 +189,8 @@ def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> Co
     # "Grad" is German for degrees
     radians = re.search(r"(?<![a-z])rad", text)
     told = radians or re.search(r"deg|°|grad", text)
+    if units.get(phase) and not told:
+        raise InputError(f"the unit of {phase!r} is {units[phase]!r}; expected deg or rad")
     if not told and len(turn) > 2 and np.abs(turn).max() <= 2 * np.pi and turn.any():
         raise InputError(
             f"column {phase!r} may be in degrees or in radians; name it {phase} [deg] or "

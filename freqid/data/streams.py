@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
-from freqid.data.conditions import as_conditions
+from freqid.checks import FloatArray, InputError, whole
 from freqid.data.record import Record
 from freqid.lti import Hold
 
@@ -33,15 +32,11 @@ class Stream:
     output_names: tuple[str, ...]
     n_samples: int | None = None
     origin: str = "stream"
+    conditions: Mapping[str, float] = field(default_factory=dict)
 
     # what a record has, and a stream does not
     factor = 1
     reference = None
-
-    @property
-    def conditions(self) -> dict[str, float]:
-        """None are known."""
-        return as_conditions(None)
 
     @property
     def n_inputs(self) -> int:
@@ -109,7 +104,9 @@ class Stream:
             yield rows
 
     def load(self, stop: int | None = None) -> Record:
-        """The samples, or the first ``stop`` of them, as a Record in memory."""
+        """The samples, or the first ``stop`` of them (a number), as a Record in memory."""
+        if stop is not None:
+            stop = whole("stop", stop)
         rows: list[FloatArray] = []
         have = 0
         for block in self._checked():
@@ -121,6 +118,7 @@ class Stream:
         return Record(
             _flat(every[:, : self.n_inputs]), _flat(every[:, self.n_inputs :]), self.dt, self.hold,
             input_names=self.input_names, output_names=self.output_names,
+            conditions=self.conditions,
         )  # fmt: skip
 
     def __repr__(self) -> str:

@@ -13,12 +13,16 @@ from freqid.data.readers.table import named
 if TYPE_CHECKING:
     import pandas as pd
 
+# kinds of files that may hold several tables
+_GROUPED = (".h5", ".mat", ".xlsx")
+
 
 def frame_of(
     path: Path,
     sep: str | None = None,
     decimal: str | None = None,
     columns: Sequence[str] | None = None,
+    group: str | None = None,
 ) -> pd.DataFrame:
     """The columns of a file, units and what was found of its layout in ``attrs``.
 
@@ -34,6 +38,10 @@ def frame_of(
     asked = {k: v for k, v in (("sep", sep), ("decimal", decimal)) if v is not None}
     if asked and reader is not READERS[".csv"]:
         raise InputError(f"{path}: {next(iter(asked))}= is for text tables")
+    if group is not None:
+        if reader not in [READERS[kind] for kind in _GROUPED]:
+            raise InputError(f"{path}: group= is for {', '.join(_GROUPED)}")
+        asked["group"] = group
     try:
         frame = reader(path, **asked)
     except InputError as error:

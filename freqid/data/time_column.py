@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, unknown
+from freqid.data.readers.table import named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,19 +65,25 @@ def with_time(
     return rest, notes
 
 
+def time_named(columns: Sequence[str]) -> str | None:
+    """The column whose name, its unit apart, means the time; None where none does."""
+    if "time" in columns:
+        return "time"
+    for column in columns:
+        plain = named(column)[0].strip().casefold()
+        if re.sub(r"[\s_]+", " ", plain) in _NAMES or plain in _NAMES:
+            return column
+    return None
+
+
 def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | None:
     if time is not None:
         if time not in frame.columns:
             raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
         return time
-    for column in frame.columns:
-        if str(column) == "time":
-            return str(column)
-    for column in frame.columns:
-        if re.sub(r"[\s_]+", " ", str(column).strip().casefold()) in _NAMES or (
-            str(column).casefold() in _NAMES
-        ):
-            return str(column)
+    told = time_named([str(c) for c in frame.columns])
+    if told is not None:
+        return told
     if dt is not None or len(frame.columns) < 3 or len(frame) < 3:
         return None
     # by behaviour: only a first column that runs evenly

@@ -4,6 +4,7 @@ It may import checks, lti, data, excitation, models and frf; inside, ``cost`` st
 ``search``, ``uncertainty``, readings, estimates, ``black_box`` and ``entry``, in that order.
 """
 
+from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Z95, Estimate

@@ -10,11 +10,12 @@ from typing import Literal
 from freqid.checks import InputError, choice, whole
 from freqid.data import DataSet, FrequencyResponse, Record, as_data_sets
 from freqid.fitting import black_box, grey_box
+from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.closed_loop import through_reference
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
-from freqid.fitting.noise_rounds import again, noise_weighted
+from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
@@ -112,7 +113,8 @@ def fit(
         choice("offset", offset, ("estimate",))
     if not isinstance(reference, bool):
         choice("reference", reference, ("auto",))
-    sets = as_data_sets(data)
+    given_sets = as_data_sets(data)
+    sets = tuple(in_order_of(model, d) for d in given_sets)
     estimated = isinstance(hold, str) and hold == "estimate"
     skip_zero = isinstance(model, GreyBox) and model.integrates
     late = isinstance(model, GreyBox) and bool(model.delay_sources)
@@ -155,7 +157,7 @@ def fit(
     call = _call(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
     return dataclasses.replace(
-        est, data=sets, band=band, weights=weights, call=call, inquiry=inquiry,
+        est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*notes, *est.notes],
     )  # fmt: skip
 
@@ -169,7 +171,11 @@ def _fitted(
         own = options if near is None else again(near, options)
         if any(r.noise.to_be_learnt for r in some):
             return noise_weighted(model, some, own)
-        return fitter_of(model)(model, some, own), some
+        est = fitter_of(model)(model, some, own)
+        if any(r.logarithmic and not r.noise.plain for r in some):
+            some = [relative_to_model(est, r) for r in some]
+            est = fitter_of(model)(model, some, again(est, own))
+        return est, some
 
     if loss == "linear":
         return work(readings, None)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from freqid.checks import InputError
+from freqid.data import FrequencyResponse
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.met import met_by
@@ -63,6 +64,22 @@ def again(est: Estimate, options: SearchOptions) -> SearchOptions:
     near = {n: est[n] for n in getattr(est.model, "values", {})}
     near |= {n: est[n] for n in est.names if "[" in n} if near else {}
     return dataclasses.replace(options, n_starts=1, start=near or None, refit=True)
+
+
+def relative_to_model(est: Estimate, reading: Reading) -> Reading:
+    """A reading of logarithms whose variances are relative to the model's response.
+
+    Relative to the measured one a line that its noise has made larger would count for more, which
+    shifts the gain by twice the relative variance.
+    """
+    frf = reading.data
+    if not reading.logarithmic or reading.noise.plain:
+        return reading
+    assert isinstance(frf, FrequencyResponse)
+    assert frf.variance is not None
+    model = met_by(est, reading).frequency_response(frf.omega, reading.hold).response
+    share = np.abs(frf.response) ** 2 / np.maximum(np.abs(model) ** 2, 1e-300)
+    return reading.with_(data=dataclasses.replace(frf, variance=frf.variance * share))
 
 
 def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:

@@ -31,7 +31,7 @@ def etfe(
     >>> fq.etfe(fq.simulate(fq.two_mass(), u, dt=0.5e-3), band=(10, 80))
     <FrequencyResponse 1x1: 701 lines, 10-80 Hz, dt=0.0005 s>
     """
-    sets = as_records(record)
+    sets = as_records(record, varying=False)
     first, count = sets[0], len(sets)
     if count < first.n_inputs:
         raise InputError(

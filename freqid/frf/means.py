@@ -195,5 +195,5 @@ def _packed(
         variance=np.moveaxis(variance, 0, -1),
         input_spectrum=(np.abs(U) ** 2).mean(axis=1),
         input_names=first.input_names, output_names=first.output_names,
-        inputs=U, outputs=Y, noise=C, freedom=freedom,
+        inputs=U, outputs=Y, noise=C, freedom=freedom, conditions=first.conditions,
     )  # fmt: skip

@@ -127,6 +127,13 @@ class _Mechanical:
         if force.shape[0] != n:
             raise InputError(f"B has shape {force.shape}; expected ({n}, inputs)")
         seen = np.eye(n) if C is None else C
+        if seen.shape[1] == 2 * n != n and self.measured != "position":
+            raise InputError(
+                f"measured={self.measured!r} beside C of shape {seen.shape}, which takes positions "
+                f"and velocities already; give C (outputs, {n}), or leave measured out"
+            )
+        if not np.allclose(M, M.T, rtol=1e-9, atol=1e-12 * float(np.abs(M).max(initial=0))):
+            raise InputError("the mass matrix M is not symmetric; check its off-diagonal elements")
         if seen.shape[1] not in (n, 2 * n):
             raise InputError(f"C has shape {seen.shape}; expected (outputs, {n}) or (…, {2 * n})")
         try:

@@ -183,9 +183,13 @@ def nyquist(
 def plot_record(record: Record, ax: Panels | None = None) -> Panels:
     """Input above output of a ``record`` in time, a zero-order hold as steps; returns the two axes.
 
+    Raises ValueError for anything but one record.
+
     >>> import freqid as fq
     >>> axes = fq.plot_record(fq.Record([0.0, 1.0], [0.0, 0.5], dt=0.1))
     """
+    if not isinstance(record, Record):
+        raise InputError(f"record={type(record).__name__} is not a Record; draw several one by one")
     with stacked(ax, 2) as ax:
         steps = "steps-post" if record.hold.constant else "default"
         for axis, what, names, time, signals, drawn in (

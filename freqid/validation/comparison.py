@@ -19,7 +19,7 @@ from freqid.data import (
     chosen,
     input_dt,
 )
-from freqid.fitting import Estimate, errors_at_stamps, line_errors, met, remembered
+from freqid.fitting import Estimate, errors_at_stamps, in_order_of, line_errors, met, remembered
 from freqid.lti import Hold, PeriodicHold, as_hold
 from freqid.models import Model, ModelLike, as_model
 
@@ -97,11 +97,13 @@ def compare(
             f"record={type(record).__name__} is neither a Record nor a FrequencyResponse; compare "
             "them one by one"
         )
+    fitted, record = met(model, record), in_order_of(as_model(model), record)
+    assert isinstance(record, Record)
     if isinstance(record, StampedRecord):
-        return _at_stamps(met(model, record), record, own_hold(model, hold, record), band)
+        return _at_stamps(fitted, record, own_hold(model, hold, record), band)
     limits = as_band(band, record.nyquist)
     choice("initial_state", initial_state, ("estimate", "steady"))
-    given, hold = met(model, record), own_hold(model, hold, record)
+    given, hold = fitted, own_hold(model, hold, record)
     residual = -line_errors(given, record, hold, None, initial_state).in_time()
     y = record.outputs[: len(residual)]
     if limits is not None:
@@ -149,6 +151,9 @@ def _with_response(
 ) -> Comparison:
     """The model's response beside a measured one, each output in per cent."""
     given, found = met(model, frf), own_hold(model, hold, frf)
+    ordered = in_order_of(given, frf)
+    assert isinstance(ordered, FrequencyResponse)
+    frf = ordered
     if band is not None:
         frf = frf.select(band)
     if isinstance(found, str):

@@ -17,9 +17,9 @@ from freqid.data import (
     StampedRecord,
     as_band,
 )
-from freqid.fitting import Estimate, line_errors, met
+from freqid.fitting import Estimate, in_order_of, line_errors, met
 from freqid.lti import Hold
-from freqid.models import ModelLike
+from freqid.models import ModelLike, as_model
 from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
 
 if TYPE_CHECKING:
@@ -79,7 +79,9 @@ def residual_test(
         raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
     limits = as_band(band, record.nyquist)
     hold = own_hold(model, hold, record)
-    e = -line_errors(met(model, record), record, hold).in_time()
+    fitted, record = met(model, record), in_order_of(as_model(model), record)
+    assert isinstance(record, Record)
+    e = -line_errors(fitted, record, hold).in_time()
     u = record.inputs[:: record.factor][: len(e)]
     N = len(e)
     if limits is not None:

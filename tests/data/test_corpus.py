@@ -8,6 +8,7 @@ import lzma
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.io
 
 import freqid as fq
 
@@ -287,3 +288,42 @@ def test_channels_know_their_units(tmp_path):
     found = fq.channels(tmp_path / "d.csv")
     assert found["unit"].to_dict() == {"M": "N m", "v": ""}
     assert found["rate"]["v"] == pytest.approx(1000)
+
+
+def grouped(path, kind):
+    runs = {f"run{k}": {"time": DT * k * np.arange(N), "u": U, "y": k * Y} for k in (1, 2)}
+    if kind == "h5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            for run, arrays in runs.items():
+                for name, x in arrays.items():
+                    file[f"{run}/{name}"] = x
+    elif kind == "mat":
+        scipy.io.savemat(path, runs)
+    else:
+        pytest.importorskip("python_calamine")
+        pytest.importorskip("openpyxl")
+        with pd.ExcelWriter(path) as book:
+            for run, arrays in runs.items():
+                pd.DataFrame(arrays).to_excel(book, sheet_name=run, index=False)
+
+
+@pytest.mark.parametrize("kind", ["h5", "mat", "xlsx"])
+def test_files_of_several_experiments(kind, tmp_path):
+    path = tmp_path / f"runs.{kind}"
+    grouped(path, kind)
+    second = fq.read(path, group="run2")
+    assert second.dt == pytest.approx(2 * DT)
+    assert np.allclose(second.y, 2 * Y)
+    if kind == "xlsx":
+        first = fq.read(path)
+        assert np.allclose(first.y, Y)
+        assert any("'run2'" in note for note in first.notes)
+    else:
+        with pytest.raises(ValueError, match=r"several.*run1, run2.*group="):
+            fq.read(path)
+    with pytest.raises(ValueError, match=r"group='run3'.*did you mean"):
+        fq.read(path, group="run3")
+    (tmp_path / "t.csv").write_text("time,u,y\n0,1,2\n1,2,3\n")
+    with pytest.raises(ValueError, match="group= is for"):
+        fq.read(tmp_path / "t.csv", group="run1")

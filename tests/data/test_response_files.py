@@ -150,3 +150,44 @@ def test_refused(tmp_path):
         fq.read_response(tmp_path / "none.s1p")
     with pytest.raises(ValueError, match="twice"):
         fq.FrequencyResponse.from_frame(pd.DataFrame({"f": [1, 1], "re": [1, 2], "im": [0, 0]}))
+
+
+@pytest.mark.parametrize("method", ["h1", "lrm", "etfe", "periodic"])
+def test_what_a_table_keeps_of_a_response(method, tmp_path):
+    """Sample time and hold: without them a fit is to the plant itself, and wrong."""
+    lag = fq.GreyBox(
+        lambda b, a, q: ([[-a]], [[b + 0 * q]], [[1.0]], None),
+        [fq.Parameter("b", 50.0), fq.Parameter("a", 20.0)], conditions={"q": 0.0},
+    )  # fmt: skip
+    u = np.tile(fq.white_noise(500, seed=1), 8)
+    record = fq.simulate(lag, u, 5e-3).with_noise(0.05).with_conditions(q=0.4)
+    frf = {
+        "h1": lambda: fq.h1(record, 500), "lrm": lambda: fq.local_rational(record, band=(1, 90)),
+        "etfe": lambda: fq.etfe(record), "periodic": lambda: fq.periodic(record, 2.5, skip=1),
+    }[method]()  # fmt: skip
+    frf.to_frame().to_csv(tmp_path / "frf.csv", index=False)
+    for back in (
+        fq.FrequencyResponse.from_frame(frf.to_frame()),
+        fq.read_response(tmp_path / "frf.csv"),
+    ):
+        assert (back.dt, back.hold, back.conditions) == (frf.dt, frf.hold, {"q": 0.4})
+        assert back.reach == frf.reach
+        for name in ("response", "variance", "coherence", "input_spectrum"):
+            mine, own = getattr(back, name), getattr(frf, name)
+            assert (mine is None) == (own is None)
+            assert own is None or np.allclose(mine, own, rtol=1e-9)
+        if method != "periodic":
+            before, after = (fq.fit(lag, f, start={"a": 30})["a"] for f in (frf, back))
+            assert after == pytest.approx(before, rel=1e-9)
+
+
+def test_responses_of_no_numbers_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="not finite"):
+        fq.FrequencyResponse([1.0, 2.0], [1.0, np.nan])
+    path = tmp_path / "frf.csv"
+    path.write_text("f,mag,phase [deg],mag2,phase2 [deg]\n" + "1,2,3,4,5\n2,3,4,5,6\n3,3,3,3,3\n")
+    with pytest.raises(ValueError, match="several responses"):
+        fq.read_response(path)
+    path.write_text("f,mag,phase [mrad]\n1,2,3\n2,3,4\n3,4,5\n")
+    with pytest.raises(ValueError, match="'mrad'"):
+        fq.read_response(path)

@@ -59,10 +59,10 @@ def test_a_file_tells_its_hold_and_its_time(tmp_path):
     dated.to_parquet(tmp_path / "dated.parquet")
     assert fq.open(tmp_path / "dated.parquet", "u", "y").dt == pytest.approx(DT)
     frame.drop(index=range(50, 900)).to_parquet(tmp_path / "gap.parquet")
-    with pytest.raises(ValueError, match="time is not even"):
+    with pytest.raises(ValueError, match="is not even"):
         fq.open(tmp_path / "gap.parquet", "u", "y")
     frame.assign(time="noon").to_parquet(tmp_path / "noon.parquet")
-    with pytest.raises(ValueError, match=r"noon\.parquet: the time holds neither"):
+    with pytest.raises(ValueError, match=r"noon\.parquet.*neither a number nor a time"):
         fq.open(tmp_path / "noon.parquet", "u", "y")
 
 
@@ -138,3 +138,28 @@ def test_what_is_refused(tmp_path):
     (tmp_path / "a.csv").write_text("1")
     with pytest.raises(ValueError, match=r"suffix='\.csv'"):
         fq.open(tmp_path / "a.csv")
+
+
+def test_times_in_other_units_and_conditions(tmp_path):
+    import pandas as pd
+
+    at = {"time": np.round(1e3 * RECORD.time).astype(int), "u": RECORD.u, "y": RECORD.y}
+    for name, stamps in {
+        "t_ms": at["time"], "time [ms]": at["time"].astype(float),
+        "time": 1_790_000_000_000_000_000 + 1_000_000 * at["time"],
+    }.items():  # fmt: skip
+        frame = pd.DataFrame({name: stamps, "u [N m]": RECORD.u, "y": RECORD.y})
+        frame.to_parquet(tmp_path / "ms.parquet")
+        stream = fq.open(tmp_path / "ms.parquet")
+        assert stream.dt == pytest.approx(DT), name
+        assert stream.input_names == ("u",)
+        assert fq.open(tmp_path / "ms.parquet", dt=1.0).dt == 1
+    fq.write(RECORD.with_conditions(q=0.5), tmp_path / "q.parquet")
+    stream = fq.open(tmp_path / "q.parquet")
+    assert stream.conditions == {"q": 0.5}
+    assert fq.h1(stream, 1000).conditions == {"q": 0.5}
+    assert stream.load(100).conditions == {"q": 0.5}
+    with pytest.raises(ValueError, match="stop"):
+        stream.load(stop=1.5)
+    with pytest.raises(ValueError, match="stream"):
+        fq.etfe(stream)

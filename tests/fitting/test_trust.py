@@ -214,3 +214,27 @@ def test_the_report_shows_how_another_record_is_explained(tmp_path):
     train, other = (fq.simulate(LAG, u, DT).with_noise(0.1, seed=s) for s in (1, 2))
     fq.fit(LAG, train).report(tmp_path / "est.html", validation=other)
     assert "nother record" in (tmp_path / "est.html").read_text()
+
+
+def unlike_noise(seed, sizes=(0.02, 0.1, 0.4)):
+    records = []
+    for i, size in enumerate(sizes):
+        record = fq.simulate(LAG, fq.white_noise(600, seed=10 * seed + i), DT)
+        records.append(record.with_noise(size * record.y.std(), seed=10 * seed + i))
+    return records
+
+
+def test_experiments_whose_noise_is_unlike():
+    """A quiet experiment beside a loud one is no spike, no drift and no other plant."""
+    pulls, warned, grades = [], 0, []
+    for seed in range(25):
+        est = fq.fit(LAG, unlike_noise(seed))
+        warned += len(est.warnings)
+        grades.append(est.verdict.grade)
+        pulls.append([(est[n] - v) / est.parameters["std"][n] for n, v in TRUTH.items()])
+    assert warned <= 3
+    assert grades.count("trust") >= 22
+    assert (np.abs(np.std(pulls, axis=0) - 1) < 0.4).all()
+    other = fq.simulate(LAG.with_values(b=52), fq.white_noise(600, seed=7), DT).with_noise(0.02)
+    mixed = fq.fit(LAG, [*unlike_noise(1), other])
+    assert "unlike experiments" in [w.kind for w in mixed.warnings]

@@ -52,3 +52,21 @@ def test_what_it_cannot_take(plant, slow):
         fq.fit(plant, slow, error="logarithm")
     with pytest.raises(ValueError, match="zero at a line"):
         fq.fit(plant, fq.FrequencyResponse([1.0, 2.0, 3.0, 4.0, 5.0], [1, 0, 1, 1, 1]), error="log")
+
+
+def test_weights_of_logarithms_shift_no_gain():
+    """Weighed by the measured response lines that noise made larger would count for more."""
+
+    def mode(w, z, g):
+        return [[0, 1], [-(w**2), -2 * z * w]], [[0], [g * w**2]], [[1, 0]], None
+
+    plant = fq.GreyBox(mode, [fq.Parameter(n, v) for n, v in (("w", 40), ("z", 0.2), ("g", 1))])
+    f, rng, pulls = np.linspace(1, 20, 600), np.random.default_rng(1), []
+    G = plant.frequency_response(2 * np.pi * f).response[0, 0]
+    for _ in range(12):
+        noise = rng.standard_normal((2, 600)) / np.sqrt(2)
+        measured = G * (1 + 0.1 * (noise[0] + 1j * noise[1]))
+        frf = fq.FrequencyResponse(f, measured, variance=(0.1 * np.abs(G)) ** 2)
+        est = fq.fit(plant, frf, error="log")
+        pulls.append((est["g"] - 1) / est.parameters["std"]["g"])
+    assert abs(np.mean(pulls)) < 4 / np.sqrt(12)

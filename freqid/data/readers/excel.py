@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from freqid.checks import InputError
+from freqid.checks import InputError, unknown
 from freqid.data.readers.kinds import damaged, missing, reads
 from freqid.data.readers.table import heading
 
@@ -14,8 +14,11 @@ if TYPE_CHECKING:
 
 
 @reads(".xlsx", ".xls", ".xlsm", ".ods")
-def read_excel(path: Path) -> pd.DataFrame:
-    """The columns of a sheet; ValueError for a damaged file, or without python-calamine."""
+def read_excel(path: Path, group: str | None = None) -> pd.DataFrame:
+    """The columns of the sheet ``group``, or of the first that has some.
+
+    Raises ValueError for a damaged file, a sheet that is not there, or without python-calamine.
+    """
     import pandas as pd
 
     try:
@@ -28,7 +31,10 @@ def read_excel(path: Path) -> pd.DataFrame:
     except Exception as error:
         # calamine has errors of many kinds for a file that is not what it says
         raise damaged("a workbook", error) from None
-    for name, rows in sheets.items():
+    if group is not None and group not in sheets:
+        raise InputError(unknown("group", group, sheets))
+    found: list[pd.DataFrame] = []
+    for name, rows in sheets.items() if group is None else [(group, sheets[group])]:
         rows = [r for r in rows if any(c not in ("", None) for c in r)]
         body = [
             i for i, r in enumerate(rows) if sum(_is_number(c) for c in r) >= max(len(r) - 1, 1)
@@ -41,8 +47,13 @@ def read_excel(path: Path) -> pd.DataFrame:
         frame = frame.iloc[:, :width].infer_objects()
         frame.columns = names
         frame.attrs.update(units=units, found=f"sheet {name!r}, columns {', '.join(names)}")
-        return frame
-    raise InputError(f"holds no columns of numbers in its sheets ({', '.join(sheets)})")
+        found.append(frame)
+    if not found:
+        raise InputError(f"holds no columns of numbers in its sheets ({', '.join(sheets)})")
+    if len(found) > 1:
+        others = ", ".join(f.attrs["found"].split(",")[0] for f in found[1:])
+        found[0].attrs["notes"] = [f"the first sheet was read; {others} are there, too: group="]
+    return found[0]
 
 
 def _is_number(cell: Any) -> bool:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, unknown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,6 +65,25 @@ def existing(path: Path) -> Path:
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
     return path
+
+
+def of_one_group(
+    found: Mapping[str, Mapping[str, object]], group: str | None, what: str
+) -> Mapping[str, object]:
+    """Arrays by name of the group that is asked for, or of all where none says what another does.
+
+    ``found`` are the arrays of each group, "" of none. Raises ValueError where a group must be
+    named.
+    """
+    if group is not None:
+        if group.strip("/") not in found:
+            raise InputError(unknown("group", group, [g for g in found if g]))
+        return found[group.strip("/")]
+    names = [n for arrays in found.values() for n in arrays]
+    if len(set(names)) < len(names):
+        groups = ", ".join(g or "its top" for g in found)
+        raise InputError(f"holds several {what}s of the same names, {groups}; name one, group=...")
+    return {n: a for arrays in found.values() for n, a in arrays.items()}
 
 
 def missing(kind: str, package: str, extra: str) -> InputError:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError, whole
+from freqid.checks import InputError, unknown, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
@@ -87,7 +88,12 @@ def fit_many(
     named = _named(records)
     if not named:
         raise InputError("records=[] holds nothing to be fitted")
-    task = _Task(model, _checked(fit_options), dict(reading or {}), verdicts)
+    task = _Task(
+        model,
+        _checked("option", fit, fit_options),
+        _checked("reading", read, reading or {}),
+        verdicts,
+    )
     names = list(named)
     # a text is a path, whose file may change
     known = {n: Path(s) if isinstance(s, str) else s for n, s in named.items()}
@@ -152,16 +158,14 @@ def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source
     return named
 
 
-def _checked(options: Mapping[str, Any]) -> dict[str, Any]:
-    """ValueError for an option that ``fit`` does not have."""
-    import inspect
-
-    from freqid.checks import unknown
-
-    known = [n for n, p in inspect.signature(fit).parameters.items() if p.kind is p.KEYWORD_ONLY]
+def _checked(what: str, function: Callable[..., object], options: Mapping[str, Any]) -> Row:
+    """ValueError for an option that the function does not have."""
+    parameters = list(inspect.signature(function).parameters.values())
+    # the first is what is fitted or read
+    known = [p.name for p in parameters[1:] if p.name != "data"]
     for name in options:
         if name not in known:
-            raise InputError(unknown("option", name, known))
+            raise InputError(unknown(what, name, known))
     return dict(options)
 
 

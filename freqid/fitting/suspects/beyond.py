@@ -84,8 +84,9 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     P = int(free.sum())
     if len(scene.seen) < 2 or P == 0 or len(scene.seen) * P > _MOST:
         return []
-    gain, rank, chi = 0.0, 0, 0.0
-    steps = []
+    gain, rank = 0.0, 0
+    steps, told_by = [], []
+    unit = np.maximum(np.linalg.norm(scene.jacobian[free], axis=1), 1e-300)
     first = 0
     for s in scene.seen:
         J = s.jacobian[free]
@@ -97,14 +98,20 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
         along = Vt @ s.left
         variance = scene.variance[first : first + len(s.left)]
         first += len(s.left)
-        chi += float(along @ np.linalg.solve((Vt * variance) @ Vt.T, along))
+        L = np.linalg.cholesky((Vt * variance) @ Vt.T)
+        told_by.append(np.linalg.solve(L, np.column_stack([along, (Vt @ J.T) / unit])))
         gain, rank = gain + float(along @ along), rank + len(Vt)
         steps.append(-((U[:, told] / sv[told]) @ along) / size)
     degrees, freedom = rank - P, scene.freedom - rank + P
     if degrees < 1 or freedom < 1:
         return []
-    if scene.white:
+    if scene.even:
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
+    else:
+        # what is left of all where each counts by its own noise: the pooled estimate counts by none
+        own, slopes = np.split(np.concatenate(told_by), [1], axis=1)
+        apart = own - slopes @ np.linalg.lstsq(slopes, own)[0]
+        chi = float(np.sum(apart**2))
     variance = np.diag(inquiry.minimum.covariance)[free]
     with np.errstate(all="ignore"):
         shift = np.abs(np.array(steps)) / np.sqrt(variance)
@@ -146,6 +153,6 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     f = more * freedom / degrees
     gain = scene.cost * more / (1 + more)
     # where the noise is coloured its shape is as uncertain as the place of the mode
-    places = sum(s.experiment.n_lines for s in scene.seen) ** (1 if scene.white else 2)
+    places = sum(s.experiment.n_lines for s in scene.seen) ** (1 if scene.even else 2)
     p = min(float(scipy.stats.f.sf(f, degrees, freedom)) * places, 1.0)
     return [Asked("another mode", Score(f, degrees, p, np.nan, 1.0, np.nan, gain), "", p)]

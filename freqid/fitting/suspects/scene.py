@@ -18,7 +18,13 @@ from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.uncertainty.noise_spectrum import is_white, local_power, projected
+from freqid.fitting.uncertainty.noise_spectrum import (
+    alike,
+    channel_power,
+    is_white,
+    local_power,
+    projected,
+)
 from freqid.lti import Plane, sum_runs
 from freqid.models import Model
 
@@ -196,9 +202,9 @@ class Scene:
         return rows - len(self.absorbed)
 
     @cached_property
-    def white(self) -> bool:
-        """Whether the power that is left is spread evenly over the lines of every experiment."""
-        return self.is_white(self.left)
+    def even(self) -> bool:
+        """Whether the power that is left is the same at all lines of all channels."""
+        return self.is_even(self.left)
 
     @cached_property
     def variance(self) -> FloatArray:
@@ -210,19 +216,24 @@ class Scene:
         ends = np.cumsum([len(s.left) for s in self.seen])
         return np.split(rows, ends)[:-1]
 
-    def is_white(self, rows: FloatArray) -> bool:
-        """The same of other rows (R,)."""
-        parts = zip(self.seen, self._parted(rows), strict=True)
-        return all(is_white(part, s.experiment) for s, part in parts)
+    def is_even(self, rows: FloatArray) -> bool:
+        """Whether the power of rows (R,) is the same at all lines of all channels."""
+        parts = [
+            (part, s.experiment) for s, part in zip(self.seen, self._parted(rows), strict=True)
+        ]
+        if not all(is_white(part, e) for part, e in parts):
+            return False
+        powers, counts = zip(*(channel_power(part, e) for part, e in parts), strict=True)
+        return alike(np.concatenate(powers), np.concatenate(counts))
 
     def variance_of(self, rows: FloatArray) -> FloatArray:
         """Variance of each row's noise (R,) where these are what it leaves."""
         every = float(rows @ rows) / max(self.freedom, 1)
-        if self.is_white(rows):
+        if self.is_even(rows):
             return np.full(len(rows), every)
         share = len(rows) / max(self.freedom, 1)
         parts = zip(self.seen, self._parted(rows), strict=True)
-        local = [local_power(part, s.experiment) * share for s, part in parts]
+        local = [_power_at(part, s.experiment) * share for s, part in parts]
         return np.concatenate([*local, np.full(len(self.known), every)])
 
     def stacked(self, columns: Sequence[FloatArray]) -> FloatArray:
@@ -235,3 +246,11 @@ class Scene:
         alone = self.stacked([s.without_free(c) for s, c in zip(self.seen, columns, strict=True)])
         B = self.absorbed
         return alone - (alone @ B.T) @ B
+
+
+def _power_at(rows: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """Variance of each real value (rows,): its channel's where that is white, else around it."""
+    if not is_white(rows, e):
+        return local_power(rows, e)
+    powers, _ = channel_power(rows, e)
+    return np.repeat(powers, 2 * e.n_lines)

@@ -86,7 +86,7 @@ def score(
     gain = float(along @ along)
     # the noise is what the suspect leaves: with it inside a strong one would hide itself
     rest = scene.left - along @ Vt
-    if scene.is_white(rest):
+    if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
     else:
         spread = (Vt * scene.variance_of(rest)) @ Vt.T

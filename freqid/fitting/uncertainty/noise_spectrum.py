@@ -10,8 +10,9 @@ import scipy.stats
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
-from freqid.lti import eliminate
+from freqid.lti import Realisation, eliminate
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000
@@ -96,9 +97,10 @@ def score_covariance(
     the data alone are least: what they leave there is noise, what a prior makes them leave is not.
     """
     lines = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+    stamped = [e for e in objective.experiments if isinstance(e, StampedExperiment)]
     if all(isinstance(e, TimeExperiment) for e in objective.experiments):
         return _of_samples(objective, x, alone)
-    if len(lines) < len(objective.experiments):
+    if len(lines) + len(stamped) < len(objective.experiments):
         return None
     try:
         realisation = objective.structure.realise(x)
@@ -121,10 +123,15 @@ def score_covariance(
                 total += (J * local_power(left, few)) @ J.T / step
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)
+        for log in stamped:
+            part, n_free = _of_stamps(log, realisation, noise_at)
+            total += part
+            rows += log.n_rows
+            unknown += n_free
     if not np.isfinite(total).all():
         return None
     # lines of a response have had their share of the freedom taken off one by one
-    if all(e.response for e in lines):
+    if lines and not stamped and all(e.response for e in lines):
         return total
     return total * rows / max(rows - unknown - len(x), 1)
 
@@ -162,6 +169,22 @@ def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -
     if not np.isfinite(total).all():
         return None
     return total * rows / max(rows - unknown - len(x), 1)
+
+
+def _of_stamps(
+    e: StampedExperiment, at: Realisation, noise_at: Realisation
+) -> tuple[FloatArray, int]:
+    """The same of samples at times of their own, each output's noise taken for white, and how many
+    unknowns its initial state has.
+    """
+    evaluation = e.at(at)
+    left, Q, delta = projected(evaluation)
+    J = evaluation.jacobian(delta)
+    J = J - (J @ Q.T) @ Q
+    if noise_at is not at:
+        left = projected(e.at(noise_at))[0]
+    power = np.mean(left.reshape(e.y.shape) ** 2, axis=0)
+    return (J * np.tile(power, len(e.y))) @ J.T, 0 if delta is None else len(delta)
 
 
 def _of_response(J: FloatArray, residual: FloatArray, e: SpectralExperiment) -> FloatArray:
@@ -215,6 +238,31 @@ def local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
     # half of a complex error's power is in each of its parts
     power: FloatArray = np.repeat(local.ravel() / 2, 2)
     return power
+
+
+def channel_power(residual: FloatArray, e: SpectralExperiment) -> tuple[FloatArray, FloatArray]:
+    """Mean squared residual of each channel's real values, and how many count, (channels,)."""
+    each = residual.view(complex).reshape(-1, e.n_lines)
+    counted = 2 * (e.lines.scale > 0).reshape(each.shape).sum(axis=1)
+    return (np.abs(each) ** 2).sum(axis=1) / np.maximum(counted, 1), counted
+
+
+def alike(powers: FloatArray, counts: FloatArray) -> bool:
+    """Whether mean squares of Gaussian values are of one variance: Bartlett's test.
+
+    Source: Bartlett, Proc. Royal Society A 160, 1937.
+    """
+    used = counts > 1
+    s, n = powers[used], counts[used].astype(float)
+    k = len(s)
+    if k < 2:
+        return True
+    if not (s > 0).all():
+        return False
+    pooled = float(n @ s / n.sum())
+    wider = 1 + (np.sum(1 / n) - 1 / n.sum()) / (3 * (k - 1))
+    q = (n.sum() * np.log(pooled) - n @ np.log(s)) / wider
+    return bool(scipy.stats.chi2.sf(q, k - 1) >= _LEVEL)
 
 
 def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:

@@ -1,0 +1,60 @@
+"""Channels by name: a record's inputs and outputs in the order of a model's."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record
+
+
+def in_order_of(model: object, data: DataSet) -> DataSet:
+    """The data with channels in the model's order, where both have the same names.
+
+    Channels of other names are taken by place. Raises ValueError where an input has the name of one
+    of the model's outputs, or the other way round.
+    """
+    own = [tuple(getattr(model, side, None) or ()) for side in ("inputs", "outputs")]
+    told = data.input_names, data.output_names
+    for side, names, others in (("input", told[0], own[1]), ("output", told[1], own[0])):
+        wrong = sorted(set(names) & set(others))
+        if wrong and set(names) != set(own[side == "output"]):
+            raise InputError(
+                f"{wrong[0]!r} is an {side} of the data and an "
+                f"{'output' if side == 'input' else 'input'} of the model: "
+                "give the data, or the model, the other way round"
+            )
+    u, y = (_order(a, b) for a, b in zip(own, told, strict=True))
+    if u is None and y is None:
+        return data
+    inputs, outputs = own[0] if u else told[0], own[1] if y else told[1]
+    if isinstance(data, Record):
+        return data.select(list(inputs), list(outputs))
+    if isinstance(data, PeriodicResponse):
+        raise InputError(
+            f"the response has inputs {', '.join(told[0])} and outputs {', '.join(told[1])}, the "
+            "model the same in another order: name the model's channels in that of the data"
+        )
+    return _turned(data, u or range(len(told[0])), y or range(len(told[1])))
+
+
+def _order(wanted: Sequence[str], given: Sequence[str]) -> list[int] | None:
+    """Places of the wanted names, None where they are there in order, or not at all."""
+    if tuple(wanted) == tuple(given) or sorted(wanted) != sorted(given):
+        return None
+    return [list(given).index(n) for n in wanted]
+
+
+def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> FrequencyResponse:
+    at = np.ix_(list(y), list(u))
+    return dataclasses.replace(
+        frf, response=frf.response[at],
+        variance=None if frf.variance is None else frf.variance[at],
+        coherence=None if frf.coherence is None else frf.coherence[at],
+        input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[list(u)],
+        input_names=tuple(frf.input_names[i] for i in u),
+        output_names=tuple(frf.output_names[i] for i in y),
+    )  # fmt: skip
