@@ -54,10 +54,8 @@ class Estimate(Shown):
         signs: the ``warnings`` that the fit itself gave.
         problem: the Minimum (structure, experiments, prior), for what asks for more.
         data: the data sets that were fitted; ``band`` (Hz) and ``weights`` as they were given.
-        call: the call of ``fit``, to be made again.
-        testimony: what the ``witness`` is heard on.
-        inquiry: what asks the ``suspects``.
-        notes: what was done on the way, in sentences.
+        call: the call of ``fit``, to be made again; ``notes``: what was done on the way.
+        testimony: what the ``witness`` is heard on; ``inquiry``: what asks the ``suspects``.
     """
 
     model: Any
@@ -140,9 +138,8 @@ class Estimate(Shown):
     @property
     def spread(self) -> Spread:
         """How the estimate scatters: covariance, and how it is carried to modes and responses."""
-        if isinstance(self.uncertainty, Spread):
-            return self.uncertainty
-        return Spread(np.ones(len(self.values)), given=self.uncertainty)
+        own = self.uncertainty
+        return own if isinstance(own, Spread) else Spread(np.ones(len(self.values)), given=own)
 
     @property
     def _unknowns(self) -> tuple[EstimatedStructure, FloatArray, Spread]:
@@ -271,7 +268,10 @@ class Estimate(Shown):
 
     def modes(self) -> pd.DataFrame:
         """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
-        return modes(*self._unknowns)
+        known: pd.DataFrame | None = self.__dict__.get(
+            "known_modes"
+        )  # of an estimate that was kept
+        return modes(*self._unknowns) if known is None else known
 
     def pole_scatter(self) -> tuple[ComplexArray, FloatArray]:
         """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""

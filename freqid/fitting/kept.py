@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import datetime
-import hashlib
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,9 +15,12 @@ from freqid.data import DataSet, Record, whole_file
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.grades import Verdict
-from freqid.fitting.met import remembered
+from freqid.fitting.met import data_digest, remembered
 from freqid.fitting.search.verdict import Witness
 from freqid.models import GreyBox, hold_of_dict, hold_to_dict, model_of_dict, model_to_dict
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Json = Any
 Written = dict[str, Any]
@@ -70,6 +72,8 @@ def written(est: Estimate) -> Written:
         "call": est.call,
         "findings": [_finding(w) for w in est.warnings],
         "data": [_described(d) for d in est.data],
+        "suspects": _table(est.suspects),
+        "modes": _table(est.modes()) if est.problem is not None else None,
     }
 
 
@@ -150,9 +154,28 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"])
                   for w in kept["findings"]],
         parameters=table,
+        digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip
+    for name, key in (("suspects", "suspects"), ("known_modes", "modes")):
+        if kept.get(key) is not None:
+            est.__dict__[name] = _frame(kept[key])
     return est
+
+
+def _table(frame: pd.DataFrame) -> Written:
+    """A table as columns by name and its index."""
+    return {
+        "columns": {str(c): frame[c].tolist() for c in frame.columns},
+        "index": list(frame.index), "name": frame.index.name,
+    }  # fmt: skip
+
+
+def _frame(kept: Written) -> pd.DataFrame:
+    import pandas as pd
+
+    index = pd.Index(kept["index"], name=kept["name"])
+    return pd.DataFrame(kept["columns"], index=index)
 
 
 def _finding(warning: str) -> Written:
@@ -166,14 +189,11 @@ def _finding(warning: str) -> Written:
 
 def _described(data: DataSet) -> Written:
     """What the data were, and a fingerprint that tells whether others are the same."""
-    digest = hashlib.sha256()
-    arrays = (data.u, data.y) if isinstance(data, Record) else (data.frequency, data.response)
-    for array in arrays:
-        digest.update(np.ascontiguousarray(array).tobytes())
     about = {
         "kind": type(data).__name__, "inputs": list(data.input_names),
         "outputs": list(data.output_names), "dt": data.dt, "conditions": dict(data.conditions),
-        "samples": len(arrays[0]), "sha256": digest.hexdigest(),
+        "samples": len(data.u if isinstance(data, Record) else data.frequency),
+        "sha256": data_digest(data),
     }  # fmt: skip
     if isinstance(data, Record):
         about |= {"input_dt": data.input_dt, "hold": hold_to_dict(data.hold)}

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 
+import numpy as np
+
 from freqid.checks import InputError
-from freqid.data import DataSet, input_dt
+from freqid.data import DataSet, Record, input_dt
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 from freqid.lti import Hold
-from freqid.models import Model, ModelLike, as_model
+from freqid.models import GreyBox, Model, ModelLike, as_model
 
 
 def remembered(est: Estimate) -> tuple[Hold | None, float | None]:
@@ -40,15 +43,33 @@ def met(model: ModelLike, data: DataSet) -> Model:
         return as_model(model).met_at(data.conditions)
     own = {found[1] for n in model.names if (found := re.fullmatch(r"(.+)\[\d+\]", n))}
     own &= set(getattr(model.model, "values", {}))
-    for place, fitted in enumerate(model.data):
-        if fitted is data and model.problem is not None and own:
-            structure = model.problem.structure
-            assert isinstance(structure, GreyStructure)
-            return structure.at(model.problem.x, place)
+    given: Model = model.model
+    if own and isinstance(given, GreyBox):
+        place = _place(model, data)
+        if place is not None:
+            values = {n: model[f"{n}[{place}]"] for n in own if f"{n}[{place}]" in model.names}
+            return given.with_values(**values).met_at(data.conditions)
     for name in sorted(own - set(data.conditions)):
         raise InputError(
             f"{name} has a value for each experiment that was fitted, and this is none of them: "
             f"say its own with data.with_conditions({name}=...)"
         )
-    given: Model = model.model
     return given.met_at(data.conditions)
+
+
+def _place(est: Estimate, data: DataSet) -> int | None:
+    """Which of the experiments that were fitted the data are, here or before it was saved."""
+    for place, fitted in enumerate(est.data):
+        if fitted is data:
+            return place
+    digests = est.__dict__.get("digests", [])
+    own = data_digest(data) if digests else ""
+    return digests.index(own) if own in digests else None
+
+
+def data_digest(data: DataSet) -> str:
+    """A fingerprint of samples or response, which tells whether others are the same."""
+    digest = hashlib.sha256()
+    for array in (data.u, data.y) if isinstance(data, Record) else (data.frequency, data.response):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

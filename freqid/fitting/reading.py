@@ -24,6 +24,7 @@ from freqid.data import (
 )
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
+from freqid.fitting.cost.noise_ends import noise_ends
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
@@ -206,6 +207,10 @@ class Reading:
         free = self.initial_state != "steady"
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
         made = dataclasses.replace(made, place=self.place)
+        whole = self.band is None
+        if whole and free and self.noise.to_be_learnt and not self.noise.plain:
+            number = np.round(s.omega * s.n_samples * s.dt / (2 * np.pi)).astype(int)
+            made = made.with_shapes(noise_ends(number, s.n_samples, np.atleast_2d(weights)))
         return made.with_offsets(s.n_samples) if self.offset else made
 
     def _logarithm(self) -> LogResponse:

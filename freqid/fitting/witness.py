@@ -30,8 +30,8 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
+from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.fitting.uncertainty.noise_spectrum import evenly_spread
 from freqid.models import DiscreteModel, Model
 
 # level below which the black box explains the data so much better that it is no chance

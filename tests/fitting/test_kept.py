@@ -57,6 +57,8 @@ def test_what_is_kept(kind, tmp_path):
         assert kept.modes()["frequency"].tolist() == pytest.approx(
             est.modes()["frequency"].tolist()
         )
+    assert kept.suspects.equals(est.suspects)
+    assert kept.modes().equals(est.modes())
     assert np.array_equal(kept.to_control().A, est.to_control().A)
     kept.save(tmp_path / "again.json")
     assert fq.load(tmp_path / "again.json").verdict == est.verdict

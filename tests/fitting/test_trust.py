@@ -238,3 +238,29 @@ def test_experiments_whose_noise_is_unlike():
     other = fq.simulate(LAG.with_values(b=52), fq.white_noise(600, seed=7), DT).with_noise(0.02)
     mixed = fq.fit(LAG, [*unlike_noise(1), other])
     assert "unlike experiments" in [w.kind for w in mixed.warnings]
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_error_bars_in_coloured_noise_of_short_records(outputs):
+    """A drifting input and red noise: weights that run around would meet the jump at the ends."""
+
+    def joint(J, k, fm):
+        C = [[1, 0], [0, 1]][:outputs]
+        return [[0, 1], [-k / J, -fm / J]], [[0], [1 / J]], C, None
+
+    true = {"J": 1.0, "k": 400.0, "fm": 2.0}
+    plant = fq.GreyBox(joint, [fq.Parameter(n, v) for n, v in true.items()])
+    u = 0.3 * np.random.default_rng(0).standard_normal(500).cumsum()
+    clean = fq.simulate(plant, u, 5e-3)
+    values, told = [], []
+    for seed in range(40):
+        noise = np.column_stack([slow_noise(100 * o + seed, 500) for o in range(outputs)])
+        y = clean.outputs + 0.1 * clean.outputs.std(axis=0) * noise
+        record = dataclasses.replace(clean, y=y if outputs > 1 else y[:, 0])
+        est = fq.fit(plant, record, weights="noise")
+        values.append(est.values)
+        told.append(est.parameters["std"])
+    ratio = np.sqrt(np.mean(np.square(told), axis=0)) / np.std(values, axis=0)
+    # 0.6 to 0.8 before
+    assert (ratio > 0.78).all(), ratio
+    assert (ratio < 1.4).all(), ratio

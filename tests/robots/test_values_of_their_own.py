@@ -1,5 +1,7 @@
 """Experiments that met plants of their own, in whatever uses the estimate afterwards."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -39,12 +41,24 @@ def test_each_way_to_fit_finds_them(options):
     assert est["k"] == pytest.approx(400, rel=2e-3)
 
 
-def test_a_comparison_is_with_the_plant_that_the_record_met():
+def test_a_condition_that_one_record_does_not_say_is_noted():
+    data = records()
+    silent = dataclasses.replace(data[1], conditions={})
+    est = fq.fit(cart(), [data[0], silent])
+    assert any("data[1] do not say it" in note for note in est.notes), est.notes
+
+
+def test_a_comparison_is_with_the_plant_that_the_record_met(tmp_path):
     data = records()
     est = fq.fit(cart(), data, separate="d")
     for record in data:
         assert fq.compare(est, record).fit_percent[0] > 85
         assert fq.residual_test(est, record)["passed"].all()
+    assert any("d[0]" in note for note in est.notes)
+    est.save(tmp_path / "carts.json")
+    kept = fq.load(tmp_path / "carts.json", model=cart())
+    for record in data:
+        assert fq.compare(kept, record).fit_percent == fq.compare(est, record).fit_percent
     other = records(seed=1)[2]
     with pytest.raises(ValueError, match=r"d has a value for each.*with_conditions\(d=\.\.\.\)"):
         fq.compare(est, other)

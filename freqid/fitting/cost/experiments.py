@@ -20,7 +20,7 @@ from typing import Protocol
 
 import numpy as np
 
-from freqid.checks import FloatArray, IntArray
+from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.data import FrequencyResponse
 from freqid.fitting.cost.evaluation import SpectralEvaluation, SumOfEvaluations
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
@@ -72,9 +72,9 @@ class SpectralExperiment:
     ``lift`` inputs of one slow period stand in turn for each input of the plant; a ``discrete``
     model's matrices are taken as they are. ``n_rows`` counts real values. The noise of a
     ``response`` need not be alike at lines that are neighbours, and may go together within the
-    ``reach`` of some lines. ``added`` (q, rows) are shapes of unknown size in the output, offsets
-    of the sensor, which are eliminated with the initial state. ``place`` is the number of the
-    experiment where these differ in more than their data.
+    ``reach`` of some lines. ``added`` (q, rows) are shapes of unknown size in the output, the
+    noise's past and offsets of the sensor, which are eliminated with the initial state. ``place``
+    is the number of the experiment where these differ in more than their data.
     """
 
     lines: Lines
@@ -150,11 +150,16 @@ class SpectralExperiment:
         zero = self.lines.omega == 0
         if not zero.any():
             return self
-        p, channels, K = self.lines.Y.shape
-        unit = np.zeros((p, p, channels, K), complex)
-        unit[np.arange(p), np.arange(p)] = n_samples * self.lines.scale * zero
-        rows = unit.reshape(p, -1).view(float)
-        return dataclasses.replace(self, added=rows)
+        p = len(self.lines.Y)
+        return self.with_shapes(n_samples * np.eye(p, dtype=complex)[:, :, None] * zero)
+
+    def with_shapes(self, shapes: ComplexArray) -> SpectralExperiment:
+        """The same where shapes (q, outputs, K) of unknown size are added to the outputs' lines."""
+        if not len(shapes):
+            return self
+        rows = (shapes[:, :, None] * self.lines.scale).reshape(len(shapes), -1).view(float)
+        before = [] if self.added is None else [self.added]
+        return dataclasses.replace(self, added=np.concatenate([*before, rows]))
 
     def in_plane(self, plane: Plane) -> SpectralExperiment:
         """The same lines of a sampled model, in z until now, seen in another plane."""

@@ -47,6 +47,18 @@ def places_of(
         f"condition {n}: no data set says it; the model's own {model.conditions[n]:g} is taken"
         for n in silent
     ]
+    for n in (n for n in model.conditions if n not in silent):
+        lacking = [str(i) for i, d in enumerate(data) if n not in d.conditions]
+        if lacking:
+            notes.append(
+                f"condition {n}: data[{'], data['.join(lacking)}] do not say it, unlike the "
+                f"others; the model's own {model.conditions[n]:g} is taken there"
+            )
+    for n in separate:
+        notes.append(
+            f"{n} has a value for each experiment: est.model, and what is drawn or derived from it "
+            f"alone, has that of the first, {n}[0]; compare(est, record) takes the record's own"
+        )
     return places, notes
 
 

@@ -105,13 +105,13 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     degrees, freedom = rank - P, scene.freedom - rank + P
     if degrees < 1 or freedom < 1:
         return []
-    if scene.even:
-        chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
-    else:
-        # what is left of all where each counts by its own noise: the pooled estimate counts by none
-        own, slopes = np.split(np.concatenate(told_by), [1], axis=1)
-        apart = own - slopes @ np.linalg.lstsq(slopes, own)[0]
-        chi = float(np.sum(apart**2))
+    # what is left of all where each counts by its own noise: the pooled estimate counts by none
+    own, slopes = np.split(np.concatenate(told_by), [1], axis=1)
+    apart = (own - slopes @ np.linalg.lstsq(slopes, own)[0])[:, 0] ** 2
+    pooled = max(scene.cost - gain, 1e-300) / freedom
+    chi = gain / pooled if scene.even else float(np.sum(apart))
+    ends = np.cumsum([len(rows) for rows in told_by])[:-1]
+    most = int(np.argmax([part.sum() for part in np.split(apart, ends)]))
     variance = np.diag(inquiry.minimum.covariance)[free]
     with np.errstate(all="ignore"):
         shift = np.abs(np.array(steps)) / np.sqrt(variance)
@@ -120,7 +120,8 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     p = float(scipy.stats.f.sf(f, degrees, freedom))
     x = scene.x[free]
     size = float(np.max(np.abs(np.array(steps)) / np.maximum(np.abs(x), 1e-300)))
-    test = Score(f, degrees, p, size, 1.0, largest, gain)
+    change = float(np.max(np.abs(steps[most]) / np.maximum(np.abs(x), 1e-300)))
+    test = Score(f, degrees, p, size, 1.0, largest, gain, change)
     return [Asked("unlike experiments", test, "relative", p)]
 
 

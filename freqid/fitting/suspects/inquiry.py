@@ -95,8 +95,11 @@ class Inquiry:
         """How much better the data are explained, less what as many unknowns do by chance."""
         left = max(scene.cost - a.test.gain, 1e-12 * scene.cost)
         n = max(scene.freedom, 2)
-        places = 2 * np.log(a.trials)
-        return float(n * np.log(scene.cost / left) - a.test.degrees * np.log(n) - places)
+        better = np.log(scene.cost / left)
+        if not scene.even:
+            # where the noise differs a quiet experiment says much that costs little
+            better = max(better, np.log1p(a.test.statistic * a.test.degrees / n))
+        return float(n * better - a.test.degrees * np.log(n) - 2 * np.log(a.trials))
 
     @cached_property
     def speaking(self) -> list[Asked]:
@@ -176,7 +179,7 @@ class Inquiry:
         if not named:
             return []
         strongest = self._evidence(scene, named[0])
-        near = [a for a in named if self._evidence(scene, a) >= _WORTH * strongest]
+        near = [a for a in named if self._evidence(scene, a) >= min(_WORTH * strongest, strongest)]
         said = [a for a in near if not self._negligible(scene, a)][:_SAID]
         found = [self._finding(scene, a) for a in said]
         if isinstance(self.model, GreyBox) or not said or said[0].name in _LIKELY:

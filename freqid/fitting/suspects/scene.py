@@ -17,14 +17,9 @@ from freqid.fitting.cost.objective import EstimatedStructure, Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
+from freqid.fitting.uncertainty.evenness import alike, channel_power, is_white
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.uncertainty.noise_spectrum import (
-    alike,
-    channel_power,
-    is_white,
-    local_power,
-    projected,
-)
+from freqid.fitting.uncertainty.noise_spectrum import local_power, projected
 from freqid.lti import Plane, sum_runs
 from freqid.models import Model
 

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import scipy.fft
 import scipy.ndimage
-import scipy.stats
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
+from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.lti import Realisation, eliminate
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000
-# level below which power that is spread unevenly is no chance
-_LEVEL = 0.01
 # autoregressions of at most this order, and lines that each order needs
 _ORDERS, _ORDER_LINES = 8, 15
+# leverage that is believed at the most
+_MOST = 0.9
 
 
 def smoothed_power(error: ComplexArray) -> FloatArray:
@@ -33,6 +33,22 @@ def smoothed_power(error: ComplexArray) -> FloatArray:
     K = power.shape[-1]
     shape = _autoregressive(power.reshape(-1, K)).reshape(power.shape)
     return shape * _local_mean(power / shape)
+
+
+def _spectrum(error: ComplexArray) -> FloatArray:
+    """The noise's power for errors (channels, K): an autoregression, where that makes it even.
+
+    Local means beside it would follow the very lines that they are to weigh, of which a parameter
+    may have few.
+    """
+    power = np.abs(error) ** 2
+    shape = _autoregressive(power)
+    whitened = power / shape
+    local = _local_mean(whitened)
+    for row, each in enumerate(whitened):
+        if evenly_spread(np.sqrt(each)[None]):
+            local[row] = each.mean()
+    return shape * local
 
 
 def _local_mean(power: FloatArray) -> FloatArray:
@@ -81,7 +97,7 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     In a record's cost, Σ 2|E|²/N, every real value then adds a half, as it does to a response's
     under weights of 1/variance.
     """
-    variance = smoothed_power(error)
+    variance = _spectrum(error)
     floor = 1e-12 * variance.max(initial=0)
     return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
 
@@ -120,6 +136,7 @@ def score_covariance(
             if e.response:
                 total += _of_response(J, left, few) / step
             else:
+                left = left / np.sqrt(1 - leverage(J, Q))
                 total += (J * local_power(left, few)) @ J.T / step
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)
@@ -169,6 +186,18 @@ def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -
     if not np.isfinite(total).all():
         return None
     return total * rows / max(rows - unknown - len(x), 1)
+
+
+def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
+    """Part of each complex error that parameters and initial state take on themselves, twice each,
+    (rows,): the few lines that tell a parameter leave less than their noise (MacKinnon and White,
+    J. Econometrics 29, 1985).
+    """
+    gram = J @ J.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
+    own = np.einsum("ak,ab,bk->k", J, half, J) + np.sum(Q**2, axis=0)
+    return np.repeat(np.minimum(own.reshape(-1, 2).mean(axis=1), _MOST), 2)
 
 
 def _of_stamps(
@@ -238,49 +267,3 @@ def local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
     # half of a complex error's power is in each of its parts
     power: FloatArray = np.repeat(local.ravel() / 2, 2)
     return power
-
-
-def channel_power(residual: FloatArray, e: SpectralExperiment) -> tuple[FloatArray, FloatArray]:
-    """Mean squared residual of each channel's real values, and how many count, (channels,)."""
-    each = residual.view(complex).reshape(-1, e.n_lines)
-    counted = 2 * (e.lines.scale > 0).reshape(each.shape).sum(axis=1)
-    return (np.abs(each) ** 2).sum(axis=1) / np.maximum(counted, 1), counted
-
-
-def alike(powers: FloatArray, counts: FloatArray) -> bool:
-    """Whether mean squares of Gaussian values are of one variance: Bartlett's test.
-
-    Source: Bartlett, Proc. Royal Society A 160, 1937.
-    """
-    used = counts > 1
-    s, n = powers[used], counts[used].astype(float)
-    k = len(s)
-    if k < 2:
-        return True
-    if not (s > 0).all():
-        return False
-    pooled = float(n @ s / n.sum())
-    wider = 1 + (np.sum(1 / n) - 1 / n.sum()) / (3 * (k - 1))
-    q = (n.sum() * np.log(pooled) - n @ np.log(s)) / wider
-    return bool(scipy.stats.chi2.sf(q, k - 1) >= _LEVEL)
-
-
-def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:
-    """Whether the squared residual is spread evenly over the lines that count, of each channel."""
-    each = residual.view(complex).reshape(-1, e.n_lines)
-    return evenly_spread(each[:, e.lines.counted])
-
-
-def evenly_spread(error: ComplexArray) -> bool:
-    """Whether the power of errors (channels, K) is spread evenly over the lines.
-
-    Bartlett's test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series,
-    1981, section 6.2.5).
-    """
-    power = np.abs(error) ** 2
-    K = power.shape[1]
-    total = power.sum(axis=1, keepdims=True)
-    share = np.cumsum(power, axis=1) / np.where(total > 0, total, 1)
-    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1) * (total[:, 0] > 0)
-    p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
-    return bool((p >= _LEVEL / len(power)).all())

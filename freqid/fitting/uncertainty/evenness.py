@@ -1,0 +1,58 @@
+"""Whether the power of what a fit leaves is the same at all lines, and in all channels."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.stats
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.cost.experiments import SpectralExperiment
+
+# level below which power that is spread unevenly is no chance
+_LEVEL = 0.01
+
+
+def channel_power(residual: FloatArray, e: SpectralExperiment) -> tuple[FloatArray, FloatArray]:
+    """Mean squared residual of each channel's real values, and how many count, (channels,)."""
+    each = residual.view(complex).reshape(-1, e.n_lines)
+    counted = 2 * (e.lines.scale > 0).reshape(each.shape).sum(axis=1)
+    return (np.abs(each) ** 2).sum(axis=1) / np.maximum(counted, 1), counted
+
+
+def alike(powers: FloatArray, counts: FloatArray) -> bool:
+    """Whether mean squares of Gaussian values are of one variance: Bartlett's test.
+
+    Source: Bartlett, Proc. Royal Society A 160, 1937.
+    """
+    used = counts > 1
+    s, n = powers[used], counts[used].astype(float)
+    k = len(s)
+    if k < 2:
+        return True
+    if not (s > 0).all():
+        return False
+    pooled = float(n @ s / n.sum())
+    wider = 1 + (np.sum(1 / n) - 1 / n.sum()) / (3 * (k - 1))
+    q = (n.sum() * np.log(pooled) - n @ np.log(s)) / wider
+    return bool(scipy.stats.chi2.sf(q, k - 1) >= _LEVEL)
+
+
+def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:
+    """Whether the squared residual is spread evenly over the lines that count, of each channel."""
+    each = residual.view(complex).reshape(-1, e.n_lines)
+    return evenly_spread(each[:, e.lines.counted])
+
+
+def evenly_spread(error: ComplexArray) -> bool:
+    """Whether the power of errors (channels, K) is spread evenly over the lines.
+
+    Bartlett's test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series,
+    1981, section 6.2.5).
+    """
+    power = np.abs(error) ** 2
+    K = power.shape[1]
+    total = power.sum(axis=1, keepdims=True)
+    share = np.cumsum(power, axis=1) / np.where(total > 0, total, 1)
+    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1) * (total[:, 0] > 0)
+    p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
+    return bool((p >= _LEVEL / len(power)).all())
