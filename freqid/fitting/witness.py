@@ -18,10 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import Record, StampedRecord
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -30,8 +31,9 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
-from freqid.fitting.uncertainty.evenness import evenly_spread
+from freqid.fitting.uncertainty.evenness import evenly_spread, together
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.uncertainty.noise_spectrum import projected
 from freqid.models import DiscreteModel, Model
 
 # level below which the black box explains the data so much better that it is no chance
@@ -107,8 +109,9 @@ class Testimony:
             return Witness("absent", "the data are too few for a black box beside it", cost)
         if top < 1:
             return self._alike(order, cost, grey.cost / cost - 1)
-        f = excess(structure, readings, boxes, grey) * bottom / top
-        p = float(scipy.stats.f.sf(f, top, bottom))
+        wider = shared(boxes)
+        f = excess(structure, readings, boxes, grey) * bottom / top / wider
+        p = float(scipy.stats.f.sf(f, top, bottom / wider))
         numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
         gap = grey.cost / cost - 1
         verdict, sentence = self._verdict(order, numbers, p, gap, self._open())
@@ -157,6 +160,26 @@ class Testimony:
             return self.minimum.solution
         begin = structure.start if late else self.minimum.x
         return polish(Objective(structure, [r.lines() for r in readings]), begin)
+
+
+def _left(boxes: Sequence[Reference]) -> list[tuple[FloatArray, SpectralExperiment]]:
+    """What black boxes leave, (rows,) of each experiment."""
+    left = []
+    for box in boxes:
+        realisation = box.objective.structure.realise(box.solution.x)
+        for e in box.objective.experiments:
+            assert isinstance(e, SpectralExperiment)
+            left.append((projected(e.at(realisation))[0], e))
+    return left
+
+
+def shared(boxes: Sequence[Reference]) -> float:
+    """How much larger a cost falls by chance where lines of responses share their noise."""
+    return (
+        together(_left(boxes))
+        if any(getattr(e, "reach", 0) for box in boxes for e in box.objective.experiments)
+        else 1.0
+    )
 
 
 def _groups(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:

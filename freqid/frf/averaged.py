@@ -21,7 +21,7 @@ from freqid.data import (
     references_of,
 )
 from freqid.frf.measured import measured
-from freqid.frf.segments import Averaging, Detrend, Window, independent
+from freqid.frf.segments import Averaging, Detrend, Window, independent, shared_lines
 
 # samples whose segments are transformed at once
 _PIECE = 1 << 19
@@ -152,6 +152,7 @@ class _Spectral:
     yy: ComplexArray
     averages: float
     first: Record | Stream
+    reach: int
     reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
 
 
@@ -186,6 +187,7 @@ def _spectral(
     keep = chosen(f, as_band(averaging.band, first.nyquist), positive=True)
     mean = {pair: S[keep] / count for pair, S in total.items()}
     averages = independent(averaging.window, length, step, count)
+    reach = shared_lines(averaging.window, length)
     if count < m:
         raise InputError(
             f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
@@ -196,7 +198,7 @@ def _spectral(
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
         _related(mean["uu"], mean["ur"], mean["rr"], averages)
-    return _Spectral(f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, joint)
+    return _Spectral(f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, reach, joint)
 
 
 def _pieces(
@@ -287,4 +289,5 @@ def _packed(
     output = _powers(s.yy)
     coherence = np.clip(explained / np.where(output > 0, output, 1), 0, 1)
     shown = np.broadcast_to(coherence[:, :, None], G.shape)
-    return measured(s.first, s.frequency, G, variance, shown, _powers(s.uu).T)
+    power = _powers(s.uu).T
+    return measured(s.first, s.frequency, G, variance, shown, power, reach=s.reach)

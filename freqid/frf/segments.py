@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.fft
 import scipy.signal
 from numpy.typing import ArrayLike
 
@@ -16,6 +17,9 @@ from freqid.data import Record, Stream
 _SEGMENTS = 8
 # windows that suit whole periods, which nothing need overlap
 _WHOLE = ("boxcar", "rectangular")
+
+# correlation of noise over input at two lines that is none, of independent segments
+_TIED = 0.01
 
 # what scipy.signal.csd takes under these names
 Window = str | tuple[str | float, ...] | ArrayLike
@@ -51,6 +55,18 @@ class Averaging:
                 f"overlap={overlap!r} must be a part of the segment, from 0 to below 1"
             )
         return length, length - int(length * overlap)
+
+
+def shared_lines(window: Window, length: int) -> int:
+    """Lines on each side of one whose noise, over the input's, goes together with its own.
+
+    A window ties lines by the spectrum of its square, the noise's and the input's alike.
+    """
+    given = isinstance(window, (list, np.ndarray))
+    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
+    tied = np.abs(scipy.fft.rfft(w**2)) / (w @ w)
+    far = np.flatnonzero(tied[: len(tied) // 2] ** 2 > _TIED)
+    return int(far[-1])
 
 
 def independent(window: Window, length: int, step: int, count: int) -> float:

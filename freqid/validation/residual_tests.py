@@ -30,6 +30,8 @@ _LAGS = 25
 _LEVEL = 0.01
 # samples for each lag from which on chi-square holds, and how much wider it is in fewer
 _LONG, _WIDER = 40, 2.3
+# lines that windows of averages tie at the most; local models share more
+_WINDOWED = 4
 # lines of a window in which a coherence is taken, and the part of the strongest window's input
 # below which one is not driven
 _WINDOW, _DRIVEN = 12, 1e-6
@@ -50,7 +52,8 @@ def residual_test(
     error, which the residual's own colour makes wider) and ``coherence`` of the two (what the input
     explains of the residual in windows of a few lines). Columns: test, output, input, statistic,
     limit (99 %), p_value and passed. Of a FrequencyResponse with a variance: ``size`` of what is
-    left in units of that, and ``whiteness`` from line to line. ``attrs["correlations"]`` holds the
+    left in units of that, and ``whiteness`` from line to line where lines do not share their noise,
+    as those of windowed averages and of local models do. ``attrs["correlations"]`` holds the
     correlations themselves with their limits, which ``plot_residuals`` draws. With ``band`` (Hz)
     only its lines inside are tested. Raises ValueError for fewer samples than four times the
     ``lags``.
@@ -185,6 +188,12 @@ def _of_response(c: Comparison) -> pd.DataFrame:
             K = len(each)
             # a complex error of variance one has a square of one, exponentially distributed
             q, null = 2 * float(np.sum(np.abs(each) ** 2)), scipy.stats.chi2(2 * K)
+            if frf.reach > _WINDOWED:
+                q, null = q / (2 * K), _few_lines(K / (frf.reach + 1))
+            elif frf.reach:
+                # lines of a window go together: as many as are apart
+                share = max(K / (frf.reach + 1), 1.0)
+                q, null = q * share / K, scipy.stats.chi2(2 * share)
             rows.append(_row("size", output, name, q, float(null.isf(_LEVEL)), float(null.sf(q))))
             if frf.reach or K < 4:
                 continue
@@ -197,6 +206,13 @@ def _of_response(c: Comparison) -> pd.DataFrame:
     table = pd.DataFrame(rows)
     table.attrs["correlations"] = []
     return table
+
+
+def _few_lines(count: float) -> Any:
+    """A mean of ``count`` squares over variances that few lines have told, at the least three:
+    F(2, 6) of mean 3/2 and variance 27/4.
+    """
+    return scipy.stats.norm(1.5, np.sqrt(6.75 / max(count, 1.0)))
 
 
 def _bartlett(e: FloatArray, dt: float, band: Band) -> float:

@@ -21,7 +21,7 @@ from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, score
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.witness import excess
+from freqid.fitting.witness import excess, shared
 from freqid.models import GreyBox, Model, OutputError
 
 # experiments times parameters whose separate fits are compared at the most
@@ -116,7 +116,7 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     with np.errstate(all="ignore"):
         shift = np.abs(np.array(steps)) / np.sqrt(variance)
     largest = float(np.nanmax(np.where(np.isfinite(shift), shift, np.nan), initial=0.0))
-    f = chi / degrees
+    f = chi / degrees / scene.together(scene.left)
     p = float(scipy.stats.f.sf(f, degrees, freedom))
     x = scene.x[free]
     size = float(np.max(np.abs(np.array(steps)) / np.maximum(np.abs(x), 1e-300)))
@@ -151,7 +151,8 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     structure = inquiry.minimum.structure
     assert isinstance(structure, GreyStructure)
     more = excess(structure, readings, [box], inquiry.minimum.solution, True)
-    f = more * freedom / degrees
+    wider = shared([box])
+    f, freedom = more * freedom / degrees / wider, int(freedom / wider)
     gain = scene.cost * more / (1 + more)
     # where the noise is coloured its shape is as uncertain as the place of the mode
     places = sum(s.experiment.n_lines for s in scene.seen) ** (1 if scene.even else 2)

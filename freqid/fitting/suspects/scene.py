@@ -17,7 +17,7 @@ from freqid.fitting.cost.objective import EstimatedStructure, Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
-from freqid.fitting.uncertainty.evenness import alike, channel_power, is_white
+from freqid.fitting.uncertainty.evenness import alike, channel_power, is_white, together
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import local_power, projected
 from freqid.lti import Plane, sum_runs
@@ -220,6 +220,11 @@ class Scene:
             return False
         powers, counts = zip(*(channel_power(part, e) for part, e in parts), strict=True)
         return alike(np.concatenate(powers), np.concatenate(counts))
+
+    def together(self, rows: FloatArray) -> float:
+        """How much lines that share their noise widen what rows (R,) sum to."""
+        parts = zip(self._parted(rows), (s.experiment for s in self.seen), strict=True)
+        return together(list(parts))
 
     def variance_of(self, rows: FloatArray) -> FloatArray:
         """Variance of each row's noise (R,) where these are what it leaves."""

@@ -91,6 +91,8 @@ def score(
     else:
         spread = (Vt * scene.variance_of(rest)) @ Vt.T
         chi = float(along @ np.linalg.solve(spread, along))
+    wider = scene.together(rest)
+    chi, freedom = chi / wider, max(int(freedom / wider), 1)
     delta = -(U / s) @ along
     moved = np.abs(scene.moved(delta @ (raw / size[:, None])))
     shift = moved / np.where(std > 0, std, np.inf)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.stats
 
@@ -56,3 +58,19 @@ def evenly_spread(error: ComplexArray) -> bool:
     gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1) * (total[:, 0] > 0)
     p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
     return bool((p >= _LEVEL / len(power)).all())
+
+
+def together(parts: Sequence[tuple[FloatArray, SpectralExperiment]]) -> float:
+    """How much the sum of noise over lines is larger than if each had its own: the correlations
+    within the ``reach`` of a line, over rows (rows,) of each experiment.
+    """
+    sums, weight = 0.0, 0.0
+    for rows, e in parts:
+        total = 1.0
+        if e.reach:
+            each = rows.view(complex).reshape(-1, e.n_lines)
+            unit = each / np.maximum(np.abs(each), 1e-300)
+            for d in range(1, min(e.reach, e.n_lines - 1) + 1):
+                total += 2 * float(np.mean(unit[:, :-d] * unit[:, d:].conj()).real)
+        sums, weight = sums + max(total, 1.0) * e.n_rows, weight + e.n_rows
+    return sums / max(weight, 1.0)
