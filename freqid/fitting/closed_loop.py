@@ -14,16 +14,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import Record
+from freqid.data import DataSet, Record
 from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import nested_model
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.estimate import Estimate
+from freqid.fitting.loop_noise import Loop, loop_scores
+from freqid.fitting.noise_models import NoiseModel, as_noise_model
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
+from freqid.fitting.uncertainty.minimum import Spread
 from freqid.lti import ZeroOrderHold
-from freqid.models import DiscreteModel
+from freqid.models import DiscreteModel, GreyBox
 
 # states of controller and delays that a loop may have beyond the plant's own
 _BEYOND = (0, 1, 2, 4)
@@ -33,9 +37,70 @@ _LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
 _WHOLE = 0.995
 
 
-def through_reference(
+def through_references(
+    sets: Sequence[DataSet],
+    models: list[NoiseModel],
+    order: int,
+    reference: object,
+    plain: bool,
+    apart: bool,
+) -> tuple[list[DataSet], list[NoiseModel], list[str], list[Loop]]:
+    """The data, those with a reference as it explains them, their noise, notes, and the loops.
+
+    ``order`` is that of the plant. Experiments that have values of their own are loops ``apart``.
+    """
+    has = [isinstance(d, Record) and d.reference is not None for d in sets]
+    if reference is True and not all(has):
+        raise InputError(
+            "reference=True, but a record has none; give it to Record(..., reference=...) or "
+            "read(..., reference='column')"
+        )
+    seen, noise = list(sets), list(models)
+    found: list[Loop] = []
+    notes: list[str] = []
+    if reference is False:
+        return seen, noise, notes, found
+    groups: dict[tuple[object, ...], list[int]] = {}
+    for i, d in enumerate(sets):
+        if not has[i] or not isinstance(d, Record):
+            continue
+        if d.factor > 1:
+            if reference is True:
+                raise InputError(
+                    "reference=True needs an input sampled like the output; decimate the input"
+                )
+            notes.append("the input is faster than the reference, which is not used")
+            continue
+        # experiments of one rate, the same channels and conditions are of one loop
+        alike = (d.dt, d.input_names, d.output_names, tuple(sorted(d.conditions.items())))
+        groups.setdefault((*alike, i if apart else None), []).append(i)
+    for members in groups.values():
+        records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
+        explained, note, loop = _explained(records, order, reference is True)
+        notes.append(note)
+        if loop is not None:
+            found.append(dataclasses.replace(loop, places=members))
+        for i, record in zip(members, explained, strict=True):
+            changed = record is not seen[i]
+            seen[i] = record
+            if plain and changed:
+                noise[i] = as_noise_model("noise", record)
+    return seen, noise, notes, found
+
+
+def with_loop_noise(est: Estimate, readings: Sequence[Reading], loops: Sequence[Loop]) -> Estimate:
+    """The estimate whose standard errors know that the explained input has errors, too."""
+    score = loop_scores(est, readings, loops)
+    if score is None:
+        return est
+    minimum = dataclasses.replace(est.minimum, score=score)
+    spread = Spread(est.spread.change, minimum)
+    return dataclasses.replace(est, problem=minimum, uncertainty=spread)
+
+
+def _explained(
     records: Sequence[Record], order: int, always: bool
-) -> tuple[list[Record], str]:
+) -> tuple[list[Record], str, Loop | None]:
     """Records of one loop with what the reference explains of their input, and a sentence on it.
 
     ``order`` is that of the plant; the loop's is chosen between that and some more by the minimum
@@ -85,13 +150,13 @@ def through_reference(
             "next to no noise into it, and the input was fitted as it is; reference=True goes "
             "through the reference all the same"
         )
-        return list(records), note
+        return list(records), note, None
     note = (
         f"fitted through the reference: a black box of order {n} explains "
         f"{100 * share:.3g} % of the input's power by it; "
         "reference=False fits the input as it is"
     )
-    return seen, note
+    return seen, note, Loop(chart, found.x, readings, size, ())
 
 
 def _loop(record: Record, size: np.ndarray) -> Record:
@@ -114,3 +179,10 @@ def _black_box(readings: Sequence[Reading], order: int, count: int) -> tuple[Cha
     x = np.zeros(chart.size)
     found = polish(objective, x, limit=_LIMIT, tolerance=_TOLERANCE)
     return chart, found, objective.n_rows
+
+
+def plant_order(model: object) -> int:
+    """States of what is fitted."""
+    if isinstance(model, GreyBox):
+        return len(model.state_space().A)
+    return int(getattr(model, "order", getattr(model, "poles", 1)))

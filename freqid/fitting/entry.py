@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from typing import Literal
 
 from freqid.checks import InputError, choice, whole
-from freqid.data import DataSet, FrequencyResponse, Record, as_data_sets
+from freqid.data import DataSet, FrequencyResponse, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
-from freqid.fitting.closed_loop import through_reference
+from freqid.fitting.closed_loop import plant_order, through_references, with_loop_noise
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
@@ -132,7 +132,9 @@ def fit(
     models = _noise_models(weights, data, sets)
     own = (separate,) if isinstance(separate, str) else tuple(separate)
     plain = weights is None
-    seen, models, notes = _through_references(model, sets, models, reference, plain, bool(own))
+    seen, models, notes, loops = through_references(
+        sets, models, plant_order(model), reference, plain, bool(own)
+    )
     readings: Sequence[Reading] = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late, i
@@ -148,6 +150,8 @@ def fit(
         est, readings = _fitted(model, readings, options, loss)
     if offset is not None:
         notes += offsets(est, readings)
+    if loops:
+        est = with_loop_noise(est, readings, loops)
     given = {
         "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
@@ -180,61 +184,6 @@ def _fitted(
     if loss == "linear":
         return work(readings, None)
     return robust_fit(lambda some, near: work(some, near)[0], readings)
-
-
-def _through_references(
-    model: object,
-    sets: Sequence[DataSet],
-    models: list[NoiseModel],
-    reference: object,
-    plain: bool,
-    apart: bool,
-) -> tuple[list[DataSet], list[NoiseModel], list[str]]:
-    """The data, those with a reference as it explains them, their noise, and notes on both.
-
-    Experiments that have values of their own are loops ``apart``.
-    """
-    has = [isinstance(d, Record) and d.reference is not None for d in sets]
-    if reference is True and not all(has):
-        raise InputError(
-            "reference=True, but a record has none; give it to Record(..., reference=...) or "
-            "read(..., reference='column')"
-        )
-    seen, noise = list(sets), list(models)
-    notes: list[str] = []
-    if reference is False:
-        return seen, noise, notes
-    loops: dict[tuple[object, ...], list[int]] = {}
-    for i, d in enumerate(sets):
-        if not has[i] or not isinstance(d, Record):
-            continue
-        if d.factor > 1:
-            if reference is True:
-                raise InputError(
-                    "reference=True needs an input sampled like the output; decimate the input"
-                )
-            notes.append("the input is faster than the reference, which is not used")
-            continue
-        # experiments of one rate, the same channels and conditions are of one loop
-        alike = (d.dt, d.input_names, d.output_names, tuple(sorted(d.conditions.items())))
-        loops.setdefault((*alike, i if apart else None), []).append(i)
-    for members in loops.values():
-        records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
-        explained, note = through_reference(records, _order(model), reference is True)
-        notes.append(note)
-        for i, record in zip(members, explained, strict=True):
-            changed = record is not seen[i]
-            seen[i] = record
-            if plain and changed:
-                noise[i] = as_noise_model("noise", record)
-    return seen, noise, notes
-
-
-def _order(model: object) -> int:
-    """States of what is fitted."""
-    if isinstance(model, GreyBox):
-        return len(model.state_space().A)
-    return int(getattr(model, "order", getattr(model, "poles", 1)))
 
 
 def _logarithmic(reading: Reading, model: object) -> Reading:

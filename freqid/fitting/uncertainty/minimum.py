@@ -38,6 +38,8 @@ class Minimum:
     alone: FloatArray | None = None
     # how much wider errors that were cut have made the scatter, in variance
     inflation: float = 1.0
+    # covariance of the data's gradient, where it is not what the residuals alone tell
+    score: FloatArray | None = None
 
     @property
     def structure(self) -> EstimatedStructure:
@@ -122,7 +124,9 @@ class Minimum:
         Samples in time, and what is down to rounding, are taken for white.
         """
         H = self.determined.inverse
-        score = None if self.exact else score_covariance(self.objective, self.x, self.alone)
+        score = self.score
+        if score is None and not self.exact:
+            score = score_covariance(self.objective, self.x, self.alone)
         if score is None:
             wider = [getattr(e, "inflation", 1.0) for e in self.experiments]
             return self.determined.scatter(
