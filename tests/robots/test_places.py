@@ -288,3 +288,31 @@ def test_noise_and_sums():
     assert record + each + quiet == [record, each, quiet]
     with pytest.raises(TypeError):
         record + 3
+
+
+def test_profiles_of_values_of_their_own():
+    """Profile intervals of a fit at many places are those of its standard errors in little noise."""
+    est = fq.fit(joint(), records(noise=0.01), separate=["d"])
+    linear, profile = est.intervals(), est.intervals("profile")
+    width = linear["upper"] - linear["lower"]
+    assert list(profile.index) == list(est.names)
+    for side in ("lower", "upper"):
+        assert (np.abs(profile[side] - linear[side]) < 0.15 * width).all()
+
+
+def test_error_bars_beside_inputs_with_holds_of_their_own():
+    def driven(a, b, c):
+        return [[-a]], [[b, c]], [[1.0]], None
+
+    true = {"a": 20.0, "b": 50.0, "c": 10.0}
+    plant = fq.GreyBox(driven, [fq.Parameter(n, v) for n, v in true.items()])
+    t = 5e-3 * np.arange(1200)
+    u = np.column_stack([fq.white_noise(1200, seed=1), np.sin(9 * t) + np.cos(31 * t)])
+    clean = fq.simulate(plant, u, 5e-3, hold={"u1": "zoh", "u2": "foh"})
+    pulls, grades = [], []
+    for seed in range(30):
+        est = fq.fit(plant, clean.with_noise(0.3, seed=seed))
+        pulls.append([(est[n] - v) / est.parameters["std"][n] for n, v in true.items()])
+        grades.append(est.verdict.grade)
+    assert (np.abs(np.std(pulls, axis=0) - 1) < 0.4).all()
+    assert grades.count("trust") >= 27
