@@ -37,6 +37,10 @@ EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
 _EVEN = 1e-3
 # a name that ends in a unit, and steps in s that nobody samples a machine with
 _SUFFIX, _SLOW = r"_(s|ms|us|ns)$", 1.0
+# a date and a time of day in columns of their own, and seconds of a day
+_DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
+_CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
+_DAY = 86_400.0
 
 
 def with_time(
@@ -46,6 +50,7 @@ def with_time(
 
     Raises ValueError for a column that is not there or holds no time.
     """
+    frame = _joined(frame) if time is None else frame
     name = _found(frame, time, dt)
     if name is None:
         return frame, []
@@ -74,6 +79,24 @@ def time_named(columns: Sequence[str]) -> str | None:
         if re.sub(r"[\s_]+", " ", plain) in _NAMES or plain in _NAMES:
             return column
     return None
+
+
+def _joined(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame with a column of dates and one of times of day, side by side, made one."""
+    for day, clock in zip(frame.columns[:-1], frame.columns[1:], strict=True):
+        texts = [frame[c].iloc[:5] for c in (day, clock)]
+        if any(t.dtype.kind in "fiubmM" for t in texts):
+            continue
+        if not all(_DATE.fullmatch(str(x)) for x in texts[0]):
+            continue
+        if not all(_CLOCK.fullmatch(str(x)) for x in texts[1]):
+            continue
+        both = frame[day].astype(str) + " " + frame[clock].astype(str)
+        rest = frame.drop(columns=[day, clock])
+        rest.insert(0, "date time", both.str.replace(",", "."))
+        rest.attrs = frame.attrs
+        return rest
+    return frame
 
 
 def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | None:
@@ -107,10 +130,17 @@ def _converted(column: Column) -> Column | None:
     """Texts as dates or durations; None where they are neither."""
     import pandas as pd
 
+    # with dots the day comes first
+    first = bool(column.astype(str).str.contains(r"\d\.\d+\.").any())
     ways: list[Callable[[], Any]] = [
         lambda: pd.to_datetime(column, format="ISO8601"),
         lambda: pd.to_timedelta(column),
-        lambda: pd.to_datetime(column, format="mixed"),
+        # with dots the day comes first
+        lambda: pd.to_datetime(
+            column,
+            format="mixed",
+            dayfirst=bool(column.astype(str).str.contains(r"\d\.\d+\.").any()),
+        ),
     ]
     for way in ways:
         try:
@@ -125,7 +155,10 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
     if column.dtype.kind == "M":
         return _since_first(column), "date and time"
     if column.dtype.kind == "m":
-        return column.dt.total_seconds().to_numpy(dtype=float), "durations"
+        seconds = column.dt.total_seconds().to_numpy(dtype=float)
+        # a time of day begins anew at midnight
+        nights = np.cumsum(np.concatenate([[0], np.diff(seconds) < -_DAY / 2]))
+        return seconds + _DAY * nights, "durations"
     if column.dtype.kind not in "fiub":
         converted = _converted(column)
         if converted is None:

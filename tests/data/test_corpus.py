@@ -327,3 +327,16 @@ def test_files_of_several_experiments(kind, tmp_path):
     (tmp_path / "t.csv").write_text("time,u,y\n0,1,2\n1,2,3\n")
     with pytest.raises(ValueError, match="group= is for"):
         fq.read(tmp_path / "t.csv", group="run1")
+
+
+def test_a_date_and_a_time_of_day_over_midnight(tmp_path):
+    stamps = pd.Timestamp("2026-03-31 23:59:59.5") + pd.to_timedelta(DT * np.arange(N), "s")
+    rows = [f"{u};{y}" for u, y in zip(U, Y, strict=True)]
+    both = [f"{s:%d.%m.%Y};{s:%H:%M:%S.%f};{r}" for s, r in zip(stamps, rows, strict=True)]
+    clock = [f"{s:%H:%M:%S.%f};{r}" for s, r in zip(stamps, rows, strict=True)]
+    for head, lines in (("Datum;Uhrzeit;u;y", both), ("time;u;y", clock)):
+        path = tmp_path / "night.csv"
+        path.write_text("\n".join([head, *lines]))
+        record = fq.read(path)
+        assert record.dt == pytest.approx(DT, rel=1e-6), head
+        assert np.allclose(record.y, Y)

@@ -291,7 +291,7 @@ def test_noise_and_sums():
 
 
 def test_profiles_of_values_of_their_own():
-    """Profile intervals of a fit at many places are those of its standard errors in little noise."""
+    """In little noise profile intervals are those of the standard errors, at many places too."""
     est = fq.fit(joint(), records(noise=0.01), separate=["d"])
     linear, profile = est.intervals(), est.intervals("profile")
     width = linear["upper"] - linear["lower"]
