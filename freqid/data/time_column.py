@@ -135,12 +135,7 @@ def _converted(column: Column) -> Column | None:
     ways: list[Callable[[], Any]] = [
         lambda: pd.to_datetime(column, format="ISO8601"),
         lambda: pd.to_timedelta(column),
-        # with dots the day comes first
-        lambda: pd.to_datetime(
-            column,
-            format="mixed",
-            dayfirst=bool(column.astype(str).str.contains(r"\d\.\d+\.").any()),
-        ),
+        lambda: pd.to_datetime(column, format="mixed", dayfirst=first),
     ]
     for way in ways:
         try:
