@@ -61,7 +61,7 @@ def multisine(
     >>> u = multisine((1, 31), period=1.0, dt=1 / 512)
     >>> bool(np.abs(u).max() < 1.5)
     True
-    >>> multisine((1, 31), 1.0, 1 / 512, n_inputs=3, orthogonal=True, grid="odd").shape
+    >>> multisine((1, 31), 1.0, 1 / 512, 1, "random", n_inputs=3, orthogonal=True).shape
     (3, 512, 3)
     """
     positive("rms", rms)
@@ -88,7 +88,7 @@ def multisine(
         )
     lines = _Lines(k, _amplitudes(powers, len(k)))
     phases = np.array(
-        [_phases(lines, N, crest, rng, first=i == 0 or crest == "schroeder") for i in range(count)]
+        [_phases(lines, N, crest, rng, i == 0 or crest == "schroeder", count) for i in range(count)]
     )
     turns = np.zeros((1, count))
     if orthogonal:
@@ -120,14 +120,16 @@ _GRIDS: dict[str, Callable[[IntArray], IntArray]] = {
 }
 
 
-def _phases(lines: _Lines, N: int, crest: str, rng: np.random.Generator, first: bool) -> FloatArray:
-    """Phases of one signal; those of a second one begin elsewhere."""
+def _phases(
+    lines: _Lines, N: int, crest: str, rng: np.random.Generator, first: bool, signals: int
+) -> FloatArray:
+    """Phases of one of several signals; those of a second one begin elsewhere."""
     if crest == "random":
         return rng.uniform(0, 2 * np.pi, len(lines.k))
     # a sweep from another moment on is the same but for a delay: a further signal begins by chance
     phases = lines.schroeder() if first else rng.uniform(0, 2 * np.pi, len(lines.k))
     if crest == "minimise" and len(lines.k) > 1:
-        return _least_crest(lines, N, phases, rng)
+        return _least_crest(lines, N, phases, rng, _MORE // signals)
     return phases
 
 
@@ -166,19 +168,21 @@ class _Lines:
         return -2 * np.pi * np.cumsum(np.concatenate([[0], before[1:]]))
 
 
-def _least_crest(lines: _Lines, N: int, first: FloatArray, rng: np.random.Generator) -> FloatArray:
+def _least_crest(
+    lines: _Lines, N: int, first: FloatArray, rng: np.random.Generator, more: int
+) -> FloatArray:
     k = lines.k
     # peaks between the samples do not exist for a converter; a coarser grid shows those that do
     grid = min(N, scipy.fft.next_fast_len(16 * int(k[-1]), real=True))
     # few lines are cheap, and their least peak takes luck
-    count = _STARTS + _MORE // grid
+    count = _STARTS + more // grid
     starts = [first, *rng.uniform(0, 2 * np.pi, (count - 1, len(k)))]
 
     def crest(phases: FloatArray) -> float:
         return float(np.abs(lines.signal(phases, N)).max())
 
     clipped = sorted((_clipped(lines, start, grid) for start in starts), key=crest)
-    lowered = [_lowered(lines, phases, grid) for phases in clipped[: 1 + _MORE // grid]]
+    lowered = [_lowered(lines, phases, grid) for phases in clipped[: 1 + more // grid]]
     return min([*clipped, *lowered], key=crest)
 
 
