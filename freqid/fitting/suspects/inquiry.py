@@ -24,6 +24,7 @@ from freqid.fitting.suspects.scores import Asked, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.lti import in_one_blas_thread
 from freqid.models import GreyBox, Model
 
 if TYPE_CHECKING:
@@ -164,6 +165,7 @@ class Inquiry:
         test = dataclasses.replace(a.test, gain=scene.cost - again.cost, size=again.size)
         return dataclasses.replace(a, test=test, detail=again.sentence)
 
+    @in_one_blas_thread
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects."""
         scene, named = self.scene, self.named
@@ -233,6 +235,7 @@ class Inquiry:
         severity: Severity = "minor" if small else "serious"
         return Finding(a.name, text, severity, float(a.test.statistic))
 
+    @in_one_blas_thread
     def table(self) -> pd.DataFrame:
         """The suspects by name: statistic, p_value, size, unit, power, largest_shift."""
         import pandas as pd

@@ -12,7 +12,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.uncertainty.evenness import evenly_spread
-from freqid.lti import Realisation, eliminate
+from freqid.lti import Realisation, eliminate, in_one_blas_thread
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000
@@ -102,6 +102,7 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
 
 
+@in_one_blas_thread
 def score_covariance(
     objective: Objective, x: FloatArray, alone: FloatArray | None = None
 ) -> FloatArray | None:
