@@ -15,18 +15,17 @@ def in_order_of(model: object, data: DataSet) -> DataSet:
     """The data with channels in the model's order, where both have the same names.
 
     Channels of other names are taken by place. Raises ValueError where an input has the name of one
-    of the model's outputs, or the other way round.
+    of the model's outputs and an output that of one of its inputs.
     """
     own = [tuple(getattr(model, side, None) or ()) for side in ("inputs", "outputs")]
     told = data.input_names, data.output_names
-    for side, names, others in (("input", told[0], own[1]), ("output", told[1], own[0])):
-        wrong = sorted(set(names) & set(others))
-        if wrong and set(names) != set(own[side == "output"]):
-            raise InputError(
-                f"{wrong[0]!r} is an {side} of the data and an "
-                f"{'output' if side == 'input' else 'input'} of the model: "
-                "give the data, or the model, the other way round"
-            )
+    crossed = sorted(set(told[0]) & set(own[1])), sorted(set(told[1]) & set(own[0]))
+    # one name alone, u or y, may be a default that means nothing
+    if all(crossed) and set(told[0]) != set(own[0]):
+        raise InputError(
+            f"{crossed[0][0]!r} is an input of the data and an output of the model, "
+            f"{crossed[1][0]!r} the other way round: turn the data, or the model"
+        )
     u, y = (_order(a, b) for a, b in zip(own, told, strict=True))
     if u is None and y is None:
         return data

@@ -40,14 +40,14 @@ _WHOLE = 0.995
 def through_references(
     sets: Sequence[DataSet],
     models: list[NoiseModel],
-    order: int,
+    model: object,
     reference: object,
     plain: bool,
     apart: bool,
 ) -> tuple[list[DataSet], list[NoiseModel], list[str], list[Loop]]:
     """The data, those with a reference as it explains them, their noise, notes, and the loops.
 
-    ``order`` is that of the plant. Experiments that have values of their own are loops ``apart``.
+    Experiments that have values of their own are loops ``apart``.
     """
     has = [isinstance(d, Record) and d.reference is not None for d in sets]
     if reference is True and not all(has):
@@ -76,7 +76,7 @@ def through_references(
         groups.setdefault((*alike, i if apart else None), []).append(i)
     for members in groups.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
-        explained, note, loop = _explained(records, order, reference is True)
+        explained, note, loop = _explained(records, _plant_order(model), reference is True)
         notes.append(note)
         if loop is not None:
             found.append(dataclasses.replace(loop, places=members))
@@ -181,7 +181,7 @@ def _black_box(readings: Sequence[Reading], order: int, count: int) -> tuple[Cha
     return chart, found, objective.n_rows
 
 
-def plant_order(model: object) -> int:
+def _plant_order(model: object) -> int:
     """States of what is fitted."""
     if isinstance(model, GreyBox):
         return len(model.state_space().A)

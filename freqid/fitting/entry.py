@@ -11,7 +11,7 @@ from freqid.checks import InputError, choice, whole
 from freqid.data import DataSet, FrequencyResponse, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
-from freqid.fitting.closed_loop import plant_order, through_references, with_loop_noise
+from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
@@ -133,7 +133,7 @@ def fit(
     own = (separate,) if isinstance(separate, str) else tuple(separate)
     plain = weights is None
     seen, models, notes, loops = through_references(
-        sets, models, plant_order(model), reference, plain, bool(own)
+        sets, models, model, reference, plain, bool(own)
     )
     readings: Sequence[Reading] = [
         Reading.of(

@@ -268,9 +268,8 @@ class Estimate(Shown):
 
     def modes(self) -> pd.DataFrame:
         """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
-        known: pd.DataFrame | None = self.__dict__.get(
-            "known_modes"
-        )  # of an estimate that was kept
+        # those of an estimate that was kept were written down
+        known: pd.DataFrame | None = self.__dict__.get("known_modes")
         return modes(*self._unknowns) if known is None else known
 
     def pole_scatter(self) -> tuple[ComplexArray, FloatArray]:

@@ -58,6 +58,11 @@ def test_the_other_way_round_is_refused():
                        output_names=["velocity"])  # fmt: skip
     with pytest.raises(ValueError, match="'torque' is an input of the data and an output of the"):
         fq.fit(lag, record)
+    # a default name on one side alone says nothing
+    plain = fq.GreyBox(lambda a, b: ([[-a]], [[b]], [[1.0]], None),
+                       [fq.Parameter("a", 20.0), fq.Parameter("b", 50.0)])  # fmt: skip
+    simple = fq.simulate(plain, fq.white_noise(500), 5e-3, input_names=["y"], output_names=["z"])
+    assert fq.fit(plain, simple)["a"] == pytest.approx(20)
 
 
 def test_names_of_which_only_one_side_knows_are_taken_by_place():
