@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +21,13 @@ FloatArray = npt.NDArray[Any]
 ComplexArray = npt.NDArray[Any]
 BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
+
+
+T = TypeVar("T")
+# what a pickle keeps of an object
+State = dict[str, Any]
+# samples that a signal may have: 64 GiB of them
+_MOST = 2**33
 
 
 class InputError(ValueError):
@@ -39,9 +48,60 @@ def positive(name: str, value: object, unit: str = "") -> float:
 
 def finite(name: str, value: object) -> float:
     """Return ``value`` as a float; ValueError unless it is a finite real number."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise InputError(f"{name}={value!r} must be a finite real number")
-    return float(value)
+    try:
+        if isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value):
+            return float(value)
+    except OverflowError:
+        raise InputError(f"{name} is beyond the numbers that a computer has, 1.8e308") from None
+    raise InputError(f"{name}={value!r:.80} must be a finite real number")
+
+
+def numbers(name: str, values: ArrayLike, kind: type = float) -> Array:
+    """A new array of ``kind``; ValueError for what is no array of numbers."""
+    try:
+        return np.array(real(name, values) if kind is float else values, dtype=kind)
+    except InputError:
+        raise
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name}={values!r:.80} must be numbers, or an array of them") from None
+
+
+def an(name: str, value: object, *kinds: type[T]) -> T:
+    """The value; ValueError unless it is of one of the kinds."""
+    if isinstance(value, kinds):
+        return value
+    wanted = " or ".join(kind.__name__ for kind in kinds)
+    raise InputError(f"{name} is a {type(value).__name__}; expected a {wanted}")
+
+
+def listed(name: str, values: Iterable[T]) -> list[T]:
+    """The values as a list; ValueError for what has none."""
+    if isinstance(values, Iterable):
+        return list(values)
+    raise InputError(f"{name}={values!r:.80} must be a list")
+
+
+def named_values(name: str, values: Mapping[str, T] | None) -> dict[str, T]:
+    """Values by name, none for None; ValueError for what is no dictionary."""
+    if values is None or isinstance(values, Mapping):
+        return dict(values or {})
+    raise InputError(f"{name}={values!r:.80} must be a dictionary, values by name")
+
+
+def path_of(name: str, value: object) -> Path:
+    """The path; ValueError for what cannot be one."""
+    if isinstance(value, (str, os.PathLike)) and "\0" not in str(value):
+        return Path(value)
+    raise InputError(f"{name}={value!r:.80} must be a path, as text or pathlib.Path")
+
+
+def few_enough(name: str, count: float) -> int:
+    """A number of samples; ValueError where they would not fit into any memory."""
+    if count > _MOST:
+        raise InputError(
+            f"{name}: {count:.3g} samples would take {count / 2**27:.3g} GiB of memory; take less"
+        )
+    return round(count)
 
 
 def whole(name: str, value: object, least: int = 1) -> int:
@@ -61,11 +121,32 @@ def steps(name: str, value: float, dt: float, least: int = 1) -> int:
     return number
 
 
+def real(name: str, values: ArrayLike) -> ArrayLike:
+    """The same values; ValueError where some are masked or have an imaginary part."""
+    if isinstance(values, np.ma.MaskedArray) and (count := int(np.ma.count_masked(values))):
+        raise InputError(
+            f"{name} has {count} masked samples; cut the record there or fill them first"
+        )
+    if np.iscomplexobj(values) and np.any(np.imag(values)):
+        raise InputError(f"{name} is complex; expected real numbers: give its real part")
+    return np.real(values) if np.iscomplexobj(values) else values
+
+
+def sealed(state: State) -> State:
+    """What a pickle or a copy brought, its arrays read-only as they were."""
+    for value in state.values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    return state
+
+
 def samples(name: str, values: ArrayLike) -> FloatArray:
     """A read-only copy of signal samples, (N,) or (N, channels), checked to be finite."""
     try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+        array = np.array(real(name, values), dtype=float)
+    except InputError:
+        raise
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"{name} must be an array of real numbers, (N,) or (N, channels)"
         ) from None
@@ -106,7 +187,9 @@ def channel_names(
     """Names of ``count`` channels, u or u1, u2, … where none are given; ValueError for others."""
     if given is None:
         return (letter,) if count == 1 else tuple(f"{letter}{i + 1}" for i in range(count))
-    names = (given,) if isinstance(given, str) else tuple(given)
+    names = (given,) if isinstance(given, str) else tuple(listed(argument, given))
+    if not all(isinstance(n, str) for n in names):
+        raise InputError(f"{argument}={list(names)} must hold names, as text")
     if len(names) != count:
         raise InputError(f"{argument}={list(names)} names {len(names)} of {count} channels")
     return names

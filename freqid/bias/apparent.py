@@ -118,7 +118,11 @@ def apparent_density(
     """The continuous part of the spectrum, at frequencies (Hz) up to the slow Nyquist limit."""
     folds = unfold(frequency, sampling.base_dt, sampling.factor)
     density = spectrum.density(np.abs(folds), sampling.base_dt) * sampling.filter_power(folds)
-    G = held(folds.ravel())
+    # a band that is narrow beside the fast Nyquist limit leaves most folds without power
+    there = density.ravel() > 0
+    some = held(folds.ravel()[there])
+    G = np.zeros((*some.shape[:2], density.size), complex)
+    G[..., there] = some
     G = G.reshape(*G.shape[:2], *folds.shape)
     return _mixed(frequency, density, G, lambda x: x.sum(axis=-1))
 

@@ -64,6 +64,10 @@ class Expected:
         return Reading.of(response, hold, noise=GivenWeights(self.weight))
 
 
+# responses of folds that are computed for one spectrum: about ten seconds
+_MOST = 20_000_000
+
+
 @dataclass(frozen=True)
 class Conditions:
     """Everything but the model: spectrum, sampling, band and weights."""
@@ -82,6 +86,18 @@ class Conditions:
         s, held = self.sampling, held_response(at, self.sampling.hold)
         nyquist = 0.5 / s.dt
         low, high = as_band(self.band, nyquist) or (0.0, nyquist)
+        work = 0
+
+        def columns(f: FloatArray) -> Array:
+            nonlocal work
+            work += len(f) * s.factor
+            if work > _MOST:
+                raise InputError(
+                    f"factor={s.factor} folds so much below {nyquist:g} Hz that it takes "
+                    f"more than {_MOST:.0e} responses; take a smaller factor or a band"
+                )
+            return self._columns(held, f, responses)
+
         edges = slow_edges(self.spectrum, s)
         edges = np.unique(np.clip(edges, low, high)) if len(edges) else edges
         panels = np.column_stack([edges[:-1], edges[1:]])
@@ -90,7 +106,7 @@ class Conditions:
             middle = panels.mean(axis=1)
             panels = panels[apparent_density(held, self.spectrum, s, middle).power > 0]
         if len(panels):
-            panels = resolved(panels, lambda f: self._columns(held, f, responses))
+            panels = resolved(panels, columns)
             frequency, weights = panel_nodes(panels)
         dense = apparent_density(held, self.spectrum, s, frequency)
         with np.errstate(divide="ignore", invalid="ignore"):

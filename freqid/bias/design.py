@@ -12,7 +12,7 @@ from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
-from freqid.checks import FloatArray, InputError, choice, positive, whole
+from freqid.checks import FloatArray, InputError, an, choice, listed, positive, whole
 from freqid.data import Band
 from freqid.excitation import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
 from freqid.fitting import GreyStructure
@@ -77,7 +77,8 @@ def experiment_design(
     positive("amplitude", amplitude)
     positive("duration", duration, "s")
     choice("criterion", criterion, ("worst", "rms"))
-    counts = [whole("factors", f) for f in factors]
+    an("plant", plant, GreyBox)
+    counts = [whole("factors", f) for f in listed("factors", factors)]
     hold = ZeroOrderHold(base_dt) if true_hold is None else true_hold
     known_hold("true_hold", hold)
     grid = (

@@ -113,7 +113,11 @@ def _together(
         if len(coarse) == 0:
             break
         for i in coarse.tolist():
-            problems[i] = _problem(model, rows[i], shared, found.values[i])
+            try:
+                problems[i] = _problem(model, rows[i], shared, found.values[i])
+            except InputError:
+                # told by the fit of that row alone
+                found.converged[i] = False
         batch = Batch(model, problems)
         part = Batch(model, [problems[i] for i in coarse.tolist()])
         again = descend(part, found.values[coarse])

@@ -14,7 +14,7 @@ import numpy as np
 from freqid.bias.apparent import Sampling, weight_of
 from freqid.bias.conditions import Conditions
 from freqid.bias.map_rows import Answer, Row, answer_chunk
-from freqid.checks import Array, InputError, whole
+from freqid.checks import Array, InputError, listed, named_values, whole
 from freqid.excitation import ChirpSpectrum, InputSpectrum
 from freqid.fitting import Bar, TableStore, unordered
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
@@ -75,7 +75,7 @@ def bias_map(
     """
     import pandas as pd
 
-    plants = {"": plant} if isinstance(plant, GreyBox) else dict(plant)
+    plants = {"": plant} if isinstance(plant, GreyBox) else named_values("plant", plant)
     sampling, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
     sampling = dataclasses.replace(sampling, antialias=antialias)
     # each row puts its own spectrum and factor in
@@ -131,8 +131,8 @@ def _asked(
     for name, spectrum in spectra.items():
         if not isinstance(spectrum, InputSpectrum):
             raise InputError(f"spectra[{name!r}] is a {type(spectrum).__name__}, not a spectrum")
-    counts = [whole("factors", f) for f in factors]
-    assumed = list(holds)
+    counts = [whole("factors", f) for f in listed("factors", factors)]
+    assumed = listed("holds", holds)
     for what, given in (("plant", plants), ("spectra", spectra)):
         if not given:
             raise InputError(f"{what} is empty; give at least one")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
 import sys
 from pathlib import Path
 from typing import Literal
@@ -12,7 +15,16 @@ import freqid as fq
 from freqid.checks import InputError
 from freqid.cli.estimates import bias, fit, fit_many, new_model
 from freqid.cli.options import Band, Columns, Dt
-from freqid.cli.terminal import folder, may_write, progress, show, write_picture, write_table
+from freqid.cli.terminal import (
+    PICTURES,
+    TABLES,
+    folder,
+    may_write,
+    progress,
+    show,
+    write_picture,
+    write_table,
+)
 
 
 def reproduce(out: Path = Path("out"), *, force: bool = False) -> None:
@@ -101,8 +113,8 @@ def frf(
     force
         overwrite files that are there already; never the one that is read.
     """
-    for path in (out, plot):
-        may_write(path, [data], force)
+    may_write(out, [data], force, TABLES)
+    may_write(plot, [data], force, PICTURES)
     record = fq.read(data, input, output, dt, reference=reference)
     if reference is not None and method == "etfe":
         raise InputError("--reference needs --method h1, lpm or lrm")
@@ -149,7 +161,7 @@ def show_file(
     force
         overwrite the picture.
     """
-    may_write(plot, [file], force)
+    may_write(plot, [file], force, PICTURES)
     print(fq.channels(file).to_string(index=False, float_format=lambda x: f"{x:.6g}"))
     record = fq.read(file, input, output, dt=dt, time=time)
     print(f"{record!r}".strip("<>"))
@@ -212,19 +224,44 @@ for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_mo
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point: 0 done, 1 the fit did not converge, 2 bad arguments or bad input."""
+    _end_tidily_when_told_to()
     try:
         status = app(arguments, exit_on_error=False, print_error=False)
+        sys.stdout.flush()
     except cyclopts.CycloptsError as error:
         _fail(str(error))
-    except (ValueError, FileNotFoundError, IsADirectoryError, PermissionError) as error:
+    except BrokenPipeError:
+        # who reads has seen enough, as head has; nothing is left to be said there
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    except OSError as error:
+        told = error.filename is not None or error.errno is None
+        _fail(str(error) if told else f"the output cannot be written: {error.strerror}")
+    except (ValueError, MemoryError) as error:
         _fail(str(error))
     except KeyboardInterrupt:
         _fail("interrupted")
     sys.exit(status if isinstance(status, int) else 0)
 
 
+def _end_tidily_when_told_to() -> None:
+    """A signal to end is an exit like another, which leaves no half-written file behind."""
+
+    def end(number: int, frame: object) -> None:
+        sys.exit(128 + number)
+
+    with contextlib.suppress(ValueError):
+        # only the main thread may say so
+        signal.signal(signal.SIGTERM, end)
+
+
 def _fail(message: str) -> None:
+    with contextlib.suppress(OSError):
+        # what was not said cannot be said later, either
+        sys.stdout.flush()
     print(f"freqid: {' '.join(message.split())}", file=sys.stderr)
+    if sys.stdout is sys.__stdout__ and sys.stdout is not None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(2)
 
 

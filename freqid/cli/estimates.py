@@ -9,11 +9,19 @@ import numpy as np
 from cyclopts import Parameter as Option
 
 import freqid as fq
-from freqid.checks import InputError, choice, whole
+from freqid.checks import choice, whole
 from freqid.cli.fleets import engine, matching
 from freqid.cli.options import Band, Columns, Dt, Hold, Limits, Texts, hold_of
 from freqid.cli.plants import TEMPLATE, model_of, pairs, with_options
-from freqid.cli.terminal import may_write, progress, show, write_picture, write_table
+from freqid.cli.terminal import (
+    PICTURES,
+    TABLES,
+    may_write,
+    progress,
+    show,
+    write_picture,
+    write_table,
+)
 from freqid.data import whole_file
 from freqid.excitation import below_nyquist
 from freqid.lti import holds
@@ -94,10 +102,8 @@ def fit(
         overwrite files that are there already; never those that are read.
     """
     read = [data, *([] if validate is None else [validate])]
-    for path in (out, plot, report):
-        may_write(path, read, force)
-    if out is not None and out.suffix.lower() != ".json":
-        raise InputError(f"--out {out} must be a .json file")
+    for path, kinds in ((out, (".json",)), (plot, PICTURES), (report, (".html", ".htm"))):
+        may_write(path, read, force, kinds)
     options: dict[str, Any] = {"dt": dt, "time": time, "resample": resample}
     record = fq.read(data, input, output, **options)
     other = None if validate is None else fq.read(validate, input, output, **options)
@@ -215,9 +221,7 @@ def new_model(path: Path = Path("my_plant.py"), *, force: bool = False) -> None:
     force
         overwrite the file.
     """
-    if path.suffix != ".py":
-        raise InputError(f"{path} must be a .py file")
-    may_write(path, [], force)
+    may_write(path, [], force, (".py",))
     with whole_file(path) as beside:
         beside.write_text(TEMPLATE.format(name=path.name, stem=path.stem), encoding="utf-8")
     print(f"{path}: change it, then: freqid fit DATA --model {path}:plant")
@@ -258,8 +262,8 @@ def bias(
     force
         overwrite files that are there already.
     """
-    for path in (out, plot):
-        may_write(path, [], force)
+    may_write(out, [], force, TABLES)
+    may_write(plot, [], force, PICTURES)
     names = ["zoh", "foh", "remembered"] if hold is None else hold
     for name in names:
         choice("--hold", name, (*holds.Hold.named, "remembered"))

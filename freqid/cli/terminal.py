@@ -31,16 +31,29 @@ def progress() -> Progress:
     )
 
 
-def may_write(path: Path | None, read: Sequence[Path], force: bool) -> None:
-    """ValueError for a file that is read, and for any other that is there without ``--force``."""
-    if path is None or not path.exists():
+TABLES, PICTURES = (".csv",), (".png", ".pdf", ".svg", ".jpg", ".eps", ".webp")
+
+
+def may_write(
+    path: Path | None, read: Sequence[Path], force: bool, kinds: Sequence[str] = ()
+) -> None:
+    """ValueError for a file that is read, any other that is there without ``--force``, a folder
+    that is none, and a suffix that is none of ``kinds``.
+    """
+    if path is None:
         return
-    if any(r.exists() and path.samefile(r) for r in read):
+    for above in path.parents:
+        if above.exists() and not above.is_dir():
+            raise InputError(f"{path}: {above} is a file and no folder; give another name")
+    there = path.exists()
+    if there and any(r.exists() and path.samefile(r) for r in read):
         raise InputError(f"{path} is the file that is read, which is never overwritten")
     if path.is_dir():
         raise InputError(f"{path} is a folder; give a file")
-    if not force:
+    if there and not force:
         raise InputError(f"{path} is there already; give another name, or --force")
+    if kinds and path.suffix.lower() not in kinds:
+        raise InputError(f"{path} must end in {' or '.join(kinds)}")
 
 
 def folder(out: Path, names: Sequence[str], force: bool) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from freqid.checks import finite
+from freqid.checks import finite, named_values
 
 
 def as_conditions(values: Mapping[str, float] | None) -> dict[str, float]:
     """The conditions as numbers by name; ValueError for what is none."""
-    return {str(name): finite(f"condition {name}", v) for name, v in (values or {}).items()}
+    given = named_values("conditions", values)
+    return {str(name): finite(f"condition {name}", v) for name, v in given.items()}

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from freqid.checks import InputError, unknown
+from freqid.checks import InputError, an, path_of, unknown
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS
 from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
-from freqid.data.remembered import kept_in_files
+from freqid.data.remembered import is_kept, kept_in_files
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
 from freqid.lti import Hold
@@ -80,7 +80,7 @@ def read(
     >>> fq.read(path).dt, fq.read(path).notes
     (0.01, ("column 't' was taken for the time, in ms",))
     """
-    path = Path(path)
+    path = path_of("path", path)
     if kind_of(path) in LOGS:
         _no_table(path, {
             "dt": dt, "reference": reference, "time": time, "sep": sep, "decimal": decimal,
@@ -108,8 +108,8 @@ def read(
             frame, _known(inputs, frame), _known(outputs, frame), dt, hold,
             _known(reference, frame), units=told, resample=resample,
         )  # fmt: skip
-        notes = (*frame.attrs.get("notes", ()), *said, *record.notes)
-        return _cut(dataclasses.replace(record, notes=notes), start, stop, detrend)
+        notes = dict.fromkeys((*frame.attrs.get("notes", ()), *said, *record.notes))
+        return _cut(dataclasses.replace(record, notes=tuple(notes)), start, stop, detrend)
     except InputError as error:
         text = str(error).replace(_REPAIR, "stop= cuts the file before, resample=True fills gaps")
         raise InputError(f"{path}: {text} (found {found})") from None
@@ -155,32 +155,64 @@ def write(record: Record, path: str | Path) -> None:
     """Write a record to the file ``path`` that ``read`` reads: .csv, .parquet or .npz.
 
     Holds, conditions, units (``torque [N m]``) and what decimation has folded are kept in the file.
-    Folders that are missing are made. Raises ValueError for another suffix.
+    Folders that are missing are made. Raises ValueError for another suffix, and for channels whose
+    names could not be read back: those that a file uses itself, blank ones, ones in quotes.
     """
-    path = Path(path)
+    an("record", record, Record)
+    path = path_of("path", path)
     kind = path.suffix.lower()
     if kind not in WRITERS:
         raise InputError(f"{path}: {unknown('suffix', path.suffix, WRITERS)}")
+    _check_names(record, path)
     frame = record.to_frame().assign(**kept_in_files(record))
     frame.columns = [named_with(str(c), record.units.get(str(c), "")) for c in frame.columns]
     with whole_file(path) as beside:
         WRITERS[kind](frame, beside)
 
 
+def _check_names(record: Record, path: Path) -> None:
+    """ValueError for a channel whose name means something else in a file."""
+    for name in (*record.input_names, *record.output_names):
+        own = (
+            name == "time"
+            or is_kept(name)
+            or (name == "reference" and record.reference is not None)
+        )
+        if own or name != name.strip(" \t\"'") or not name or not name.isprintable():
+            why = "files use that name themselves" if own else "it would be read back as another"
+            raise InputError(
+                f"{path}: the channel {name!r} cannot be written, {why}; rename it with "
+                "input_names=, output_names="
+            )
+
+
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """A path beside ``path`` to write to, renamed into place when the block ends well."""
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    beside = Path(name)
+    try:
+        yield from _renamed(path)
+    except OSError as error:
+        # of the file that was asked for, not of the one beside it
+        if error.filename is not None and Path(error.filename).parent == path.parent:
+            raise type(error)(error.errno, error.strerror, str(path)) from None
+        raise
+
+
+def _renamed(path: Path) -> Iterator[Path]:
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; expected the name of a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{path}: {path.parent} is no folder; give another name") from None
+    beside = path.parent / f".{path.stem}-{secrets.token_hex(8)}{path.suffix}"
+    # made here, so that nobody else's is taken and the rights are those of any new file
+    os.close(os.open(beside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
     try:
         yield beside
-        # mkstemp makes files private; the finished one gets what any new file would
-        mask = os.umask(0)
-        os.umask(mask)
-        beside.chmod(0o666 & ~mask)
+        with beside.open("rb") as file:
+            os.fsync(file.fileno())
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from freqid.checks import BoolArray, FloatArray, IntArray, positive, whole
+from freqid.checks import BoolArray, FloatArray, InputError, IntArray, positive, whole
 
 # slow samples in which the anti-alias filter forgets
 _SETTLED = 30
@@ -57,6 +57,10 @@ def merged_lines(
     return at[order][new], mirrored, groups
 
 
+# samples that scipy.signal.sosfiltfilt needs for this filter, at both ends
+_SHORTEST = 27
+
+
 def low_pass(x: FloatArray, factor: int, faster: int = 1) -> FloatArray:
     """The anti-alias filter of ``Record.decimate``: forwards and backwards, so of zero phase.
 
@@ -64,6 +68,11 @@ def low_pass(x: FloatArray, factor: int, faster: int = 1) -> FloatArray:
     filter of the slow samples' own does not have: their lines are multiplied by it.
     """
     if faster == 1:
+        if len(x) <= _SHORTEST:
+            raise InputError(
+                f"antialias=True needs more than {_SHORTEST} samples, and there are {len(x)}; "
+                "decimate without it"
+            )
         return scipy.signal.sosfiltfilt(_anti_alias(factor), x, axis=0)
     pad = min(len(x) - 1, _SETTLED * factor)
     # odd at both ends, as scipy.signal.sosfiltfilt makes it

@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, positive, unknown
+from freqid.checks import FloatArray, InputError, positive, real, unknown
 from freqid.data.printed_times import printed_period
 from freqid.data.regular_time import on_a_grid
 from freqid.data.remembered import (
+    as_printed,
     is_kept,
     kept_aliased,
     kept_channels,
     kept_columns,
     kept_conditions,
     kept_hold,
+    kept_notes,
+    kept_step,
 )
 from freqid.lti import Hold
 
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from freqid.data.record import Record
+
+
+# beyond these rounding itself would overflow
+_DIGITS = 290
 
 
 def record_of(
@@ -38,16 +45,19 @@ def record_of(
     resample: bool,
 ) -> Record:
     """The record of that kind that a frame holds: columns to channels, time to periods."""
+    if not hasattr(frame, "columns"):
+        raise InputError(f"frame is a {type(frame).__name__}; expected a pandas.DataFrame")
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
     told = kept_channels(frame, signals, reference)
     u_names, y_names = _channels(signals, inputs, outputs, reference, told)
     between = kept_hold(frame, u_names) if hold is None else hold
-    notes: list[str] = []
+    notes = list(kept_notes(frame))
     if resample:
         held = set(u_names) if between is None or between == "zoh" else set()
-        frame, notes = _resampled(frame, signals, held)
+        frame, more = _resampled(frame, signals, held)
+        notes += more
     step = _sample_time(frame, dt, notes)
     u, y = (_numbers(frame, names) for names in (u_names, y_names))
     commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
@@ -83,8 +93,15 @@ def samples_frame(record: Record) -> pd.DataFrame:
         columns[name] = np.full(len(record.u), np.nan)
         columns[name][:: record.factor] = values
     columns |= kept_columns(record)
-    # twelve digits hide the rounding of k * dt and keep the times exactly regular on paper
-    return pd.DataFrame(columns, index=pd.Index(np.round(record.input_time, 12), name="time"))
+    return pd.DataFrame(columns, index=pd.Index(_on_paper(record), name="time"))
+
+
+def _on_paper(record: Record) -> FloatArray:
+    """Times of the input's samples, in s, exactly regular on paper."""
+    # twelve digits, of short sample times more, hide the rounding of k * dt
+    digits = max(12, 12 - int(np.floor(np.log10(record.input_dt))))
+    times = record.input_time
+    return np.round(times, digits) if digits < _DIGITS else times
 
 
 def _resampled(
@@ -131,8 +148,10 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
     if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
         raise InputError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")
     # a time column printed with few digits carries their rounding: prefer the round number
-    rounded = float(f"{step:.9g}")
-    return rounded if dt is None else float(dt)
+    kept = kept_step(frame)
+    if kept is not None and abs(kept - step) > 1e-3 * step:
+        kept = None
+    return (kept or as_printed(step)) if dt is None else float(dt)
 
 
 def _times(frame: pd.DataFrame) -> FloatArray | None:
@@ -189,6 +208,10 @@ def _channels(
 
 
 def _numbers(frame: pd.DataFrame, names: list[str]) -> FloatArray:
+    for name in names:
+        if frame[name].dtype.kind == "c":
+            real(f"column {name!r}", frame[name].to_numpy())
+            frame = frame.assign(**{name: np.real(frame[name].to_numpy())})
     try:
         return frame[names].to_numpy(dtype=float)
     except (TypeError, ValueError):

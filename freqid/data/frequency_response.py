@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, channel_names, whole
+from freqid.checks import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    InputError,
+    State,
+    channel_names,
+    finite,
+    numbers,
+    sealed,
+    whole,
+)
 from freqid.data.band import Band, chosen
 from freqid.data.conditions import as_conditions
 from freqid.data.remembered import response_columns
@@ -21,6 +32,9 @@ if TYPE_CHECKING:
     import control
     import pandas as pd
     import xarray
+
+# by how much a coherence may pass one
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -76,10 +90,10 @@ class FrequencyResponse:
         reach: int = 0,
         conditions: Mapping[str, float] | None = None,
     ) -> None:
-        f = np.array(frequency, dtype=float)
+        f = numbers("frequency", frequency)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
             raise InputError("frequency must be finite and increasing, (K,), in Hz")
-        G = np.array(response, dtype=complex)
+        G = numbers("response", response, complex)
         G = G.reshape(1, 1, -1) if G.ndim == 1 else G
         if not np.isfinite(G).all():
             raise InputError("response has values that are not finite; leave those lines out")
@@ -90,7 +104,7 @@ class FrequencyResponse:
             )
         if np.ndim(dt):
             raise InputError("dt is an array; expected a sample time in s: give variance by name")
-        if not np.isfinite(dt) or dt < 0:
+        if finite("dt", dt) < 0:
             raise InputError(f"dt={dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape
         self.__dict__.update(
@@ -99,7 +113,7 @@ class FrequencyResponse:
             dt=dt,
             hold=hold,
             variance=_shaped("variance", variance, G.shape),
-            coherence=_shaped("coherence", coherence, G.shape),
+            coherence=_shaped("coherence", coherence, G.shape, most=1.0),
             input_spectrum=_shaped("input_spectrum", input_spectrum, (m, K)),
             input_names=channel_names("input_names", input_names, m, "u"),
             output_names=channel_names("output_names", output_names, p, "y"),
@@ -107,9 +121,9 @@ class FrequencyResponse:
             conditions=as_conditions(conditions),
         )
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"reach": 0, "conditions": {}} | state)
+        self.__dict__.update({"reach": 0, "conditions": {}} | sealed(state))
 
     @property
     def omega(self) -> FloatArray:
@@ -260,13 +274,22 @@ class FrequencyResponse:
         return f"<p>{escape(repr(self)[1:-1])}</p>" + self.to_frame().head(8).to_html(index=False)
 
 
-def _shaped(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
-    """Values of a shape, read-only; ValueError for another number of them."""
+def _shaped(
+    name: str, values: ArrayLike | None, shape: tuple[int, ...], most: float = np.inf
+) -> FloatArray | None:
+    """Values of a shape between 0 and ``most``, read-only; ValueError for others."""
     if values is None:
         return None
-    array = np.array(values, dtype=float)
+    array = numbers(name, values)
     if array.size != np.prod(shape):
         raise InputError(f"{name} has shape {array.shape}; expected {shape}")
+    bad = ~((array >= 0) & (array <= most * (1 + _ROUNDING)))
+    if bad.any():
+        above = f"between 0 and {most:g}" if np.isfinite(most) else "zero or above"
+        raise InputError(
+            f"{name} has {int(bad.sum())} values that cannot be, the first {array[bad][0]:g}; "
+            f"expected numbers {above}"
+        )
     return frozen(array.reshape(shape))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, unknown
+from freqid.checks import FloatArray, InputError, path_of, unknown
 from freqid.data.logs import record_from_logs
 from freqid.data.readers.kinds import LOGS, Channel
 from freqid.data.record import Record
@@ -54,7 +54,7 @@ def _row(c: Channel) -> tuple[float, float, int, int, float, str]:
 
 def log_of(path: str | Path) -> Mapping[str, Channel]:
     """Every numeric channel of a file by name."""
-    path = Path(path)
+    path = path_of("path", path)
     kind = kind_of(path)
     if kind in LOGS:
         try:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from freqid.checks import FloatArray, InputError, choice, samples
 from freqid.data.clocks import Clock, simple_ratio
 from freqid.data.record import Record
+from freqid.data.regular_time import EMPTY
 from freqid.data.stamped_record import StampedRecord
 from freqid.data.stamps import common_seconds
 from freqid.lti import Hold, as_hold
@@ -181,6 +182,11 @@ def _resampled(
     count = int(np.floor((end - start) / y_clock.period)) + 1
     if count < 3:
         raise InputError("the clocks overlap in fewer than three output samples")
+    if count > EMPTY * len(y_at):
+        raise InputError(
+            f"y_time leaps so that {count} samples of {y_clock.period:g} s would stand for "
+            f"{len(y_at)}; repair its stamps"
+        )
     t_slow = start + y_clock.period * np.arange(count)
     t_fast = start + step * np.arange(count * every)
     inputs, outputs = u.reshape(len(u), -1), y.reshape(len(y), -1)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, an
 from freqid.data.record import Record
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def check_record(record: Record) -> pd.DataFrame:
     """
     import pandas as pd
 
+    an("record", record, Record)
     rows: list[dict[str, str | float]] = []
     channels = [
         *zip(record.input_names, record.inputs.T, strict=True),

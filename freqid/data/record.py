@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,13 @@ from numpy.typing import ArrayLike
 from freqid.checks import (
     FloatArray,
     InputError,
+    State,
     channel_names,
     finite,
+    named_values,
     positive,
     samples,
+    sealed,
     unknown,
     whole,
 )
@@ -98,7 +101,7 @@ class Record(Signals):
         both = (*u_names, *y_names)
         if len(set(both)) < len(both):
             raise InputError(f"channel names {list(both)} hold a name twice; names must differ")
-        for name in units or {}:
+        for name in named_values("units", units):
             if name not in (*both, "reference"):
                 raise InputError(unknown("units", name, both))
         commanded = None if reference is None else samples("reference", reference)
@@ -112,9 +115,9 @@ class Record(Signals):
             aliased=float(aliased), conditions=as_conditions(conditions),
         )  # fmt: skip
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"notes": (), "aliased": 0.0, "conditions": {}} | state)
+        self.__dict__.update({"notes": (), "aliased": 0.0, "conditions": {}} | sealed(state))
 
     def decimate(self, factor: int, keep_input: bool = False, antialias: bool = False) -> Record:
         """Every ``factor``-th sample, with the hold remembered as it was.
@@ -193,7 +196,7 @@ class Record(Signals):
         ValueError for a negative or non-finite ``std``, another number of them, or both or none.
         """
         size = noise_sizes(self.outputs, std, snr)
-        noise = np.random.default_rng(seed).standard_normal(self.y.shape)
+        noise = np.random.default_rng(whole("seed", seed, least=0)).standard_normal(self.y.shape)
         return replace(self, y=self.y + size.reshape(self.y.shape[1:]) * noise)
 
     def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> Record:

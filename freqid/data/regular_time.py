@@ -10,6 +10,9 @@ from freqid.checks import FloatArray, InputError
 from freqid.data.clocks import Clock
 from freqid.data.printed_times import plain_period, printed_period
 
+# rows of a regular time for each that is there, beyond which a stamp is wrong and no gap
+EMPTY = 1000
+
 
 def on_a_grid(
     times: FloatArray, columns: Mapping[str, FloatArray], held: Collection[str]
@@ -33,6 +36,11 @@ def on_a_grid(
     known_to = max(clock.standard_error, 1e-9) * clock.period
     step = rounded[0] if rounded else plain_period(clock.period, known_to)
     begin = times[0] + clock.start
+    if clock.number[-1] > EMPTY * len(times):
+        raise InputError(
+            f"column 'time' leaps by {gaps.max():g} s where most steps are {step:g} s: a regular "
+            f"time would have {int(clock.number[-1]) + 1} rows for {len(times)}; repair that stamp"
+        )
     grid = begin + step * np.arange(int(clock.number[-1]) + 1)
     wide = int((np.diff(clock.number) > 1).sum())
     if wide:

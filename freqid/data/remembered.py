@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -20,13 +21,16 @@ if TYPE_CHECKING:
 _CONDITION = "condition "
 # the part of the power that decimation has folded, and how many of several channels are inputs
 _ALIASED, _INPUTS = "aliased share", "input count"
+# the sample time where the times do not say it to the last bit, and what was done before
+_STEP, _NOTE = "sample time", re.compile(r"note \d+: ")
 _ROUNDING = 1e-9
 
 
 def is_kept(column: object) -> bool:
     """Whether a column is about the record and no signal."""
     name = str(column)
-    other = name in (_ALIASED, _INPUTS) or name.startswith(_CONDITION)
+    other = name in (_ALIASED, _INPUTS, _STEP) or name.startswith(_CONDITION)
+    other = other or _NOTE.match(name) is not None
     return other or name.split(" ")[0] in _holds()
 
 
@@ -77,7 +81,26 @@ def kept_in_files(record: Record) -> dict[str, float | bool]:
         kept[_INPUTS] = record.n_inputs
     if record.aliased > _ROUNDING:
         kept[_ALIASED] = record.aliased
-    return kept
+    if as_printed(record.input_dt) != record.input_dt:
+        kept[_STEP] = record.input_dt
+    # the words are the name of the column: a table has no other place for them in every format
+    return kept | {f"note {i + 1}: {' '.join(n.split())}": 1.0 for i, n in enumerate(record.notes)}
+
+
+def as_printed(step: float) -> float:
+    """A sample time as a column of times tells it: few digits carry their rounding."""
+    return float(f"{step:.9g}")
+
+
+def kept_step(frame: pd.DataFrame) -> float | None:
+    """The time between rows in s that a table remembers."""
+    return positive(_STEP, _one(frame, _STEP), "s") if _STEP in frame.columns else None
+
+
+def kept_notes(frame: pd.DataFrame) -> tuple[str, ...]:
+    """What was done to the samples before the table was written."""
+    found = [_NOTE.match(str(c)) for c in frame.columns]
+    return tuple(m.string[m.end() :] for m in found if m)
 
 
 def kept_hold(frame: pd.DataFrame, inputs: list[str]) -> Hold | dict[str, Hold] | None:

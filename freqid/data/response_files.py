@@ -10,21 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, numbers, path_of
+from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
 from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.readers.kinds import damaged, existing, first_line, missing
 from freqid.data.remembered import kept_of_response
 from freqid.data.tables import frame_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# Hz of each unit of frequency
-_HERTZ = {
-    "hz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "rad/s": 1 / (2 * np.pi),
-    "rad/sec": 1 / (2 * np.pi),
-}  # fmt: skip
-_FREQUENCY = r"(f|freq|frequency|frequenz|w|omega|ω)"
 _PHASE = r"(phase|ph|phi|angle|arg|deg|degrees|∠)"
 _SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db)"
 
@@ -57,15 +51,15 @@ def read_response(
     >>> fq.read_response(path).response[0, 0].round(6)
     array([ 0.-10.j, -1. -0.j])
     """
-    path = Path(path)
+    path = path_of("path", path)
     kind = path.suffix.lower()
     try:
         if re.fullmatch(r"\.s\d+p", kind):
-            found = _touchstone(path)
+            found = of_touchstone(path)
         elif kind in (".uff", ".unv"):
-            found = _universal(path)
+            found = of_universal(path)
         elif kind == ".mat":
-            found = _matlab(path)
+            found = of_matlab(path)
         else:
             frame = frame_of(path, sep, decimal)
             found = of_frame(frame, frame.attrs.get("units", {}))
@@ -77,12 +71,14 @@ def read_response(
 
 def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> FrequencyResponse:
     """The response that a table holds; ValueError, with its columns, where that is none."""
+    if not hasattr(frame, "columns"):
+        raise InputError(f"frame is a {type(frame).__name__}; expected a pandas.DataFrame")
     names = [str(c) for c in frame.columns]
     if {"frequency", "output", "input", "real", "imag"} <= set(names):
         return _long(frame)
     told = dict(units or {})
-    at = _one(names, _FREQUENCY, told) or names[0]
-    f = _numbers(frame, at) * _scale(at, told.get(at, ""))
+    at = _one(names, FREQUENCY, told) or names[0]
+    f = _numbers(frame, at) * in_hertz(at, told.get(at, ""))
     rest = [n for n in names if n != at]
     G = _complex(frame, rest, told)
     order = np.argsort(f, kind="stable")
@@ -95,7 +91,7 @@ def of_db(
     frequency: ArrayLike, magnitude_db: ArrayLike, phase_deg: ArrayLike, **fields: Any
 ) -> FrequencyResponse:
     """The work of ``FrequencyResponse.from_db``."""
-    size, turn = np.asarray(magnitude_db, dtype=float), np.asarray(phase_deg, dtype=float)
+    size, turn = numbers("magnitude_db", magnitude_db), numbers("phase_deg", phase_deg)
     if size.shape != turn.shape:
         raise InputError(
             f"magnitude_db has shape {size.shape} and phase_deg {turn.shape}; they must agree"
@@ -106,24 +102,26 @@ def of_db(
 def _long(frame: pd.DataFrame) -> FrequencyResponse:
     outputs, inputs = list(dict.fromkeys(frame["output"])), list(dict.fromkeys(frame["input"]))
     first = frame[(frame["output"] == outputs[0]) & (frame["input"] == inputs[0])]
-    f = first["frequency"].to_numpy(dtype=float)
+    f = _numbers(first, "frequency")
     fields: dict[str, Array] = {}
-    for name in ("response", "variance", "coherence"):
-        if name != "response" and name not in frame.columns:
-            continue
-        values = frame["real"] + 1j * frame["imag"] if name == "response" else frame[name]
-        kind = complex if name == "response" else float
-        whole = np.empty((len(outputs), len(inputs), len(f)), kind)
+    columns: dict[str, Array] = {
+        n: _numbers(frame, n) for n in ("variance", "coherence") if n in frame.columns
+    }
+    columns["response"] = _joined(_numbers(frame, "real"), _numbers(frame, "imag"))
+    for name, values in columns.items():
+        whole = np.empty((len(outputs), len(inputs), len(f)), values.dtype)
         for i, y in enumerate(outputs):
             for j, u in enumerate(inputs):
-                some = values[(frame["output"] == y) & (frame["input"] == u)].to_numpy()
+                some = values[((frame["output"] == y) & (frame["input"] == u)).to_numpy()]
                 if len(some) != len(f):
                     raise InputError(f"{y} from {u} has {len(some)} rows and others {len(f)}")
                 whole[i, j] = some
         fields[name] = whole
     if "input_spectrum" in frame.columns:
         rows = frame[frame["output"] == outputs[0]]
-        spectra = [rows["input_spectrum"][rows["input"] == u].to_numpy(dtype=float) for u in inputs]
+        spectra = [_numbers(rows[rows["input"] == u], "input_spectrum") for u in inputs]
+        if len({len(s) for s in spectra}) > 1:
+            raise InputError("column 'input_spectrum' has another number of rows for each input")
         fields["input_spectrum"] = np.array(spectra)
     names = {"input_names": inputs, "output_names": outputs}
     kept = kept_of_response(frame, [str(n) for n in inputs])
@@ -135,17 +133,6 @@ def _one(names: list[str], pattern: str, units: dict[str, str]) -> str | None:
     return found[0] if found else None
 
 
-def _scale(name: str, unit: str) -> float:
-    text = unit.casefold()
-    if not text:
-        tail = re.search(r"_(hz|khz|mhz|ghz)$", name.casefold())
-        turned = re.search(r"^(w|omega|ω)|rad", name.casefold())
-        text = tail[1] if tail else "rad/s" if turned else "hz"
-    if text not in _HERTZ:
-        raise InputError(f"the unit of {name!r} is {unit!r}; expected one of {', '.join(_HERTZ)}")
-    return _HERTZ[text]
-
-
 def _numbers(frame: pd.DataFrame, name: str) -> FloatArray:
     try:
         return frame[name].to_numpy(dtype=float)
@@ -153,11 +140,16 @@ def _numbers(frame: pd.DataFrame, name: str) -> FloatArray:
         raise InputError(f"column {name!r} holds values that are not numbers") from None
 
 
+def _joined(real: FloatArray, imaginary: FloatArray) -> ComplexArray:
+    # not a sum, in which an infinite part would spoil the other
+    return np.stack([real, imaginary], axis=-1).view(complex)[..., 0]
+
+
 def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> ComplexArray:
     real = _one(names, r"(re|real|in-phase)", units)
     imaginary = _one(names, r"(im|imag|imaginary|quadrature)", units)
     if real and imaginary:
-        return _numbers(frame, real) + 1j * _numbers(frame, imaginary)
+        return _joined(_numbers(frame, real), _numbers(frame, imaginary))
     phase = _one(names, _PHASE, units)
     turns = [n for n in names if re.search(rf"(^|[^a-z]){_PHASE}([^a-z]|$)", n.casefold())]
     if len(turns) > 1:
@@ -199,76 +191,6 @@ def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> Co
     if not radians:
         turn = np.deg2rad(turn)
     return magnitude * np.exp(1j * turn)
-
-
-def _touchstone(path: Path) -> FrequencyResponse:
-    try:
-        import skrf
-    except ImportError:
-        raise missing("Touchstone", "scikit-rf", "rf") from None
-    existing(path)
-    try:
-        network = skrf.Network(str(path))
-    except Exception as error:
-        # scikit-rf has errors of many kinds for a file that is not what it says
-        raise damaged("Touchstone", error) from None
-    return FrequencyResponse(np.asarray(network.f), np.moveaxis(np.asarray(network.s), 0, -1))
-
-
-def _universal(path: Path) -> FrequencyResponse:
-    try:
-        import pyuff
-    except ImportError:
-        raise missing("UFF58", "pyuff", "uff") from None
-    existing(path)
-    try:
-        sets = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:
-        # pyuff has errors of many kinds for a file that is not what it says
-        raise damaged("UFF58", error) from None
-    sets = [sets] if isinstance(sets, dict) else list(sets)
-    # function type 4 is a frequency response
-    found = [s for s in sets if s.get("type") == 58 and s.get("func_type") == 4]
-    if not found:
-        raise InputError("holds no frequency responses (data sets 58 of function type 4)")
-
-    def end(s: dict[str, Any], kind: str) -> str:
-        return f"{s.get(f'{kind}_node', 0)}:{s.get(f'{kind}_dir', 0)}"
-
-    outputs = list(dict.fromkeys(end(s, "rsp") for s in found))
-    inputs = list(dict.fromkeys(end(s, "ref") for s in found))
-    f = np.asarray(found[0]["x"], dtype=float)
-    G = np.full((len(outputs), len(inputs), len(f)), np.nan + 0j)
-    for s in found:
-        if len(s["x"]) != len(f) or not np.allclose(s["x"], f):
-            raise InputError("its responses have unlike frequencies; read them one file each")
-        G[outputs.index(end(s, "rsp")), inputs.index(end(s, "ref"))] = s["data"]
-    if np.isnan(G).any():
-        raise InputError(f"holds {len(found)} responses, not all of {outputs} from {inputs}")
-    return FrequencyResponse(f, G, input_names=inputs, output_names=outputs)
-
-
-def _matlab(path: Path) -> FrequencyResponse:
-    import scipy.io
-
-    existing(path)
-    try:
-        content = scipy.io.loadmat(path, squeeze_me=True)
-    except (ValueError, TypeError, OSError, IndexError, NotImplementedError) as error:
-        raise InputError(f"is not a MAT file that can be read ({first_line(error)})") from None
-    arrays = {k: np.asarray(v) for k, v in content.items() if not k.startswith("__")}
-    found = [k for k, v in arrays.items() if np.iscomplexobj(v) and v.ndim >= 1]
-    axes = [k for k in arrays if re.fullmatch(_FREQUENCY, k.casefold())]
-    if len(found) != 1 or not axes:
-        raise InputError(
-            f"holds {', '.join(arrays)}; expected frequencies f (Hz) or w (rad/s) and one complex "
-            "array"
-        )
-    f = arrays[axes[0]].astype(float) * _scale(axes[0], "")
-    G = arrays[found[0]]
-    if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
-        G = np.moveaxis(G, 0, -1)
-    return FrequencyResponse(f, G if G.ndim != 2 else G[:, None])
 
 
 def _picked(

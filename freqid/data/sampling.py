@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, finite
+from freqid.checks import FloatArray, InputError, finite, numbers
 
 
 def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
     """ValueError unless there is a whole number of input samples for each output sample."""
+    if not np.isfinite(dt * n_out):
+        raise InputError(f"dt={dt:g} s makes {n_out} samples last longer than numbers reach")
     factor = dt / input_dt
     M = round(factor)
     if abs(factor - M) > 1e-6 * factor or M < 1:
@@ -38,7 +40,7 @@ def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: float | None) -> Floa
         if not y.std(axis=0).all():
             raise InputError(f"snr={snr!r}: an output is constant; give std, the noise's own size")
         return y.std(axis=0) * 10 ** (-finite("snr", snr) / 20)
-    sizes = np.atleast_1d(np.asarray(std, dtype=float))
+    sizes = np.atleast_1d(numbers("std", std if std is not None else ()))
     if sizes.shape not in ((1,), (p,)) or not np.isfinite(sizes).all() or (sizes < 0).any():
         raise InputError(
             f"std={std!r}: expected a finite number that must not be negative, or one for each of "
@@ -49,6 +51,8 @@ def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: float | None) -> Floa
 
 def less_trend(x: FloatArray, order: int) -> FloatArray:
     """Samples (N,) or (N, channels) less their least-squares polynomial in time."""
+    if order >= len(x):
+        raise InputError(f"order={order} must be below the number of samples, {len(x)}")
     basis = np.polynomial.legendre.legvander(np.linspace(-1, 1, len(x)), order)
     flat = x.reshape(len(x), -1)
     return (flat - basis @ np.linalg.lstsq(basis, flat)[0]).reshape(x.shape)

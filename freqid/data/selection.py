@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, samples, unknown
+from freqid.checks import FloatArray, InputError, an, listed, samples, unknown
 from freqid.lti import Hold, InputHolds, as_hold
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def with_input(
     record: Record, name: str, values: ArrayLike, hold: Hold | str | None, unit: str | None
 ) -> Record:
     """The record with one input more."""
+    an("name", name, str)
     if name in (*record.input_names, *record.output_names):
         raise InputError(f"name={name!r} is a channel already; take another")
     more = samples(name, values)
@@ -92,7 +93,7 @@ def _names(
 ) -> tuple[str, ...]:
     if given is None:
         return tuple(known)
-    names = (given,) if isinstance(given, str) else tuple(given)
+    names = (given,) if isinstance(given, str) else tuple(listed(argument, given))
     if not names:
         raise InputError(f"{argument}=[] leaves no channel; the record has {', '.join(known)}")
     for name in names:

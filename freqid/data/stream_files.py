@@ -83,6 +83,10 @@ def _of_hdf5(path: Path, block: int, given: float | None) -> Found:
     def look(name: str, item: Source) -> None:
         if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiu":
             return
+        if item.external or item.is_virtual:
+            raise InputError(
+                f"{path}: {name!r} refers to another file, which is not read; copy it in"
+            )
         if item.ndim == 1 and len(item) > 1:
             sizes[name] = len(item)
         elif item.size == 1:
@@ -100,7 +104,8 @@ def _of_hdf5(path: Path, block: int, given: float | None) -> Found:
                 dt = _even(str(path), leaf, np.concatenate([t[:2], t[-2:]]), len(t))
     except InputError:
         raise
-    except OSError as error:
+    except Exception as error:
+        # h5py has errors of many kinds for a file that is not what it says
         raise InputError(f"{path}: {damaged('HDF5', error)}") from None
     full = [n for n in sizes if n not in times]
     if not full:

@@ -32,11 +32,22 @@ def power_gain(system: Filter, frequency: ArrayLike, dt: float) -> FloatArray:
     elif callable(system):
         H = np.asarray(system(omega))
     else:
-        raise InputError(
-            f"system={type(system).__name__} is no filter; expected a control system, a tuple "
-            "(b, a) of polynomials in z, or a function of omega (rad/s)"
-        )
+        raise _no_filter(system)
     return np.abs(H) ** 2
+
+
+def known_filter(system: Filter) -> None:
+    """ValueError for what is no filter."""
+    pair = isinstance(system, tuple) and len(system) == 2
+    if not (pair or hasattr(system, "ninputs") or callable(system)):
+        raise _no_filter(system)
+
+
+def _no_filter(system: object) -> InputError:
+    return InputError(
+        f"system={type(system).__name__} is no filter; expected a control system, a tuple "
+        "(b, a) of polynomials in z, or a function of omega (rad/s)"
+    )
 
 
 def _response(system: control.lti.LTI, omega: FloatArray, dt: float) -> Array:

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, choice, positive
+from freqid.checks import FloatArray, InputError, choice, numbers, positive
 from freqid.data import Band, merged_lines, unfold
-from freqid.excitation.filters import Filter, power_gain
+from freqid.excitation.filters import Filter, known_filter, power_gain
 from freqid.lti import panel_nodes, resolved
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ class LineSpectrum(InputSpectrum):
     powers: Sequence[float]
 
     def __post_init__(self) -> None:
-        f, power = np.array(self.frequencies, float), np.array(self.powers, float)
+        f, power = numbers("frequencies", self.frequencies), numbers("powers", self.powers)
         if f.ndim != 1 or f.shape != power.shape or len(f) == 0:
             raise InputError(
                 f"frequencies has shape {f.shape} and powers {power.shape}; expected as many "
@@ -205,6 +205,9 @@ class FilteredSpectrum(InputSpectrum):
 
     system: Filter
     source: InputSpectrum | None = None
+
+    def __post_init__(self) -> None:
+        known_filter(self.system)
 
     def _source(self) -> InputSpectrum:
         return WhiteSpectrum() if self.source is None else self.source

@@ -18,6 +18,8 @@ _STARTS, _CLIPPING_ROUNDS = 6, 400
 _NORMS, _STEPS = (32, 64, 128, 256, 512, 1024), 200
 # samples over which one more start is followed to the end
 _MORE = 8_000
+# samples from which on one start is clipped alone, and ever fewer times: seconds, not minutes
+_SAMPLES = 200_000
 
 
 def multisine(
@@ -176,12 +178,16 @@ def _least_crest(
     grid = min(N, scipy.fft.next_fast_len(16 * int(k[-1]), real=True))
     # few lines are cheap, and their least peak takes luck
     count = _STARTS + more // grid
+    # many lines are dear, and each start of them comes as low as another
+    count = min(count, 1 + _SAMPLES // grid)
     starts = [first, *rng.uniform(0, 2 * np.pi, (count - 1, len(k)))]
 
     def crest(phases: FloatArray) -> float:
         return float(np.abs(lines.signal(phases, N)).max())
 
     clipped = sorted((_clipped(lines, start, grid) for start in starts), key=crest)
+    if grid > _SAMPLES:
+        return clipped[0]
     lowered = [_lowered(lines, phases, grid) for phases in clipped[: 1 + more // grid]]
     return min([*clipped, *lowered], key=crest)
 
@@ -189,7 +195,8 @@ def _least_crest(
 def _clipped(lines: _Lines, phases: FloatArray, grid: int) -> FloatArray:
     """Clip the peaks, keep the phases that this leaves, and again, ever less."""
     best, least = phases, np.inf
-    for level in np.linspace(0.75, 0.98, _CLIPPING_ROUNDS):
+    rounds = max(_CLIPPING_ROUNDS * _SAMPLES // max(grid, _SAMPLES), 20)
+    for level in np.linspace(0.75, 0.98, rounds):
         x = lines.signal(phases, grid)
         peak = np.abs(x).max()
         if peak < least:

@@ -54,7 +54,10 @@ class PRBSSpectrum(InputSpectrum):
     amplitude: float = 1.0
 
     def __post_init__(self) -> None:
-        whole("n_bits", self.n_bits, least=2)
+        if whole("n_bits", self.n_bits, least=2) > 24:
+            raise InputError(
+                f"n_bits={self.n_bits} must be at most 24: a period has 2**n_bits - 1 bits"
+            )
         whole("clock", self.clock)
         positive("amplitude", self.amplitude)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.signal
 
-from freqid.checks import FloatArray, InputError, choice, finite, positive, whole
+from freqid.checks import FloatArray, InputError, choice, few_enough, finite, positive, whole
 
 
 def _times(duration: float, dt: float) -> FloatArray:
-    count = round(positive("duration", duration, "s") / positive("dt", dt, "s"))
+    count = few_enough("duration", positive("duration", duration, "s") / positive("dt", dt, "s"))
     if count < 1:
         raise InputError(f"duration={duration:g} s is shorter than half of dt={dt:g} s")
     return dt * np.arange(count)
@@ -86,4 +86,4 @@ def white_noise(n: int, seed: int = 0) -> FloatArray:
     """
     # not the sequence that Record.with_noise has for the same seed: input and noise must not agree
     rng = np.random.default_rng([whole("seed", seed, least=0), 1])
-    return rng.standard_normal(whole("n", n))
+    return rng.standard_normal(few_enough("n", whole("n", n)))

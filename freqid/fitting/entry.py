@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Literal
 
-from freqid.checks import InputError, choice, whole
+from freqid.checks import InputError, choice, named_values, whole
 from freqid.data import DataSet, FrequencyResponse, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
@@ -104,6 +104,7 @@ def fit(
     """
     choice("domain", domain, ("frequency", "time"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
+    start = None if start is None else named_values("start", start)
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
     whole("seed", seed, least=0)
     fitter_of(model)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import InputError, path_of
 from freqid.data import DataSet, Record, whole_file
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
@@ -31,7 +31,7 @@ SCHEMA = 1
 
 def save(est: Estimate, path: str | Path, overwrite: bool = False) -> None:
     """The work of ``est.save``."""
-    path = Path(path)
+    path = path_of("path", path)
     if path.suffix.lower() != ".json":
         raise InputError(f"{path}: estimates are saved as .json")
     if path.exists() and not overwrite:
@@ -97,7 +97,7 @@ def load(path: str | Path, model: GreyBox | None = None) -> Estimate:
     >>> fq.load(path).verdict.grade
     'trust'
     """
-    path = Path(path)
+    path = path_of("path", path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} does not exist or is not a file; check the path")
     try:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import InputError, choice, whole
+from freqid.checks import InputError, an, choice, listed, whole
 from freqid.data import FrequencyResponse, Record, channel_counts
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
@@ -56,10 +56,12 @@ def select_order(
     """
     import pandas as pd
 
+    an("data", data, Record, FrequencyResponse)
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
     if feedthrough not in (True, False, None):
         raise InputError(f"feedthrough={feedthrough!r} must be True, False or None for both")
-    wanted = [whole("orders", n) for n in ([orders] if isinstance(orders, int) else orders)]
+    given = [orders] if isinstance(orders, int) else listed("orders", orders)
+    wanted = [whole("orders", n) for n in given]
     if not wanted:
         raise InputError("orders is empty; give at least one, such as range(1, 7)")
     late = [whole("delays", q, least=0) for q in ([delays] if isinstance(delays, int) else delays)]

@@ -41,7 +41,7 @@ class Averaging:
         lengths = [r.n_samples for r in sets if r.n_samples is not None]
         if self.segment is None and not lengths:
             raise InputError("segment=None: a stream of unknown length needs one; give segment")
-        shortest = min(lengths, default=int(self.segment or 0))
+        shortest = min(lengths, default=0) or whole("segment", self.segment, least=2)
         default = shortest if len(sets) > 1 else max(shortest // _SEGMENTS, 2)
         length = whole("segment", default if self.segment is None else self.segment, least=2)
         if length > shortest:

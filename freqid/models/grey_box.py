@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, channel_names, finite, unknown
+from freqid.checks import FloatArray, InputError, channel_names, finite, listed, unknown
 from freqid.data import as_conditions
 from freqid.lti import Linearisation, StateSpace
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction, without
@@ -65,7 +65,7 @@ class GreyBox(Model):
     _function: MatrixFunction = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        parameters = tuple(self.parameters)
+        parameters = tuple(listed("parameters", self.parameters))
         object.__setattr__(self, "parameters", parameters)
         for p in parameters:
             if not isinstance(p, Parameter):
@@ -209,6 +209,9 @@ class GreyBox(Model):
 
     def with_bounds(self, **bounds: tuple[float, float]) -> GreyBox:
         """The same plant with other search bounds, ``with_bounds(k=(1e4, 1e6))``."""
+        for name, pair in bounds.items():
+            if not isinstance(pair, (tuple, list, np.ndarray)) or len(pair) != 2:
+                raise InputError(f"bounds of {name}={pair!r:.80} must be (lower, upper)")
         return self._changed({n: {"lower": lo, "upper": hi} for n, (lo, hi) in bounds.items()})
 
     def with_prior(self, **priors: tuple[float, float] | None) -> GreyBox:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -261,8 +261,13 @@ def _dense(matrices: Sequence[object], dtype: type) -> list[Array]:
 
 def _shaped(matrices: Sequence[object], values: Mapping[str, float]) -> StateSpace:
     """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
-    if len(matrices) != 4:
-        raise InputError(f"matrices returned {len(matrices)} items; expected A, B, C, D")
+    if not isinstance(matrices, (Sequence, np.ndarray)) or len(matrices) != 4:
+        found = f"{len(matrices)} items" if isinstance(matrices, Sized) else f"{matrices!r:.60}"
+        raise InputError(f"matrices returned {found}; expected A, B, C, D")
+    try:
+        shapes = [np.asarray(M, dtype=complex).shape for M in matrices if M is not None]
+    except (TypeError, ValueError):
+        raise InputError("matrices returned rows of unlike length, or no numbers") from None
     shapes = [np.asarray(M).shape for M in matrices]
     text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
     expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"

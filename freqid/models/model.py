@@ -10,7 +10,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, numbers, whole
 from freqid.data import FrequencyResponse
 from freqid.lti import (
     BandLimited,
@@ -127,7 +127,7 @@ class Model(ABC):
         >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
         np.float64(0.7071)
         """
-        at = np.atleast_1d(np.asarray(omega, dtype=float))
+        at = np.atleast_1d(numbers("omega", omega))
         if at.ndim != 1 or not np.isfinite(at).all():
             raise InputError(
                 f"omega has shape {at.shape}; expected finite frequencies (rad/s), (K,)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 from freqid.checks import InputError, finite
 
@@ -34,6 +35,11 @@ class Parameter:
         if not isinstance(self.name, str) or not self.name:
             raise InputError(f"name={self.name!r} must be a non-empty string")
         object.__setattr__(self, "value", finite(f"parameter {self.name}", self.value))
+        for side in ("lower", "upper"):
+            if not isinstance(getattr(self, side), Real):
+                raise InputError(
+                    f"parameter {self.name}: {side}={getattr(self, side)!r} must be a number"
+                )
         if not self.lower < self.upper:
             raise InputError(
                 f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"
@@ -42,6 +48,15 @@ class Parameter:
             raise InputError(
                 f"parameter {self.name}={self.value:g} lies outside its bounds "
                 f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
+            )
+        try:
+            least, most = (float(v) for v in self.physical)
+        except (TypeError, ValueError):
+            least = most = math.nan
+        if not least < most:
+            raise InputError(
+                f"parameter {self.name}: physical={self.physical!r} must be (low, high), low below "
+                "high"
             )
         if self.prior is not None:
             try:

@@ -63,6 +63,10 @@ def two_mass(
     )
 
 
+# masses of a chain: more are a mesh, for which dense matrices are the wrong tool
+_LONGEST = 200
+
+
 def drivetrain(
     n_masses: int,
     outputs: Sequence[str] = ("motor velocity",),
@@ -85,6 +89,8 @@ def drivetrain(
     'fm'
     """
     n = whole("n_masses", n_masses, least=2)
+    if n > _LONGEST:
+        raise InputError(f"n_masses={n} must be at most {_LONGEST}")
     names = [outputs] if isinstance(outputs, str) else list(outputs)
     for name in names:
         choice("outputs", name, _DRIVETRAIN_OUTPUTS)

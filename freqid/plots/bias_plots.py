@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.bias import apparent_response, asymptotic_fit
-from freqid.checks import InputError, unknown
+from freqid.checks import InputError, an, unknown
 from freqid.data import FrequencyResponse
 from freqid.excitation import InputSpectrum
 from freqid.fitting import Estimate
@@ -108,6 +108,10 @@ def plot_bias_curves(
     where not given. One panel a parameter, one curve a hold. Returns the axes. Raises ValueError
     for an unknown factor or parameter.
     """
+    import pandas as pd
+
+    if "parameter" not in an("table", table, pd.DataFrame):
+        raise InputError("table has no column 'parameter'; expected what bias_map returns")
     known = list(dict.fromkeys(table["parameter"]))
     wanted = list(parameters or known)
     chosen = int(table["factor"].max()) if factor is None else factor
@@ -229,6 +233,10 @@ def _sentence(est: Estimate, plant: Model) -> str:
 
 
 def _of_parameter(table: pd.DataFrame, parameter: str) -> pd.DataFrame:
+    import pandas as pd
+
+    if "parameter" not in an("table", table, pd.DataFrame):
+        raise InputError("table has no column 'parameter'; expected what bias_map returns")
     known = list(dict.fromkeys(table["parameter"]))
     if parameter not in known:
         raise InputError(unknown("parameter", parameter, known))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, choice
+from freqid.checks import FloatArray, InputError, an, choice
 from freqid.data import FrequencyResponse, Record
 from freqid.fitting import Estimate
 from freqid.lti import Hold, PeriodicHold
@@ -213,6 +213,7 @@ def plot_coherence(frf: FrequencyResponse, ax: Axes | None = None, unit: str = "
     Raises ValueError where it has none.
     """
     choice("unit", unit, list(UNITS))
+    an("frf", frf, FrequencyResponse)
     if frf.coherence is None:
         raise InputError("frf has no coherence; an average over segments or repeats has one")
     with drawing(ax) as ax:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.stats
 
-from freqid.checks import FloatArray, InputError, whole
+from freqid.checks import FloatArray, InputError, an, whole
 from freqid.data import (
     Band,
     DataSet,
@@ -268,6 +268,7 @@ def cost_test(est: Estimate) -> dict[str, float]:
     are estimates themselves, those of ``periodic``, raise what is expected and its scatter: each
     term is then F-distributed.
     """
+    an("est", est, Estimate)
     freedom = max(est.n_rows - len(est.names), 1)
     if any(isinstance(d, PeriodicResponse) for d in est.data):
         return _of_means(est, freedom)

@@ -13,6 +13,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def in_numbers(values: object) -> object:
+    """Dates and durations as seconds, since the first of them; others as they are."""
+    array = np.asarray(values)
+    if array.dtype.kind == "M":
+        array = array - array.ravel()[0] if array.size else array.view("int64")
+    return array / np.timedelta64(1, "s") if array.dtype.kind == "m" else values
+
+
 def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     """Named arrays as columns: matrices become name1, name2, …, scalars are left out.
 
@@ -25,11 +33,13 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     scalars: dict[str, float] = {}
     for name, value in arrays.items():
         try:
-            x = np.squeeze(np.asarray(value, dtype=float))
+            x = np.squeeze(np.asarray(in_numbers(value)))
+            # complex samples stay so: who uses that column is told
+            x = x if x.dtype.kind == "c" and x.imag.any() else x.real.astype(float)
         except (TypeError, ValueError):
             continue
         if x.ndim == 0:
-            scalars[name] = float(x)
+            scalars[name] = float(x.real)
         elif x.ndim == 1:
             columns[name] = x
         elif x.ndim == 2:
@@ -43,7 +53,7 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
         if len(x) == N:
             full[name] = x
         elif len(x) > 1 and N % len(x) == 0 and name != "time":
-            full[name] = np.full(N, np.nan)
+            full[name] = np.full(N, np.nan, dtype=x.dtype)
             full[name][:: N // len(x)] = x
         else:
             raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError, unknown
 from freqid.data.readers.kinds import damaged, missing, reads
+from freqid.data.readers.limits import check_size
 from freqid.data.readers.table import heading
 
 if TYPE_CHECKING:
@@ -25,6 +27,9 @@ def read_excel(path: Path, group: str | None = None) -> pd.DataFrame:
         from python_calamine import CalamineWorkbook
     except ImportError:
         raise missing("a workbook", "python-calamine", "excel") from None
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            check_size(path, sum(part.file_size for part in archive.infolist()), "its sheets")
     try:
         book = CalamineWorkbook.from_path(str(path))
         sheets = {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freqid.checks import Array
+from freqid.checks import Array, InputError
 from freqid.data.readers.columns import columns_of
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
+from freqid.data.readers.limits import check_size
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,15 +25,26 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
     except ImportError:
         raise missing("HDF5", "h5py", "hdf5") from None
     found: dict[str, dict[str, Array]] = {}
+    taken = 0.0
 
     def keep(name: str, item: object) -> None:
+        nonlocal taken
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not name.startswith("#"):
+            # samples that lie in another file, which the file's maker chose, are not fetched
+            if item.external or item.is_virtual:
+                raise InputError(f"{name!r} refers to another file, which is not read; copy it in")
+            taken += 8.0 * item.size
+            check_size(path, taken)
             parent, _, leaf = name.rpartition("/")
             found.setdefault(parent, {})[leaf] = item[()]
 
     try:
+        # visititems follows no external and no soft links
         with h5py.File(path, "r") as file:
             file.visititems(keep)
-    except OSError as error:
+    except InputError:
+        raise
+    except Exception as error:
+        # h5py has errors of many kinds for a file that is not what it says
         raise damaged("HDF5", error) from None
     return columns_of(of_one_group(found, group, "group"))

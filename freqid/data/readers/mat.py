@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.data.readers.columns import columns_of
 from freqid.data.readers.kinds import READERS, damaged, of_one_group, reads
+from freqid.data.readers.mat_structure import check_structure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,16 +21,11 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
 
     Raises ValueError for a damaged file, or several structures with the same fields.
     """
-    import scipy.io
-    from scipy.io.matlab import MatReadError
-
     try:
-        content = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True)
+        content = loaded(path)
     except NotImplementedError:
         # version 7.3 is HDF5
         return READERS[".h5"](path, group=group)
-    except (ValueError, TypeError, OSError, IndexError, MatReadError) as error:
-        raise damaged("a MAT file", error) from None
     found: dict[str, dict[str, Any]] = {}
     for name, value in content.items():
         if name.startswith("__"):
@@ -40,3 +36,20 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
         else:
             found.setdefault("", {})[name] = value
     return columns_of(of_one_group(found, group, "structure"))
+
+
+def loaded(path: Path) -> dict[str, Any]:
+    """The variables of a MAT file by name; ValueError for a damaged one.
+
+    Raises NotImplementedError for version 7.3.
+    """
+    import scipy.io
+
+    check_structure(path)
+    try:
+        return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True)
+    except NotImplementedError:
+        raise
+    except Exception as error:
+        # scipy has errors of many kinds for a file that is not what it says
+        raise damaged("a MAT file", error) from None

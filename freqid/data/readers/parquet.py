@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from freqid.checks import InputError
 from freqid.data.readers.kinds import damaged, missing, reads, writes
+from freqid.data.readers.limits import check_size
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,7 +19,13 @@ def read_parquet(path: Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
+        import pyarrow.parquet
+
+        layout = pyarrow.parquet.read_metadata(path)
+        check_size(path, 8.0 * layout.num_rows * layout.num_columns)
         return pd.read_parquet(path)
+    except InputError:
+        raise
     except ImportError:
         raise missing("Parquet", "pyarrow", "parquet") from None
     except Exception as error:

@@ -158,6 +158,8 @@ def _tried(lines: Sequence[str], mark: str, sign: str) -> tuple[float, int, Layo
         return None
     followed = [g and after for g, after in zip(good, [*good[1:], True], strict=True)]
     first = followed.index(True) if True in followed else good.index(True)
+    if not any(any(r) for r in rows[:first]) and _is_heading(rows[first:], sign):
+        first += 1
     body = [g for r, g in zip(rows[first:], good[first:], strict=True) if any(r)]
     share = sum(body) / len(body)
     if share < 0.5:
@@ -167,6 +169,15 @@ def _tried(lines: Sequence[str], mark: str, sign: str) -> tuple[float, int, Layo
     names, units, headed = heading([r for r in rows[:first] if any(r)], width)
     layout = Layout(mark, sign, first, names, units, headed)
     return round(share * numbers, 2), width, layout
+
+
+def _is_heading(rows: Sequence[Sequence[str]], sign: str) -> bool:
+    """Whether the first row is a heading though some names are numbers: ``time,1,2``."""
+    below = [r for r in rows[1:60] if len(r) == len(rows[0])]
+    return len(below) > 1 and any(
+        not _is_value(cell, sign) and all(_NUMBER[sign].fullmatch(r[i]) for r in below)
+        for i, cell in enumerate(rows[0])
+    )
 
 
 def _is_row(cells: Sequence[str], width: int, sign: str) -> bool:

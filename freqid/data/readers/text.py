@@ -6,11 +6,13 @@ import bz2
 import gzip
 import io
 import lzma
+import zlib
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from freqid.checks import InputError
 from freqid.data.readers.kinds import damaged, reads, writes
+from freqid.data.readers.limits import check_size, limit_of
 from freqid.data.readers.table import LOOK, Layout, layout_of
 
 if TYPE_CHECKING:
@@ -54,8 +56,11 @@ def _text(path: Path) -> str:
         else:
             stream: IO[bytes] = opener(path, "rb")  # type: ignore[operator]
             with stream:
-                raw = stream.read()
-    except (OSError, EOFError, lzma.LZMAError) as error:
+                limit = limit_of(path)
+                raw = stream.read(limit + 1)
+                if len(raw) > limit:
+                    check_size(path, len(raw), "its text")
+    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
         raise damaged("a compressed table", error) from None
     if b"\x00" in raw[:1000] and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("is no text: it holds zero bytes; check the file's kind")

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# part of the length by which the times of two channels may differ by rounding
+_AGREE = 1e-6
+
+
 @reads(".uff", ".unv")
 def read_uff(path: Path) -> pd.DataFrame:
     """The time responses of a UFF as columns; ValueError for none of them, or without pyuff."""
@@ -35,8 +39,16 @@ def read_uff(path: Path) -> pd.DataFrame:
         name = str(s.get("id1") or s.get("rsp_ent_name") or "").strip()
         if not name or name.upper() == "NONE":
             name = f"channel{number + 1}"
+        if name in arrays:
+            raise InputError(f"holds two channels called {name!r}; rename one of them")
         arrays[name] = np.real(s["data"])
-        arrays.setdefault("time", np.asarray(s["x"]))
+        times = arrays.setdefault("time", np.asarray(s["x"], dtype=float))
+        own = np.asarray(s["x"], dtype=float)
+        if own.shape != times.shape or np.abs(own - times).max() > _AGREE * np.ptp(times):
+            raise InputError(
+                f"holds {name!r} at times of its own; its channels must share one, or be read by "
+                "pyuff and given to Record.from_logs"
+            )
     if not arrays:
         raise InputError("holds no time responses (data sets 58 of function type 1)")
     return columns_of(arrays)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError, unknown, whole
+from freqid.checks import InputError, listed, unknown, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
@@ -145,7 +145,7 @@ def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source
     if isinstance(records, Mapping):
         return {str(name): r for name, r in records.items()}
     named: dict[str, Source] = {}
-    for i, r in enumerate(records):
+    for i, r in enumerate(listed("records", records)):
         if not isinstance(r, (str, Path, Record, FrequencyResponse)):
             raise InputError(
                 f"records[{i}] is a {type(r).__name__}; expected a Record, a FrequencyResponse or "

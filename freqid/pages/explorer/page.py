@@ -6,13 +6,15 @@ Built on Dash, an extra. The page listens on the loopback address only, unless t
 from __future__ import annotations
 
 import socket
+from collections.abc import Sequence
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import InputError, whole
 from freqid.data import Record
+from freqid.pages.explorer.doors import guard
 from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 from freqid.pages.explorer.state import HOLDS, PLANTS, Scene, State, label_of, presets, scene
 from freqid.plots import Part
@@ -48,11 +50,14 @@ def explore(
     if free != port:
         print(f"port {port} is busy; using {free}")
     print(f"freqid explorer: http://{host}:{free}/  (stop with Ctrl-C)", flush=True)
-    application(record).run(host=host, port=str(free), debug=False)
+    allowed = None if allow_remote else _LOOPBACK
+    application(record, allowed).run(host=host, port=str(free), debug=False)
 
 
 def free_port(host: str, port: int) -> int:
     """The first free port from ``port`` up; ValueError where there is none near it."""
+    if not 0 < whole("port", port, least=0) < 65536:
+        raise InputError(f"--port {port} is no port; expected one from 1 to 65535")
     for candidate in range(port, min(port + _PORTS, 65536)):
         with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -64,8 +69,12 @@ def free_port(host: str, port: int) -> int:
     raise InputError(f"--port {port} and the {_PORTS} behind it are busy; give another")
 
 
-def application(record: Record | None = None) -> Dash:
-    """The Dash application, for servers of one's own and for tests."""
+def application(record: Record | None = None, hosts: Sequence[str] | None = _LOOPBACK) -> Dash:
+    """The Dash application, for servers of one's own and for tests.
+
+    Requests for another host than those of ``hosts`` are refused, so that no other site can read
+    the page through the reader's browser; None lets all pass. So are bodies above 1 MiB.
+    """
     try:
         import dash
     except ImportError:
@@ -76,6 +85,7 @@ def application(record: Record | None = None) -> Dash:
     )  # fmt: skip
     app.layout = _layout(dash, record)
     _wire(dash, app, record)
+    guard(app.server, hosts)
     return app
 
 

@@ -55,7 +55,8 @@ class State:
         for name, text in parse_qsl((query or "").lstrip("?")):
             try:
                 if name.startswith("x."):
-                    scale[name[2:]] = float(np.clip(float(text), 0.2, 5))
+                    value = float(np.clip(float(text), 0.2, 5))
+                    scale |= {name[2:]: value} if np.isfinite(value) else {}
                 elif (name == "plant" and text in PLANTS) or (name == "hold" and text in HOLDS):
                     found[name] = text
                 elif name == "factor":
@@ -75,7 +76,8 @@ class State:
         """The nearest state that can be computed."""
         low = float(np.clip(self.low, 0.5, 400))
         high = float(np.clip(self.high, low * 1.2 + 1, 900))
-        return replace(self, low=low, high=high, noise=min(self.noise, 1.0))
+        tone = float(np.clip(self.sine, 0.5, 900)) if self.sine else 0.0
+        return replace(self, low=low, high=high, noise=min(self.noise, 1.0), sine=tone)
 
     def model(self) -> GreyBox:
         """The true plant: its parameters times the factors of the sliders."""
@@ -116,9 +118,9 @@ class State:
 
     def band(self, dt: float, duration: float) -> tuple[float, float]:
         """What is fitted, in Hz: the sine's line, or the chirp as far as ``dt`` (s) lets it."""
-        if self.sine:
+        if self.sine and self.sine < 0.5 / dt:
             near = 1.5 / duration
-            return self.sine - near, self.sine + near
+            return max(self.sine - near, 0.0), min(self.sine + near, 0.5 / dt)
         top = min(self.high, 0.5 / dt * 0.999)
         return min(self.low, 0.8 * top), top
 
@@ -220,7 +222,9 @@ def scene(state: State, record: Record | None = None) -> Scene:
 
 def _frequencies(model: GreyBox, state: State, nyquist: float) -> FloatArray:
     dense = [c * (1 + 0.5 * np.linspace(-1, 1, 121) ** 3) for c in resonances(model)]
-    f = np.concatenate([np.geomspace(max(state.low / 4, 0.2), nyquist, 160), *dense])
+    f = np.concatenate(
+        [np.geomspace(min(max(state.low / 4, 0.2), nyquist / 50), nyquist, 160), *dense]
+    )
     return np.unique(f[(f > 0) & (f < nyquist * 0.9999)])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from freqid.checks import InputError
+from freqid.checks import InputError, path_of
 from freqid.data import Record, whole_file
 from freqid.fitting import Estimate
 from freqid.pages.report.figures import figures
@@ -20,7 +20,7 @@ def write_report(
         import plotly.offline
     except ImportError:
         raise InputError("a report needs jinja2 and plotly; pip install 'freqid[report]'") from None
-    path = Path(path)
+    path = path_of("path", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"path={str(path)!r} must end in .html")
     environment = jinja2.Environment(

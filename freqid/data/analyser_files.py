@@ -1,0 +1,99 @@
+"""Frequency responses from files that are no tables: Touchstone, universal files, MATLAB."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.readers.kinds import damaged, existing, missing
+from freqid.data.readers.mat import loaded
+
+# Hz of each unit of frequency
+_HERTZ = {
+    "hz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "rad/s": 1 / (2 * np.pi),
+    "rad/sec": 1 / (2 * np.pi),
+}  # fmt: skip
+FREQUENCY = r"(f|freq|frequency|frequenz|w|omega|ω)"
+
+
+def in_hertz(name: str, unit: str) -> float:
+    """Hz of one step of a column of frequencies, by its unit or its name."""
+    text = unit.casefold()
+    if not text:
+        tail = re.search(r"_(hz|khz|mhz|ghz)$", name.casefold())
+        turned = re.search(r"^(w|omega|ω)|rad", name.casefold())
+        text = tail[1] if tail else "rad/s" if turned else "hz"
+    if text not in _HERTZ:
+        raise InputError(f"the unit of {name!r} is {unit!r}; expected one of {', '.join(_HERTZ)}")
+    return _HERTZ[text]
+
+
+def of_touchstone(path: Path) -> FrequencyResponse:
+    try:
+        import skrf
+    except ImportError:
+        raise missing("Touchstone", "scikit-rf", "rf") from None
+    existing(path)
+    try:
+        network = skrf.Network(str(path))
+    except Exception as error:
+        # scikit-rf has errors of many kinds for a file that is not what it says
+        raise damaged("Touchstone", error) from None
+    return FrequencyResponse(np.asarray(network.f), np.moveaxis(np.asarray(network.s), 0, -1))
+
+
+def of_universal(path: Path) -> FrequencyResponse:
+    try:
+        import pyuff
+    except ImportError:
+        raise missing("UFF58", "pyuff", "uff") from None
+    existing(path)
+    try:
+        sets = pyuff.UFF(str(path)).read_sets()
+    except Exception as error:
+        # pyuff has errors of many kinds for a file that is not what it says
+        raise damaged("UFF58", error) from None
+    sets = [sets] if isinstance(sets, dict) else list(sets)
+    # function type 4 is a frequency response
+    found = [s for s in sets if s.get("type") == 58 and s.get("func_type") == 4]
+    if not found:
+        raise InputError("holds no frequency responses (data sets 58 of function type 4)")
+
+    def end(s: dict[str, object], kind: str) -> str:
+        return f"{s.get(f'{kind}_node', 0)}:{s.get(f'{kind}_dir', 0)}"
+
+    outputs = list(dict.fromkeys(end(s, "rsp") for s in found))
+    inputs = list(dict.fromkeys(end(s, "ref") for s in found))
+    f = np.asarray(found[0]["x"], dtype=float)
+    G = np.full((len(outputs), len(inputs), len(f)), np.nan + 0j)
+    for s in found:
+        if len(s["x"]) != len(f) or not np.allclose(s["x"], f):
+            raise InputError("its responses have unlike frequencies; read them one file each")
+        G[outputs.index(end(s, "rsp")), inputs.index(end(s, "ref"))] = s["data"]
+    if np.isnan(G).any():
+        raise InputError(f"holds {len(found)} responses, not all of {outputs} from {inputs}")
+    return FrequencyResponse(f, G, input_names=inputs, output_names=outputs)
+
+
+def of_matlab(path: Path) -> FrequencyResponse:
+    try:
+        content = loaded(existing(path))
+    except NotImplementedError:
+        raise InputError("is a MAT file of version 7.3; save it as version 7") from None
+    arrays = {k: np.asarray(v) for k, v in content.items() if not k.startswith("__")}
+    found = [k for k, v in arrays.items() if np.iscomplexobj(v) and v.ndim >= 1]
+    axes = [k for k in arrays if re.fullmatch(FREQUENCY, k.casefold())]
+    if len(found) != 1 or not axes:
+        raise InputError(
+            f"holds {', '.join(arrays)}; expected frequencies f (Hz) or w (rad/s) and one complex "
+            "array"
+        )
+    f = arrays[axes[0]].astype(float) * in_hertz(axes[0], "")
+    G = arrays[found[0]]
+    if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
+        G = np.moveaxis(G, 0, -1)
+    return FrequencyResponse(f, G if G.ndim != 2 else G[:, None])

@@ -1,0 +1,187 @@
+"""Files that are larger than they look, point elsewhere, or are damaged: an error, never harm."""
+
+import gzip
+import io
+import os
+import random
+import subprocess
+import sys
+import warnings
+import zipfile
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+
+import freqid as fq
+from freqid.checks import InputError
+
+N = 60
+T = 0.01 * np.arange(N)
+
+
+def test_more_memory_than_a_file_may_take(tmp_path, monkeypatch):
+    zeros = np.zeros(40_000_000)
+    np.savez_compressed(tmp_path / "a.npz", u=zeros, y=zeros)
+    header = io.BytesIO()
+    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+    np.lib.format.write_array_header_1_0(header, shape)
+    with zipfile.ZipFile(tmp_path / "b.npz", "w") as archive:
+        archive.writestr("u.npy", header.getvalue())
+    with gzip.open(tmp_path / "c.csv.gz", "wb") as file:
+        file.write(b"time,u,y\n")
+        for _ in range(50):
+            file.write(b"0,0,0\n" * 1_000_000)
+    frame = pd.DataFrame({"u": zeros, "y": zeros})
+    frame.to_parquet(tmp_path / "d.parquet")
+    scipy.io.savemat(tmp_path / "e.mat", {"u": zeros, "y": zeros[:1]}, do_compression=True)
+    for path in sorted(tmp_path.iterdir()):
+        if path.name == "c.csv.gz":
+            monkeypatch.setenv("FREQID_READ_LIMIT", str(2**24))
+        with pytest.raises(InputError, match="FREQID_READ_LIMIT") as error:
+            fq.read(path, dt=0.01)
+        assert str(path) in str(error.value)
+        monkeypatch.delenv("FREQID_READ_LIMIT", raising=False)
+    monkeypatch.setenv("FREQID_READ_LIMIT", "2e9")
+    with pytest.raises(InputError, match="whole number of bytes"):
+        fq.read(tmp_path / "a.npz", dt=0.01)
+
+
+def test_an_announced_size_takes_no_memory(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("u", shape=(10**11,), dtype="f8", chunks=(10**6,))
+        file["y"] = T
+    with pytest.raises(InputError, match="may take"):
+        fq.read(tmp_path / "a.h5", dt=0.01)
+
+
+def test_no_other_file_is_read(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "secret.h5", "w") as file:
+        file["x"] = T
+    T.tofile(tmp_path / "raw.bin")
+    with h5py.File(tmp_path / "link.h5", "w") as file:
+        file["time"], file["u"] = T, T
+        file["y"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
+    with h5py.File(tmp_path / "raw.h5", "w") as file:
+        file["time"], file["u"] = T, T
+        external = [(str(tmp_path / "raw.bin"), 0, 8 * N)]
+        file.create_dataset("y", shape=(N,), dtype="f8", external=external)
+    with h5py.File(tmp_path / "virtual.h5", "w") as file:
+        file["time"], file["u"] = T, T
+        layout = h5py.VirtualLayout((N,), "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "x", (N,))
+        file.create_virtual_dataset("y", layout)
+    for name, words in (
+        ("link.h5", "not one of 'u'"), ("raw.h5", "another file"), ("virtual.h5", "another file"),
+    ):  # fmt: skip
+        for read in (fq.read, fq.open):
+            with pytest.raises(InputError, match=words):
+                read(tmp_path / name, inputs="u", outputs="y")
+
+
+FUZZ = """
+import random, sys, warnings
+from pathlib import Path
+import freqid as fq
+path, seed, count = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+raw = path.read_bytes()
+for i in range(seed, seed + count):
+    r, content = random.Random(i), bytearray(raw)
+    for _ in range(r.choice([1, 1, 1, 2, 5])):
+        content[r.randrange(len(content))] = r.randrange(256)
+    if r.random() < 0.1:
+        content = content[: r.randrange(len(content))]
+    other = path.with_name("fuzzed" + path.suffix)
+    other.write_bytes(content)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            fq.read(other, inputs="u", outputs="y")
+    except ValueError as error:
+        assert str(other) in str(error), (i, error)
+print("done")
+"""
+
+
+@pytest.mark.parametrize("options", [{}, {"do_compression": True}, {"format": "4"}])
+def test_no_byte_of_a_mat_file_ends_the_interpreter(tmp_path, options):
+    """Found: eleven of 1,500 uncompressed files with one changed byte ended it."""
+    variables = {"time": T, "u": np.sin(T), "y": (100 * np.cos(T)).astype("i2")}
+    if "format" not in options:
+        variables |= {"s": {"a": T, "b": "text"}, "c": np.array([1.0, "x"], dtype=object)}
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, variables, **options)
+    assert fq.read(path, inputs="u", outputs="y").n_samples == N
+    run = subprocess.run(
+        [sys.executable, "-c", FUZZ, str(path), "0", "400"],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, (run.returncode, run.stderr[-500:])
+    assert run.stdout.endswith("done\n")
+
+
+def test_what_scipy_writes_has_the_structure_that_is_checked(tmp_path):
+    contents = [
+        {"u": np.arange(6.0).reshape(2, 3), "z": np.arange(4) + 1j, "e": np.zeros((0, 0))},
+        {"t": "text", "l": np.array(["a", "bc"]), "b": np.array([True, False])},
+        {"s": {"a": {"b": T}, "c": [1, 2]}, "k": np.array([[1, "x"], [T, "y"]], dtype=object)},
+        {"sparse": scipy.sparse.csc_array(np.eye(3)), "i": np.int64(3), "long_name_" * 3: T},
+    ]
+    for i, content in enumerate(contents):
+        for compressed in (False, True):
+            path = tmp_path / f"{i}{compressed}.mat"
+            scipy.io.savemat(path, {**content, "time": T}, do_compression=compressed)
+            from freqid.data.readers.mat import loaded
+
+            assert np.array_equal(loaded(path)["time"], T)
+
+
+def test_damaged_files_are_named(tmp_path):
+    """78 % of damaged NPZ files and 19 % of HDF5 had foreign tracebacks."""
+    record = fq.Record(np.sin(T), np.cos(T), 0.01)
+    h5py = pytest.importorskip("h5py")
+    for name in ("a.csv", "a.npz", "a.parquet"):
+        fq.write(record, tmp_path / name)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"], file["u"], file["y"] = T, record.u, record.y
+    fq.etfe(record).to_frame().to_csv(tmp_path / "frf.csv", index=False)
+    fq.fit(fq.first_order(), record).save(tmp_path / "est.json")
+    readers = {"frf.csv": fq.read_response, "est.json": fq.load}
+    refused = 0
+    for path in sorted(tmp_path.iterdir()):
+        raw = path.read_bytes()
+        other = tmp_path / f"fuzzed_{path.name}"
+        for i in range(120):
+            r, content = random.Random(i), bytearray(raw)
+            for _ in range(r.choice([1, 1, 2, 5, 20])):
+                content[r.randrange(len(content))] = r.randrange(256)
+            other.write_bytes(content[: r.randrange(len(content))] if i % 10 == 0 else content)
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("error")
+                    readers.get(path.name, fq.read)(other)
+            except InputError as error:
+                refused += str(other) in str(error) or pytest.fail(f"no path in: {error}")
+        other.unlink()
+    assert refused > 300
+
+
+def test_one_wild_stamp_takes_no_memory():
+    t = np.r_[T, 1e9]
+    x = np.r_[T, 0.0]
+    with pytest.raises(InputError, match="repair that stamp"):
+        fq.Record.from_frame(pd.DataFrame({"time": t, "u": x, "y": x}), "u", "y", resample=True)
+    with pytest.raises(InputError, match="repair its stamps"):
+        fq.Record.from_logs(t, x, t, x, resample=True)
+
+
+def test_written_files_have_the_rights_of_any_new_file(tmp_path):
+    before = os.umask(0o027)
+    try:
+        fq.write(fq.Record(T, T, 0.01), tmp_path / "a.csv")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a.csv").stat().st_mode & 0o777 == 0o640
