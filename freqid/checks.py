@@ -95,6 +95,12 @@ def path_of(name: str, value: object) -> Path:
     raise InputError(f"{name}={value!r:.80} must be a path, as text or pathlib.Path")
 
 
+def table_with(table: object, column: str, maker: str) -> None:
+    """ValueError unless it is a table with that column, as the function ``maker`` returns."""
+    if column not in getattr(table, "columns", ()):
+        raise InputError(f"table is a {type(table).__name__}; expected what {maker} returns")
+
+
 def few_enough(name: str, count: float) -> int:
     """A number of samples; ValueError where they would not fit into any memory."""
     if count > _MOST:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, an, positive, samples
 from freqid.data import FrequencyResponse, fold, low_pass_gain, merged_lines, unfold
 from freqid.excitation import InputSpectrum, power_gain
 from freqid.lti import (
@@ -195,6 +195,9 @@ def apparent_response(
     >>> bool(seen.coherence.min() < 0.5)
     True
     """
+    an("spectrum", spectrum, InputSpectrum)
+    if frequency is not None:
+        frequency = samples("frequency", frequency)
     at = true_plant(plant).state_space()
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
     held = held_response(at, sampling.hold)
@@ -203,7 +206,7 @@ def apparent_response(
     else:
         if frequency is None:
             frequency = 0.5 / dt * (np.arange(400) + 0.5) / 400
-        seen = apparent_density(held, spectrum, sampling, np.asarray(frequency, dtype=float))
+        seen = apparent_density(held, spectrum, sampling, np.asarray(frequency))
     keep = seen.power > 1e-12 * seen.power.max(initial=0)
     if not keep.any():
         raise InputError("spectrum has no energy at these frequencies; it identifies nothing there")

@@ -15,7 +15,7 @@ import numpy as np
 
 from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.conditions import Conditions, Expected, Responses
-from freqid.checks import Array, FloatArray, InputError, positive, whole
+from freqid.checks import Array, FloatArray, InputError, finite, named_values, positive, whole
 from freqid.excitation import InputSpectrum
 from freqid.fitting import (
     FITTERS,
@@ -101,6 +101,7 @@ def asymptotic_fit(
     """
     if not isinstance(spectrum, InputSpectrum):
         raise InputError(f"spectrum={type(spectrum).__name__} is not a spectrum of an input")
+    start = None if start is None else named_values("start", start)
     at = true_plant(plant).state_space()
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
     conditions = Conditions(spectrum, sampling, band, prefilter, noise_model)
@@ -109,7 +110,7 @@ def asymptotic_fit(
     options = SearchOptions(count, whole("seed", seed, least=0), start, hold == "estimate")
     if duration is not None:
         positive("duration", duration, "s")
-    if not np.isfinite(noise_std) or noise_std < 0:
+    if finite("noise_std", noise_std) < 0:
         raise InputError(f"noise_std={noise_std!r} must be finite and not negative")
     fitted = plant if model is None else model
     if isinstance(fitted, GreyBox):

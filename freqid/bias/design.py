@@ -84,7 +84,7 @@ def experiment_design(
     grid = (
         _bands(plant, base_dt)
         if bands is None
-        else [Band.of(each, 0.5 / base_dt, "bands") for each in bands]
+        else [Band.of(each, 0.5 / base_dt, "bands") for each in listed("bands", bands)]
     )
     spectra: dict[str, InputSpectrum] = {
         f"chirp {low:g}-{high:g} Hz": ChirpSpectrum(low, high, method, amplitude)
@@ -206,6 +206,7 @@ def d_optimal_spectrum(
     >>> len(best.frequencies) <= 3
     True
     """
+    an("plant", plant, GreyBox)
     k = multisine_lines(band, period)
     k = k[np.unique(np.linspace(0, len(k) - 1, _GRID_LINES).astype(int))]
     structure = GreyStructure(plant)

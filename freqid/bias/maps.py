@@ -14,7 +14,8 @@ import numpy as np
 from freqid.bias.apparent import Sampling, weight_of
 from freqid.bias.conditions import Conditions
 from freqid.bias.map_rows import Answer, Row, answer_chunk
-from freqid.checks import Array, InputError, listed, named_values, whole
+from freqid.checks import Array, InputError, listed, named_values, path_of, whole
+from freqid.data import as_band
 from freqid.excitation import ChirpSpectrum, InputSpectrum
 from freqid.fitting import Bar, TableStore, unordered
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
@@ -77,6 +78,8 @@ def bias_map(
 
     plants = {"": plant} if isinstance(plant, GreyBox) else named_values("plant", plant)
     sampling, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
+    as_band(band)
+    path = None if path is None else path_of("path", path)
     sampling = dataclasses.replace(sampling, antialias=antialias)
     # each row puts its own spectrum and factor in
     shared = Conditions(rows[0].spectrum, sampling, band, prefilter, noise_model)

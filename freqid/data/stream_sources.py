@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, positive, unknown, whole
+from freqid.checks import FloatArray, InputError, finite, listed, positive, unknown, whole
 from freqid.data.conditions import as_conditions
 from freqid.data.selection import as_holds
 from freqid.data.stream_files import Found, Source, of_array, of_file
@@ -49,7 +49,7 @@ def open(
     >>> bool(np.allclose(fq.h1(stream, 500).response, fq.h1(record, 500).response))
     True
     """
-    size = whole("block", block)
+    size, scale = whole("block", block), finite("scale", scale)
     if isinstance(source, (str, Path)):
         found = of_file(Path(source), size, dt)
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
@@ -108,7 +108,13 @@ def _chosen(
 ) -> tuple[list[str], list[str]]:
     picked: list[list[str] | None] = []
     for argument, given in (("inputs", inputs), ("outputs", outputs)):
-        some = None if given is None else [given] if isinstance(given, str) else list(given)
+        some = (
+            None
+            if given is None
+            else [given]
+            if isinstance(given, str)
+            else listed(argument, given)
+        )
         for name in some or []:
             if name not in names:
                 raise InputError(unknown(argument, name, names))

@@ -10,7 +10,7 @@ import scipy.fft
 import scipy.optimize
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, IntArray, choice, positive, steps, whole
+from freqid.checks import FloatArray, InputError, IntArray, choice, numbers, positive, steps, whole
 from freqid.excitation.signal_spectra import multisine_lines
 
 # starts, rounds of clipping of each, the norms then taken in turn, and the steps of each
@@ -137,7 +137,7 @@ def _phases(
 
 def _amplitudes(powers: ArrayLike | None, count: int) -> FloatArray:
     """Amplitudes whose sum of squares is 2, which makes an rms of 1."""
-    share = np.ones(count) if powers is None else np.asarray(powers, dtype=float)
+    share = np.ones(count) if powers is None else numbers("powers", powers)
     if share.shape != (count,) or not np.isfinite(share).all() or (share < 0).any():
         raise InputError(
             f"powers has shape {share.shape}; expected {count} powers, finite and not negative"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, IntArray, finite, positive, whole
+from freqid.checks import FloatArray, InputError, IntArray, an, finite, positive, whole
 from freqid.data import Band, Record
 from freqid.excitation.input_spectra import InputSpectrum, LineSpectrum
 
@@ -90,6 +90,8 @@ class MeasuredSpectrum(LineSpectrum):
     def __init__(self, record: Record, channel: int = 0) -> None:
         if not isinstance(record, Record):
             raise InputError(f"record={type(record).__name__} is not a Record")
+        if whole("channel", channel, least=0) >= an("record", record, Record).n_inputs:
+            raise InputError(f"channel={channel}: the record has {record.n_inputs} inputs, from 0")
         u = record.inputs[:, channel]
         n = len(u)
         power = np.abs(np.fft.rfft(u) / n) ** 2

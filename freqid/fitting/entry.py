@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Literal
 
-from freqid.checks import InputError, choice, named_values, whole
+from freqid.checks import InputError, choice, listed, named_values, whole
 from freqid.data import DataSet, FrequencyResponse, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
@@ -131,7 +131,7 @@ def fit(
         "loss": loss, "error": error, "reference": reference,
     })  # fmt: skip
     models = _noise_models(weights, data, sets)
-    own = (separate,) if isinstance(separate, str) else tuple(separate)
+    own = (separate,) if isinstance(separate, str) else tuple(listed("separate", separate))
     plain = weights is None
     seen, models, notes, loops = through_references(
         sets, models, model, reference, plain, bool(own)

@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, choice
+from freqid.checks import ComplexArray, FloatArray, InputError, choice, numbers
 from freqid.data import DataSet, FrequencyResponse, Record
 from freqid.fitting.uncertainty.noise_spectrum import noise_weights
 
@@ -161,4 +161,4 @@ def as_noise_model(weights: object, data: DataSet) -> NoiseModel:
     if isinstance(weights, str):
         choice("weights", weights, tuple(NoiseModel.named))
         return NoiseModel.named[weights].of(data)
-    return GivenWeights(np.asarray(weights, dtype=float))
+    return GivenWeights(numbers("weights", weights))  # type: ignore[arg-type]

@@ -58,6 +58,7 @@ def select_order(
 
     an("data", data, Record, FrequencyResponse)
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
+    choice("initial_state", initial_state, ("estimate", "zero", "steady"))
     if feedthrough not in (True, False, None):
         raise InputError(f"feedthrough={feedthrough!r} must be True, False or None for both")
     given = [orders] if isinstance(orders, int) else listed("orders", orders)

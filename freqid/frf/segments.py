@@ -10,7 +10,7 @@ import scipy.fft
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, whole
+from freqid.checks import FloatArray, InputError, finite, whole
 from freqid.data import Record, Stream
 
 # segments of a single record where none are asked for
@@ -50,11 +50,29 @@ class Averaging:
             )
         half = 0.0 if isinstance(self.window, str) and self.window in _WHOLE else 0.5
         overlap = half if self.overlap is None else self.overlap
-        if not 0 <= overlap < 1:
+        if not 0 <= finite("overlap", overlap) < 1:
             raise InputError(
                 f"overlap={overlap!r} must be a part of the segment, from 0 to below 1"
             )
+        taper(self.window, length)
+        known = self.detrend is False or callable(self.detrend)
+        if not known and self.detrend not in ("constant", "linear"):
+            raise InputError(
+                f"detrend={self.detrend!r} must be 'constant', 'linear', False or a function"
+            )
         return length, length - int(length * overlap)
+
+
+def taper(window: Window, length: int) -> FloatArray:
+    """The window's samples, (length,); ValueError for what is none."""
+    try:
+        given = isinstance(window, (list, np.ndarray))
+        w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"window={window!r:.60} is none that scipy knows: {error}") from None
+    if w.shape != (length,):
+        raise InputError(f"window has shape {w.shape}; expected ({length},), one for each sample")
+    return w
 
 
 def shared_lines(window: Window, length: int) -> int:
@@ -62,8 +80,7 @@ def shared_lines(window: Window, length: int) -> int:
 
     A window ties lines by the spectrum of its square, the noise's and the input's alike.
     """
-    given = isinstance(window, (list, np.ndarray))
-    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
+    w = taper(window, length)
     tied = np.abs(scipy.fft.rfft(w**2)) / (w @ w)
     far = np.flatnonzero(tied[: len(tied) // 2] ** 2 > _TIED)
     return int(far[-1])
@@ -71,8 +88,7 @@ def shared_lines(window: Window, length: int) -> int:
 
 def independent(window: Window, length: int, step: int, count: int) -> float:
     """How many independent averages overlapping segments are worth (Welch, 1967)."""
-    given = isinstance(window, (list, np.ndarray))
-    w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
+    w = taper(window, length)
     total, lag = 1.0, step
     while lag < length and count > 1:
         shared = (w[lag:] @ w[:-lag] / (w @ w)) ** 2

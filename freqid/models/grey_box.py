@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, channel_names, finite, listed, unknown
+from freqid.checks import (
+    FloatArray,
+    InputError,
+    channel_names,
+    finite,
+    listed,
+    named_values,
+    unknown,
+)
 from freqid.data import as_conditions
 from freqid.lti import Linearisation, StateSpace
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction, without
@@ -80,7 +88,7 @@ class GreyBox(Model):
                 f"conditions: {sorted(both)[0]!r} is a parameter; a record makes a parameter known "
                 "by a condition of its name, so leave it out here"
             )
-        ties = Ties(self.ties, names)
+        ties = Ties(named_values("ties", self.ties), names)
         nominal = ties.resolve({p.name: p.value for p in parameters})
         timing = self._delay_names(names)
         function = MatrixFunction(
@@ -113,7 +121,8 @@ class GreyBox(Model):
         given = self.input_delay
         if given is None:
             return ()
-        return (given,) if isinstance(given, (str, int, float)) else tuple(given)
+        one = isinstance(given, (str, int, float))
+        return (given,) if one else tuple(listed("input_delay", given))  # type: ignore[arg-type, return-value]
 
     def _delay_names(self, names: Sequence[str]) -> list[str]:
         """Parameters that are delays; ValueError for a delay that cannot be one."""

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, InputError, choice
+from freqid.checks import Array, InputError, an, choice, listed, named_values
 from freqid.models.grey_box import GreyBox
 from freqid.models.parameter import Parameter
 
@@ -62,7 +62,9 @@ def mechanical(
     matrices = _Mechanical(
         _named("M", M), _named("K", K), _named("D", D), _named("B", B), _named("C", C), measured
     )
-    known = {p.name for p in parameters} | set(conditions or {})
+    parameters = [an("parameters", p, Parameter) for p in listed("parameters", parameters)]
+    conditions = named_values("conditions", conditions)
+    known = {p.name for p in parameters} | set(conditions)
     for letter, part in zip("MKDBC", matrices.parts, strict=True):
         for wanted in part.names if part is not None else ():
             if wanted not in known:
@@ -70,7 +72,7 @@ def mechanical(
                     f"{letter} is a function of {wanted!r}, which is neither a parameter nor a "
                     f"condition; those are {', '.join(sorted(known))}"
                 )
-    return GreyBox(matrices, parameters, conditions=conditions or {}, name=name, **options)
+    return GreyBox(matrices, parameters, conditions=conditions, name=name, **options)
 
 
 class _Named:

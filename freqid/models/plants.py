@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from freqid.checks import Array, InputError, choice, whole
+from freqid.checks import Array, InputError, choice, finite, listed, whole
 from freqid.models.grey_box import GreyBox
 from freqid.models.parameter import Parameter
 
@@ -91,7 +91,9 @@ def drivetrain(
     n = whole("n_masses", n_masses, least=2)
     if n > _LONGEST:
         raise InputError(f"n_masses={n} must be at most {_LONGEST}")
-    names = [outputs] if isinstance(outputs, str) else list(outputs)
+    names = [outputs] if isinstance(outputs, str) else listed("outputs", outputs)
+    if finite("gear", gear) == 0:
+        raise InputError("gear=0 joins nothing; expected a ratio other than zero")
     for name in names:
         choice("outputs", name, _DRIVETRAIN_OUTPUTS)
     if not names:

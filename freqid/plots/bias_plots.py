@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.bias import apparent_response, asymptotic_fit
-from freqid.checks import InputError, an, unknown
+from freqid.checks import InputError, table_with, unknown
 from freqid.data import FrequencyResponse
 from freqid.excitation import InputSpectrum
 from freqid.fitting import Estimate
@@ -108,14 +108,11 @@ def plot_bias_curves(
     where not given. One panel a parameter, one curve a hold. Returns the axes. Raises ValueError
     for an unknown factor or parameter.
     """
-    import pandas as pd
-
-    if "parameter" not in an("table", table, pd.DataFrame):
-        raise InputError("table has no column 'parameter'; expected what bias_map returns")
+    table_with(table, "parameter", "bias_map")
     known = list(dict.fromkeys(table["parameter"]))
     wanted = list(parameters or known)
     chosen = int(table["factor"].max()) if factor is None else factor
-    if chosen not in set(table["factor"]):
+    if not isinstance(chosen, int) or chosen not in set(table["factor"]):
         raise InputError(unknown("factor", chosen, sorted(set(table["factor"]))))
     names, labels, title = _spectra(table)
     upper = table.attrs.get("upper_frequency", {})
@@ -233,10 +230,7 @@ def _sentence(est: Estimate, plant: Model) -> str:
 
 
 def _of_parameter(table: pd.DataFrame, parameter: str) -> pd.DataFrame:
-    import pandas as pd
-
-    if "parameter" not in an("table", table, pd.DataFrame):
-        raise InputError("table has no column 'parameter'; expected what bias_map returns")
+    table_with(table, "parameter", "bias_map")
     known = list(dict.fromkeys(table["parameter"]))
     if parameter not in known:
         raise InputError(unknown("parameter", parameter, known))

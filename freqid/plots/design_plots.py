@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from freqid.checks import table_with
 from freqid.plots.bias_plots import hold_title
 from freqid.plots.heat_maps import heat_map
 from freqid.plots.style import COLOURS, Panels, context
@@ -23,6 +24,7 @@ def plot_design(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     import matplotlib.pyplot as plt
     from matplotlib.colors import LogNorm
 
+    table_with(table, "excitation", "experiment_design")
     chirps = table[table["excitation"].str.startswith("chirp")]
     finite = chirps["error"][np.isfinite(chirps["error"])]
     norm = LogNorm(max(finite.min(), 1e-9), min(max(finite.max(), 1.1 * finite.min()), 10.0))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, choice
+from freqid.checks import FloatArray, InputError, an, choice, whole
 from freqid.data import FrequencyResponse, Record
 from freqid.fitting import Estimate
 from freqid.plots.bode_nyquist import bode
@@ -61,6 +61,8 @@ def plot_poles(
 
     if labels is not None and len(labels) != len(estimates):
         raise InputError(f"labels has {len(labels)} entries for {len(estimates)} estimates")
+    for est in estimates:
+        an("estimates", est, Estimate)
     with drawing(ax) as ax:
         for index, est in enumerate(estimates):
             colour = COLOURS[index % len(COLOURS)]
@@ -85,7 +87,7 @@ def plot_poles(
 
 def plot_parameters(est: Estimate, ax: Axes | None = None) -> Axes:
     """The parameters of ``est`` as a table: value, standard error, interval, unit."""
-    table = est.parameters
+    table = an("est", est, Estimate).parameters
     rows = [
         [f"{p['value']:.5g}", f"{p['std']:.2g}", f"{p['lower']:.5g} to {p['upper']:.5g}", p["unit"]]
         for _, p in table.iterrows()
@@ -117,6 +119,7 @@ def plot_spectrogram(
     """
     import scipy.signal
 
+    an("record", record, Record)
     name = record.output_names[0] if channel is None else channel
     choice("channel", name, [*record.input_names, *record.output_names])
     x: FloatArray
@@ -124,7 +127,7 @@ def plot_spectrogram(
         x, dt = record.inputs[:, list(record.input_names).index(name)], record.input_dt
     else:
         x, dt = record.outputs[:, list(record.output_names).index(name)], record.dt
-    length = max(len(x) // 50, 16) if segment is None else segment
+    length = max(len(x) // 50, 16) if segment is None else whole("segment", segment, least=2)
     f, t, power = scipy.signal.spectrogram(x, 1 / dt, nperseg=length, noverlap=length // 2)
     level = 10 * np.log10(np.maximum(power, power.max() * 1e-12))
     with drawing(ax) as ax:

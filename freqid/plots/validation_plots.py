@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from freqid.checks import table_with
 from freqid.data import FrequencyResponse
 from freqid.plots.bode_nyquist import bode
 from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
@@ -46,6 +47,7 @@ def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
 
 def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     """Correlations in the ``table`` of ``residual_test`` with 99 % limits; one axes for each."""
+    table_with(table, "test", "residual_test")
     curves = table.attrs["correlations"]
     with stacked(ax, len(curves), (7.2, 1.2 + 1.7 * len(curves)), sharex=False) as ax:
         for axis, curve in zip(ax, curves, strict=True):
@@ -69,6 +71,7 @@ def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
 
     Takes the table of ``select_order`` and returns the axes.
     """
+    table_with(table, "mdl", "select_order")
     with drawing(ax) as ax:
         n = np.exp((table["mdl"] - table["aic"]) / table["parameters"] + 2).iloc[0]
         curves = {

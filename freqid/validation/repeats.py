@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError, whole
+from freqid.checks import InputError, an, listed, whole
 from freqid.data import Record
 from freqid.fitting import Estimate, Weights, fit
 from freqid.models import GreyBox
@@ -36,6 +36,7 @@ def hold_bias(
     """
     import pandas as pd
 
+    an("est", est, Estimate)
     if any("[" in n for n in est.names) and isinstance(est.model, GreyBox):
         raise InputError("hold_bias knows no parameters that each experiment has for itself")
     band, weights = band or est.band, est.weights if weights is None else weights
@@ -96,7 +97,7 @@ def cross_validate(model: object, records: Sequence[Record], **options: Any) -> 
     import pandas as pd
 
     _shared(options)
-    sets = list(records)
+    sets = listed("records", records)
     if len(sets) < 2:
         raise InputError(f"records holds {len(sets)}; cross-validation needs two or more repeats")
     rows = []
@@ -123,7 +124,7 @@ def bootstrap(
     import pandas as pd
 
     _shared(options)
-    sets, count = list(records), whole("n", n)
+    sets, count = listed("records", records), whole("n", n)
     if len(sets) < 3:
         raise InputError(f"records holds {len(sets)}; a bootstrap needs three or more repeats")
     rng = np.random.default_rng(whole("seed", seed, least=0))

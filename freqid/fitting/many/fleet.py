@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError, listed, unknown, whole
+from freqid.checks import InputError, listed, named_values, path_of, unknown, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
@@ -84,6 +84,7 @@ def fit_many(
     import pandas as pd
 
     fitter_of(model)
+    path = None if path is None else path_of("path", path)
     size = whole("chunk", chunk)
     named = _named(records)
     if not named:
@@ -91,7 +92,7 @@ def fit_many(
     task = _Task(
         model,
         _checked("option", fit, fit_options),
-        _checked("reading", read, reading or {}),
+        _checked("reading", read, named_values("reading", reading)),
         verdicts,
     )
     names = list(named)
