@@ -15,13 +15,13 @@ from freqid.checks import (
     FloatArray,
     InputError,
     channel_names,
-    finite,
     listed,
     named_values,
     unknown,
 )
 from freqid.data import as_conditions
 from freqid.lti import Linearisation, StateSpace
+from freqid.models.delays import delay_names, given_delays
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction, without
 from freqid.models.model import Model
 from freqid.models.parameter import Parameter
@@ -90,7 +90,7 @@ class GreyBox(Model):
             )
         ties = Ties(named_values("ties", self.ties), names)
         nominal = ties.resolve({p.name: p.value for p in parameters})
-        timing = self._delay_names(names)
+        timing = delay_names(given_delays(self.input_delay), names, self.ties)
         function = MatrixFunction(
             without(self.matrices, timing),
             ties,
@@ -101,7 +101,7 @@ class GreyBox(Model):
         )
         object.__setattr__(self, "_function", function)
         at = self.state_space()
-        given = self._given_delays
+        given = given_delays(self.input_delay)
         if len(given) not in (0, 1, at.B.shape[1]):
             raise InputError(
                 f"input_delay has {len(given)} entries for {at.B.shape[1]} inputs; give one, or "
@@ -117,28 +117,9 @@ class GreyBox(Model):
         self.__dict__.update({"conditions": {}} | state)
 
     @property
-    def _given_delays(self) -> tuple[float | str, ...]:
-        given = self.input_delay
-        if given is None:
-            return ()
-        one = isinstance(given, (str, int, float))
-        return (given,) if one else tuple(listed("input_delay", given))  # type: ignore[arg-type, return-value]
-
-    def _delay_names(self, names: Sequence[str]) -> list[str]:
-        """Parameters that are delays; ValueError for a delay that cannot be one."""
-        for d in self._given_delays:
-            if not isinstance(d, str):
-                finite("input_delay", d)
-            elif d not in names:
-                raise InputError(unknown("input_delay", d, names))
-            elif d in self.ties:
-                raise InputError(f"input_delay={d!r} is tied; tie the other parameter to it")
-        return [d for d in self._given_delays if isinstance(d, str)]
-
-    @property
     def delay_sources(self) -> tuple[float | str, ...]:
         """What tells the delay of each input: seconds, or a parameter's name; empty for none."""
-        given = self._given_delays
+        given = given_delays(self.input_delay)
         return given * self.n_inputs if len(given) == 1 else given
 
     @property

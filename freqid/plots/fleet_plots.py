@@ -8,7 +8,7 @@ import numpy as np
 import scipy.optimize
 import scipy.stats
 
-from freqid.checks import BoolArray, FloatArray, InputError, table_with, unknown
+from freqid.checks import BoolArray, FloatArray, InputError, unknown
 from freqid.plots.style import COLOURS, drawing
 
 if TYPE_CHECKING:
@@ -100,7 +100,8 @@ def _between(left: FloatArray, std: FloatArray) -> float:
 
 
 def _columns(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:
-    table_with(table, "name", "fit_many")
+    if not hasattr(table, "columns"):
+        raise InputError(f"table is a {type(table).__name__}; expected what fit_many returns")
     known = [c[: -len("_std")] for c in table.columns if str(c).endswith("_std")]
     if parameter not in known:
         raise InputError(unknown("parameter", parameter, known))
