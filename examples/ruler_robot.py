@@ -1,6 +1,6 @@
 """A flexible robot identified from ten measured sweeps: from files to trusted parameters.
 
-python examples/ruler_robot.py [folder for the pictures]
+python examples/ruler_robot.py [folder for the pictures] [decimation factors, 5 and 10]
 
 The records (swept_01.csv to swept_10.csv) are looked for in the folder that FREQID_DATA names, or
 in ../shared/data beside the checkout.
@@ -90,7 +90,7 @@ def estimate(records, **options):
     )
 
 
-def main(out):
+def main(out, factors=(5, 10)):
     records = read_all(data_folder())
     print(records[0])
     print(fq.check_record(records[0])[["channel", "finding", "value"]].to_string(index=False))
@@ -126,7 +126,7 @@ def main(out):
 
     # the paper's question on measured data: what does decimation do?
     full = estimate(records)
-    table = decimated(records, full)
+    table = decimated(records, full, factors)
     print("deviation from the full-rate parameters, in standard errors:")
     print(table.round(1).to_string())
     draw_deviations(table).figure.savefig(out / "ruler_decimated.png", dpi=120)
@@ -176,4 +176,4 @@ if __name__ == "__main__":
     folder.mkdir(parents=True, exist_ok=True)
     if not data_folder().is_dir():
         sys.exit(f"no measured data: {data_folder()} is missing; set FREQID_DATA to its parent")
-    main(folder)
+    main(folder, [int(f) for f in sys.argv[2:]] or (5, 10))

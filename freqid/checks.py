@@ -83,8 +83,11 @@ def listed(name: str, values: Iterable[T]) -> list[T]:
 
 def named_values(name: str, values: Mapping[str, T] | None) -> dict[str, T]:
     """Values by name, none for None; ValueError for what is no dictionary."""
-    if values is None or isinstance(values, Mapping):
-        return dict(values or {})
+    if values is None:
+        return {}
+    # a pandas.Series is one, too
+    if hasattr(values, "items"):
+        return dict(values.items())
     raise InputError(f"{name}={values!r:.80} must be a dictionary, values by name")
 
 

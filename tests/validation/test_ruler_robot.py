@@ -49,8 +49,8 @@ def mode(est):
 
 
 def test_any_five_repeats_find_the_mode_of_the_other_five(records):
-    """Nine of the 126 ways to halve them; benchmarks/measured.py takes all."""
-    halves = list(itertools.combinations(range(10), 5))[:126:15]
+    """Five of the 126 ways to halve them; benchmarks/measured.py takes all."""
+    halves = list(itertools.combinations(range(10), 5))[:126:30]
     for half in halves:
         other = [i for i in range(10) if i not in half]
         a, b = (mode(ruler_robot.estimate([records[i] for i in part])) for part in (half, other))

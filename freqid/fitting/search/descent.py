@@ -9,6 +9,7 @@ import scipy.optimize
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective, Point, Structure
+from freqid.fitting.search.bounded import within_bounds
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Solution:
 
 # relative gain in cost that ends a search within bounds
 _BOUNDED = 1e-9
+# and that ends its reflective steps, where exact ones take over
+_NEAR = 1e-4
 # a step that would gain this part of the cost shows that a search has not come to its end
 _EDGE = 1e-6
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
@@ -61,21 +64,29 @@ def minimise(
 
     lower, upper = objective.structure.lower, objective.structure.upper
     bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
+
+    def searched(begin: FloatArray, gain: float) -> scipy.optimize.OptimizeResult:
+        return scipy.optimize.least_squares(
+            residual,
+            np.clip(begin, lower, upper),
+            jac=jacobian,
+            bounds=(lower, upper) if bounded else (-np.inf, np.inf),
+            method="trf" if bounded else "lm",
+            x_scale="jac",
+            ftol=max(gain, 1e-15),
+            xtol=max(1e-2 * gain, 1e-12),
+            gtol=1e-15,
+            max_nfev=limit or 100 * size,
+        )
+
     if bounded:
+        near = searched(start, max(tolerance, _NEAR))
+        ended = within_bounds(objective, near.x)
+        if ended is not None:
+            return Solution(*ended, True, "Bounded Gauss-Newton steps became negligible.")
         # next to a bound the reflective steps gain ever less, for ever
-        tolerance = max(tolerance, _BOUNDED)
-    result = scipy.optimize.least_squares(
-        residual,
-        start,
-        jac=jacobian,
-        bounds=(lower, upper) if bounded else (-np.inf, np.inf),
-        method="trf" if bounded else "lm",
-        x_scale="jac",
-        ftol=max(tolerance, 1e-15),
-        xtol=max(1e-2 * tolerance, 1e-12),
-        gtol=1e-15,
-        max_nfev=limit or 100 * size,
-    )
+        start, tolerance = near.x, max(tolerance, _BOUNDED)
+    result = searched(start, tolerance)
     point = objective.point(result.x)
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
