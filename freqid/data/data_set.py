@@ -15,10 +15,7 @@ DataSet = Record | FrequencyResponse
 def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
     """One data set or several, as a tuple; ValueError where there is none, or something else."""
     if isinstance(data, Stream):
-        raise InputError(
-            "a stream is not in memory: fit its response, fit(model, h1(stream, segment), "
-            "weights='noise'), or stream.load()"
-        )
+        raise InputError("a stream is not in memory: take stream.load() here")
     if hasattr(data, "frdata"):
         data = FrequencyResponse.from_control(data)
     if not isinstance(data, DataSet | Iterable):

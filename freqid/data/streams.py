@@ -85,6 +85,23 @@ class Stream:
                 "samples"
             )
 
+    def stretches(self, length: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Inputs (n, inputs) and outputs (n, outputs), ``length`` samples after ``length``; the
+        last may be shorter.
+        """
+        kept: list[FloatArray] = []
+        have = 0
+        for block in self._checked():
+            kept.append(block)
+            have += len(block)
+            while have >= length:
+                rows = np.concatenate(kept)
+                yield rows[:length, : self.n_inputs], rows[:length, self.n_inputs :]
+                kept, have = [rows[length:]], have - length
+        rows = np.concatenate(kept) if kept else np.zeros((0, 0))
+        if len(rows):
+            yield rows[:, : self.n_inputs], rows[:, self.n_inputs :]
+
     def _checked(self) -> Iterator[FloatArray]:
         width, at = self.n_inputs + self.n_outputs, 0
         for block in self.blocks():

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Literal
 
 from freqid.checks import InputError, choice, listed, named_values, whole
-from freqid.data import DataSet, FrequencyResponse, as_data_sets
+from freqid.data import DataSet, FrequencyResponse, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.closed_loop import through_references, with_loop_noise
@@ -21,6 +21,7 @@ from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
 from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
+from freqid.frf import stretches
 from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
 
@@ -31,7 +32,7 @@ _KNOWN = (grey_box, black_box)
 @in_one_blas_thread
 def fit(
     model: object,
-    data: DataSet | Sequence[DataSet],
+    data: DataSet | Sequence[DataSet] | Stream,
     *,
     hold: Hold | str | Mapping[str, Hold | str] | None = None,
     band: tuple[float, float] | None = None,
@@ -55,7 +56,8 @@ def fit(
     Args:
         model: a GreyBox, or OutputError(order) or TransferFunction(zeros, poles), black boxes in
             discrete and in continuous time.
-        data: a Record, a FrequencyResponse, or several; each record has its own initial state.
+        data: a Record, a FrequencyResponse, or several; each record has its own initial state. A
+            stream (see ``open``) is read in one pass, of which a ``band`` keeps its lines only.
             Their conditions reach the matrices of a GreyBox; one that bears a parameter's name
             makes it known for that experiment.
         hold: what the input did between its samples; None is what each record remembers, a name
@@ -114,6 +116,14 @@ def fit(
         choice("offset", offset, ("estimate",))
     if not isinstance(reference, bool):
         choice("reference", reference, ("auto",))
+    passed: list[str] = []
+    if isinstance(data, Stream):
+        if hold == "estimate":
+            raise InputError("hold='estimate' needs the samples: give stream.load()")
+        # a name means the hold at the rate of the stream, not at that of what its band needs
+        hold = as_holds(hold, data.dt, data.hold, data.input_names)
+        origin, data = data.origin, stretches(data, band)
+        passed = [f"{origin} was read in one pass, as {len(data)} experiments that follow on"]
     given_sets = as_data_sets(data)
     sets = tuple(in_order_of(model, d) for d in given_sets)
     estimated = isinstance(hold, str) and hold == "estimate"
@@ -163,7 +173,7 @@ def fit(
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
     return dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
-        notes=[*notes, *est.notes],
+        notes=[*passed, *notes, *est.notes],
     )  # fmt: skip
 
 

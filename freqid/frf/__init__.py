@@ -8,4 +8,5 @@ from freqid.frf.distortions import distortion
 from freqid.frf.empirical import etfe
 from freqid.frf.local_models import local_polynomial, local_rational
 from freqid.frf.means import periodic
+from freqid.frf.one_pass import stretches
 from freqid.frf.spectra import Spectra, spectra

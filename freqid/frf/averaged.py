@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import (
@@ -21,7 +20,14 @@ from freqid.data import (
     references_of,
 )
 from freqid.frf.measured import measured
-from freqid.frf.segments import Averaging, Detrend, Window, independent, shared_lines
+from freqid.frf.segments import (
+    Averaging,
+    Detrend,
+    Window,
+    independent,
+    products,
+    shared_lines,
+)
 
 # samples whose segments are transformed at once
 _PIECE = 1 << 19
@@ -175,15 +181,13 @@ def _spectral(
     count = 0
     for i, record in enumerate(sets):
         for n, channels in _pieces(record, length, step, None if signals is None else signals[i]):
-            for pair in pairs:
-                a, b = channels[pair[0]], channels[pair[1]]
-                # scipy's csd(x, y) is E[x* y]: the pair (b, a) gives E[a b*]
-                f, S = scipy.signal.csd(
-                    b[None, :], a[:, None], 1 / first.dt, averaging.window, length, length - step,
-                    detrend=averaging.detrend,
-                )  # fmt: skip
-                total[pair] = total.get(pair, 0) + n * np.moveaxis(S, -1, 0)
+            for spectra in averaging.transforms(channels, length, step):
+                for pair in pairs:
+                    S = products(spectra[pair[0]], spectra[pair[1]])
+                    total[pair] = total.get(pair, 0) + S
             count += n
+    f, density = averaging.density(length, first.dt)
+    total = {pair: S * density[:, None, None] for pair, S in total.items()}
     keep = chosen(f, as_band(averaging.band, first.nyquist), positive=True)
     mean = {pair: S[keep] / count for pair, S in total.items()}
     averages = independent(averaging.window, length, step, count)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ import scipy.fft
 import scipy.signal
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, finite, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, finite, whole
 from freqid.data import Record, Stream
 
 # segments of a single record where none are asked for
@@ -20,6 +20,8 @@ _WHOLE = ("boxcar", "rectangular")
 
 # correlation of noise over input at two lines that is none, of independent segments
 _TIED = 0.01
+# samples that are transformed at once: more leave the processor's cache
+_NEAR = 1 << 18
 
 # what scipy.signal.csd takes under these names
 Window = str | tuple[str | float, ...] | ArrayLike
@@ -61,6 +63,57 @@ class Averaging:
                 f"detrend={self.detrend!r} must be 'constant', 'linear', False or a function"
             )
         return length, length - int(length * overlap)
+
+    def transforms(
+        self, channels: Mapping[str, FloatArray], length: int, step: int
+    ) -> Iterator[dict[str, ComplexArray]]:
+        """DFTs (channels, segments, lines) of tapered segments, as many at a time as stay near.
+
+        ``channels`` are samples (channels, n) by name.
+        """
+        window = taper(self.window, length)
+        views = {
+            name: np.lib.stride_tricks.sliding_window_view(x, length, axis=1)[:, ::step]
+            for name, x in channels.items()
+        }
+        count = next(iter(views.values())).shape[1]
+        batch = max(_NEAR // length, 1)
+        for at in range(0, count, batch):
+            yield {
+                name: scipy.fft.rfft(self._level(view[:, at : at + batch]) * window)
+                for name, view in views.items()
+            }
+
+    def density(self, length: int, dt: float) -> tuple[FloatArray, FloatArray]:
+        """Frequencies (Hz), and what makes |X|² a density of one side, in units squared per Hz."""
+        f = np.fft.rfftfreq(length, dt)
+        scale = np.full(len(f), 2 * dt / (taper(self.window, length) ** 2).sum())
+        scale[[0, *([-1] if length % 2 == 0 else [])]] /= 2
+        return f, scale
+
+    def _level(self, segments: FloatArray) -> FloatArray:
+        if self.detrend is False:
+            return segments
+        if callable(self.detrend):
+            return np.asarray(self.detrend(segments))
+        if self.detrend == "constant":
+            return np.asarray(segments - segments.mean(axis=-1, keepdims=True))
+        return np.asarray(scipy.signal.detrend(segments, type=self.detrend))
+
+
+def products(a: ComplexArray, b: ComplexArray) -> ComplexArray:
+    """Sums over segments of a bᴴ, (lines, channels of a, channels of b)."""
+    found = np.empty((a.shape[-1], len(a), len(b)), complex)
+    for i, x in enumerate(a):
+        for j, y in enumerate(b):
+            if a is b and j < i:
+                found[:, i, j] = found[:, j, i].conj()
+            elif a is b and j == i:
+                found[:, i, j] = np.einsum("sk,sk->k", x.real, x.real)
+                found[:, i, j] += np.einsum("sk,sk->k", x.imag, x.imag)
+            else:
+                found[:, i, j] = np.einsum("sk,sk->k", x, y.conj())
+    return found
 
 
 def taper(window: Window, length: int) -> FloatArray:

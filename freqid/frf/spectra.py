@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
 
-from freqid.checks import ComplexArray, FloatArray, InputError, IntArray
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, IntArray
 from freqid.data import Band, Record, as_band
 
 
@@ -49,14 +49,26 @@ class Spectra:
         """The same without the line at zero frequency."""
         if self.omega[0] != 0:
             return self
+        return self.at(slice(1, None))
+
+    def at(self, keep: slice | BoolArray) -> Spectra:
+        """Some of the lines."""
         return dataclasses.replace(
             self,
-            omega=self.omega[1:],
-            omega_input=self.omega_input[1:],
-            U=self.U[:, 1:],
-            Y=self.Y[:, 1:],
-            multiplicity=self.multiplicity[1:],
+            omega=self.omega[keep],
+            omega_input=self.omega_input[keep],
+            U=self.U[:, keep],
+            Y=self.Y[:, keep],
+            multiplicity=self.multiplicity[keep],
         )
+
+
+class KnownLines(Record):
+    """A record that brings its lines along, which are of more than its samples."""
+
+    def spectra(self, limits: Iterable[float] | None) -> Spectra:
+        """The lines, or those in ``limits`` (Hz)."""
+        raise NotImplementedError
 
 
 def spectra(
@@ -70,6 +82,8 @@ def spectra(
 
     A record never changes, so it keeps its spectra: each is computed once, however many fits ask.
     """
+    if isinstance(record, KnownLines):
+        return record.spectra(limits)
     inside = as_band(limits, 0.5 / record.input_dt)
     key = inside, lifted and record.factor > 1
     known: dict[tuple[Band | None, bool], Spectra] = record.__dict__.setdefault("_spectra", {})

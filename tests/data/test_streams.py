@@ -92,8 +92,10 @@ def test_from_a_stream_to_parameters():
     plant = fq.two_mass()
     est = fq.fit(plant, fq.h1(stream, 5000, band=(5, 100)), weights="noise")
     assert est["k"] == pytest.approx(plant["k"], rel=0.02)
-    with pytest.raises(ValueError, match="not in memory"):
-        fq.fit(plant, stream)
+    est = fq.fit(plant, stream, band=(5, 100), weights="noise")
+    assert est["k"] == pytest.approx(plant["k"], rel=0.02)
+    with pytest.raises(ValueError, match="Stream is neither"):
+        fq.compare(est, stream)
 
 
 def test_memory_is_bounded():
@@ -163,3 +165,96 @@ def test_times_in_other_units_and_conditions(tmp_path):
         stream.load(stop=1.5)
     with pytest.raises(ValueError, match="stream"):
         fq.etfe(stream)
+
+
+PLANT = fq.two_mass()
+START = {"k": 1.7e5, "Jm": 8e-4, "d": 13.0}
+
+
+@pytest.mark.parametrize("kind", ["array", "generator", "log.h5", "log.parquet", "log.npy"])
+def test_a_fit_in_one_pass_is_that_of_the_record(tmp_path, kind, monkeypatch):
+    """As sixteen experiments or one: noise-free exactly the plant, whatever the block."""
+    monkeypatch.setattr("freqid.frf.one_pass._SHORTEST", 1000)
+    record = fq.simulate(PLANT, fq.chirp(5, 90, 20, 1e-3), 1e-3)
+    rows = np.column_stack([record.u, record.y])
+    passes = []
+
+    def blocks():
+        passes.append(1)
+        yield from np.array_split(rows, 37)
+
+    if kind == "log.npy":
+        np.save(tmp_path / kind, rows)
+    elif kind == "log.parquet":
+        fq.write(record, tmp_path / kind)
+    elif kind == "log.h5":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(tmp_path / kind, "w") as file:
+            file["u"], file["y"], file["time"] = record.u, record.y, record.time
+    options = {} if kind in ("log.h5", "log.parquet") else {"dt": 1e-3}
+    source = {"array": rows, "generator": blocks}.get(kind, tmp_path / kind)
+    est = fq.fit(PLANT, fq.open(source, **options), band=(5, 90), start=START)
+    assert est.values == pytest.approx([PLANT[n] for n in est.names], rel=1e-7)
+    assert len(est.data) >= 16
+    assert len(passes) == (kind == "generator")
+    assert "one pass" in est.notes[0]
+    assert est.verdict.grade == "trust"
+
+
+def test_its_error_bars_are_those_of_the_record(monkeypatch):
+    monkeypatch.setattr("freqid.frf.one_pass._SHORTEST", 1000)
+    plant = fq.first_order()
+    inside = []
+    for seed in range(12):
+        record = fq.simulate(plant, fq.white_noise(16_000, seed=seed), 1e-3)
+        noise = np.convolve(
+            np.random.default_rng(seed).standard_normal(16_000), 0.5 ** np.arange(9)
+        )
+        rows = np.column_stack([record.u, record.y + 0.1 * noise[:16_000]])
+        whole = fq.fit(plant, fq.Record(*rows.T, 1e-3), band=(1, 100), weights="noise")
+        parts = fq.fit(plant, fq.open(rows, dt=1e-3), band=(1, 100), weights="noise")
+        told = parts.parameters["std"] / whole.parameters["std"]
+        assert told.to_numpy() == pytest.approx(1, rel=0.15)
+        table = parts.parameters
+        inside += list((table["lower"] < 100) & (table["upper"] > 100))
+        assert (np.abs(parts.values - whole.values) < 0.8 * table["std"]).all()
+    assert np.mean(inside) > 0.85
+
+
+def test_a_fit_keeps_its_band_and_no_more():
+    def blocks():
+        rng = np.random.default_rng(0)
+        last = 0.0
+        for _ in range(64):
+            u = np.repeat(rng.standard_normal(2500), 100)
+            y = np.empty_like(u)
+            pole = np.exp(-0.1)
+            for i in range(0, len(u), 100):
+                level = u[i]
+                y[i : i + 100] = level + (last - level) * pole ** np.arange(100)
+                last = level + (last - level) * pole**100
+            yield np.column_stack([u, y])
+
+    stream = fq.open(blocks, dt=1e-3)
+    tracemalloc.start()
+    est = fq.fit(fq.first_order(80, 130), stream, band=(0.1, 5), hold="zoh")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert est.values == pytest.approx([100, 100], rel=1e-6)
+    # 16,000,000 samples of two channels are 244 MiB
+    assert peak < 150 * 2**20
+
+
+def test_streams_that_a_fit_cannot_take():
+    plant = fq.first_order()
+    with pytest.raises(ValueError, match="band"):
+        fq.fit(plant, fq.open(ROWS, dt=DT), band=(5, 900))
+    with pytest.raises(ValueError, match="no samples"):
+        fq.fit(plant, fq.open(lambda: iter([]), dt=DT))
+
+    def broken():
+        yield ROWS[:100]
+        yield np.full((5, 2), np.nan)
+
+    with pytest.raises(ValueError, match="sample 100 is NaN"):
+        fq.fit(plant, fq.open(broken, dt=DT))

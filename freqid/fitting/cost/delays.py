@@ -29,7 +29,7 @@ def unknown_inputs(
     """
     # early inputs lack the samples after the end: N − 1 … N − r, and z^N is one
     powers = [range(q) if q > 0 else range(-1, q - 1, -1) for q in shifts]
-    count = sum(map(len, powers))
+    count = sum(map(abs, shifts))
     if count == 0 or count * len(z) > _LONG:
         return None
     if 8 * count > rows:

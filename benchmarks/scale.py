@@ -1,0 +1,201 @@
+"""Every number of docs/scale.md, printed as a table.
+
+    python benchmarks/scale.py            sizes up to 1e7 samples, about three minutes
+    python benchmarks/scale.py --large    1e8 samples too, on disk and in memory (4 GiB free)
+
+Each ratio compares two things timed in turn in this one run, at one BLAS thread.
+"""
+
+import argparse
+import os
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+import scipy.fft
+import scipy.optimize
+import scipy.signal
+
+import freqid as fq
+from freqid.frf import spectra
+
+sys.path.insert(0, str(Path(__file__).parent))
+from table import show
+
+T1, BAND = 0.5e-3, (10, 50)  # Hz: 4 % of the Nyquist limit
+PLANT = fq.two_mass()
+START = {"k": 1.8e5, "Jm": 7.5e-4, "Ja": 13.0}
+ROUNDS = 5
+
+
+def best(*functions):
+    """The least time of each of several functions, called in turn."""
+    times = [[] for _ in functions]
+    for _ in range(ROUNDS):
+        for function, own in zip(functions, times, strict=True):
+            begin = time.perf_counter()
+            function()
+            own.append(time.perf_counter() - begin)
+    return [min(own) for own in times]
+
+
+def chirp(count):
+    u = fq.chirp(*BAND, count * T1, T1)
+    record = fq.simulate(PLANT, u, T1)
+    return record.with_noise(0.01 * float(record.y.std()))
+
+
+def fresh(record):
+    """The same record, which has not been asked for its lines."""
+    return fq.Record(record.u, record.y, record.dt)
+
+
+def fft_stage(count):
+    record = chirp(count)
+    copies = iter([fresh(record) for _ in range(ROUNDS)])
+    ours, bare = best(
+        lambda: spectra(next(copies), BAND),
+        lambda: (scipy.fft.rfft(record.u), scipy.fft.rfft(record.y)),
+    )
+    show(f"lines of {count:.0e} samples, 4 % of Nyquist / two bare rffts",
+         f"{ours:.2f} s / {bare:.2f} s = {ours / bare:.2f}", "at most 0.6")  # fmt: skip
+
+
+def segments(u, y, length):
+    """H1, H2 and coherence by hand: batches of Hann-windowed segments that overlap by half."""
+    window = scipy.signal.get_window("hann", length)
+    step, total = length // 2, None
+    views = [np.lib.stride_tricks.sliding_window_view(x, length)[::step] for x in (u, y)]
+    for at in range(0, len(views[0]), 16):
+        U, Y = (
+            scipy.fft.rfft((v[at : at + 16] - v[at : at + 16].mean(axis=1, keepdims=True)) * window)
+            for v in views
+        )
+        part = np.array([(np.abs(U) ** 2).sum(0), (np.conj(U) * Y).sum(0), (np.abs(Y) ** 2).sum(0)])
+        total = part if total is None else total + part
+    uu, uy, yy = total
+    return uy / uu, yy / np.conj(uy), np.abs(uy) ** 2 / (uu.real * yy.real)
+
+
+def averages(count):
+    record = chirp(count)
+    ours, bare = best(lambda: fq.h1(record, 20_000), lambda: segments(record.u, record.y, 20_000))
+    show(f"h1 with coherence of {count:.0e} samples / batched segments by hand",
+         f"{ours:.2f} s / {bare:.2f} s = {ours / bare:.2f}", "at most 1.2")  # fmt: skip
+
+
+def fits(counts):
+    times = []
+    for count in counts:
+        record = chirp(count)
+        spectra(record, BAND)
+        times.append(best(lambda: fq.fit(PLANT, record, band=BAND, start=START))[0])  # noqa: B023
+    told = ", ".join(f"{n:.0e}: {1e3 * t:.0f} ms" for n, t in zip(counts, times, strict=True))
+    show("fit after the FFT stage, by samples", told, "within 20 % of one time")
+
+
+def everything(count):
+    record = chirp(count)
+    copies = iter([fresh(record) for _ in range(ROUNDS)])
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    ours, bare = best(
+        lambda: fq.fit(PLANT, next(copies), band=BAND, start=START),
+        lambda: (scipy.fft.rfft(record.u), scipy.fft.rfft(record.y)),
+    )
+    more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 2**20
+    told = f"{ours:.2f} s / {bare:.2f} s = {ours / bare:.2f}, {more:.1f} GiB more"
+    show(f"fit to {count:.0e} samples, all of it / two bare rffts", told, "at most 2, 1 GiB")
+
+
+def streamed(count):
+    """A file of float32, read block by block; both need not fit into memory."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.npy"
+        rows = np.lib.format.open_memmap(path, "w+", np.float32, (count, 2))
+        size = 1 << 20
+        for at in range(0, count, size):
+            u = np.random.default_rng(at).standard_normal(min(size, count - at))
+            rows[at : at + size] = np.column_stack([u, np.roll(u, 1)])
+        del rows
+
+        def by_hand():
+            blocks = np.load(path, mmap_mode="r")
+            for at in range(0, count - 20_000, 10_000):
+                scipy.fft.rfft(np.asarray(blocks[at : at + 20_000], float), axis=0)
+
+        begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        ours, bare = best(lambda: fq.h1(fq.open(path, dt=T1), 20_000), by_hand)
+        show(f"h1 of {count:.0e} samples on disk / reading and bare FFTs of the segments",
+             f"{ours:.1f} s / {bare:.1f} s = {ours / bare:.2f}", "at most 1.5")  # fmt: skip
+        fit = best(lambda: fq.fit(fq.first_order(), fq.open(path, dt=T1), band=BAND))[0]
+        more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - begin) / 2**10
+        show(f"fit to {count:.0e} samples on disk, one pass", f"{fit:.1f} s, {more:.0f} MiB more",
+             "400 MiB for h1")  # fmt: skip
+
+
+def by_leastsq(record):
+    """A first-order lag by leastsq on lfilter: the strongest thing a user writes in its place."""
+    u, y, dt = record.u, record.y, record.dt
+
+    def error(x):
+        pole = np.exp(-x[1] * dt)
+        return scipy.signal.lfilter([0, x[0] / x[1] * (1 - pole)], [1, -pole], u) - y
+
+    return scipy.optimize.leastsq(error, [120.0, 80.0])[0]
+
+
+def fleet(count, samples, jobs):
+    plant = fq.first_order()
+    records = []
+    for seed in range(count):
+        one = fq.simulate(plant, fq.chirp(2, 60, samples * 1e-3, 1e-3), 1e-3)
+        records.append(one.with_noise(0.01 * float(one.y.std()), seed=seed))
+    start = {"b": 120.0, "a": 80.0}
+    begin = time.perf_counter()
+    table = fq.fit_many(plant, records, start=start, verdicts=False, n_jobs=1, progress=False)
+    ours = time.perf_counter() - begin
+    begin = time.perf_counter()
+    theirs = np.array([by_leastsq(r) for r in records])
+    bare = time.perf_counter() - begin
+    assert np.allclose(table[["b", "a"]], theirs, rtol=1e-2)
+    told = f"{1e3 * ours / count:.1f} ms / {1e3 * bare / count:.1f} ms"
+    show(f"{count} records of {samples} samples, a row / leastsq on lfilter", told, "1 ms")
+    begin = time.perf_counter()
+    fq.fit_many(plant, records, start=start, verdicts=False, n_jobs=jobs, progress=False)
+    faster = ours / (time.perf_counter() - begin)
+    show(f"the same on {jobs} processes", f"{faster:.2f} times faster", "1.8 times")
+
+
+def resampled():
+    plant = fq.first_order()
+    runs = [
+        fq.simulate(plant, fq.chirp(2, 60, 11, 1e-3), 1e-3).with_noise(0.05, seed=s)
+        for s in range(4)
+    ]
+    begin = time.perf_counter()
+    fq.bootstrap(plant, runs, n=200)
+    show("bootstrap of 200 over four repeats of 11,000 samples",
+         f"{time.perf_counter() - begin:.1f} s", "below 5 s")  # fmt: skip
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--large", action="store_true")
+    large = parser.parse_args().large
+    resampled()
+    fleet(1000, 2000, 2)
+    fleet(200, 20_000, 2)
+    fits([20_000, 200_000, 2_000_000])
+    fft_stage(10_000_000)
+    averages(10_000_000)
+    streamed(100_000_000 if large else 10_000_000)
+    everything(100_000_000 if large else 10_000_000)
+
+
+if __name__ == "__main__":
+    main()
