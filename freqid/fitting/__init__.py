@@ -9,7 +9,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Z95, Estimate
 from freqid.fitting.findings import Evidence, findings
-from freqid.fitting.fitters import FITTERS, SearchOptions, fitter_of
+from freqid.fitting.fitters import FITTERS, Near, SearchOptions, fitter_of
 from freqid.fitting.grades import Verdict
 from freqid.fitting.grey_box import fit_grey_box
 from freqid.fitting.kept import load

@@ -13,7 +13,7 @@ from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.fitters import Near, SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
@@ -106,6 +106,7 @@ def fit(
     """
     choice("domain", domain, ("frequency", "time"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
+    near = isinstance(start, Near)
     start = None if start is None else named_values("start", start)
     count = None if n_starts == "auto" else whole("n_starts", n_starts)
     whole("seed", seed, least=0)
@@ -156,7 +157,7 @@ def fit(
         readings = [_logarithmic(r, model) for r in readings]
     if offset is not None:
         readings = [with_offset(r) for r in readings]
-    options = SearchOptions(count, seed, start, estimated, own)
+    options = SearchOptions(count, seed, start, estimated, own, near)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
     if offset is not None:

@@ -11,6 +11,10 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 
 
+class Near(dict[str, float]):
+    """Start values next to a minimum, by name: a fit walks there on the cost itself."""
+
+
 @dataclass(frozen=True)
 class SearchOptions:
     """Where a search begins and how long it goes on, as in ``fit``: None starts for "auto".

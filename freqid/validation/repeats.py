@@ -10,7 +10,7 @@ import numpy as np
 
 from freqid.checks import InputError, an, listed, whole
 from freqid.data import Record
-from freqid.fitting import Estimate, Weights, fit
+from freqid.fitting import Estimate, Near, Weights, fit
 from freqid.models import GreyBox
 from freqid.validation.comparison import compare
 
@@ -131,7 +131,7 @@ def bootstrap(
     whole_fit = fit(model, sets, **options)
     if "start" not in options and hasattr(whole_fit.model, "values"):
         free = [p.name for p in whole_fit.model.free_parameters]
-        options = {**options, "start": {k: whole_fit[k] for k in free}, "n_starts": 1}
+        options = {**options, "start": Near({k: whole_fit[k] for k in free}), "n_starts": 1}
     rows = []
     for _ in range(count):
         drawn = [sets[i] for i in rng.integers(0, len(sets), len(sets))]
