@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -139,7 +140,10 @@ def _converted(column: Column) -> Column | None:
     ]
     for way in ways:
         try:
-            return pd.Series(way())
+            with warnings.catch_warnings():
+                # what pandas will call by another name is no matter of the file's
+                warnings.simplefilter("ignore")
+                return pd.Series(way())
         except (ValueError, TypeError, OverflowError):
             continue
     return None

@@ -129,3 +129,17 @@ def test_bad_transfer_functions_are_named(slow):
         fq.fit(fq.TransferFunction(2, 3, delay=1e-3), slow, hold="foh")
     with pytest.raises(ValueError, match="domain='frequency'"):
         fq.fit(fq.TransferFunction(2, 3, delay=1e-3), slow, domain="time")
+
+
+def test_more_starts_are_tried_and_never_cost_more(fast):
+    """``n_starts`` was ignored."""
+    record = fast.decimate(10, keep_input=True).with_noise(0.05)
+    spec = fq.TransferFunction(2, 3)
+    one = fq.fit(spec, record, band=(10, 80))
+    more = fq.fit(spec, record, band=(10, 80), n_starts=9, seed=3)
+    assert more.n_starts == 9
+    assert one.n_starts < 9
+    assert more.cost <= one.cost * (1 + 1e-9)
+    again = fq.fit(spec, record, band=(10, 80), n_starts=9, seed=3)
+    assert again.cost == more.cost
+    assert more.n_agreed > 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import cast
 
@@ -43,6 +44,8 @@ _STEPS = 40
 _LONGEST, _FOLLOWED = 24, 6
 # eighths of a turn at the top of a response that are tried
 _TURNS = 160
+# costs that differ by no more than this part are of one minimum
+_SAME = 1e-6
 # lines on which a delay is looked for
 _FEW = 400
 
@@ -69,23 +72,41 @@ def fit_transfer_function(
     scale = float(np.exp(np.log(omega).mean()))
     # a delay is counted in samples, or in turns at the top of a response without any
     unit = input_dt(first.data) or float(1 / omega[-1])
-    best: tuple[Solution, Objective] | None = None
+    ends: list[tuple[Solution, Objective, float]] = []
+
+    def descend(poles: ComplexArray, delay: float) -> None:
+        at = Delay(delay, unit)
+        unknown, known = ([at], []) if estimated else ([], [at] if late else [])
+        model = _with_gains(chained(spec, poles, scale, names), experiments, delay)
+        structure = GreyStructure(model, None, unknown, known, anonymous=True)
+        objective = Objective(structure, experiments)
+        if objective.point(structure.start) is not None:
+            solution = minimise(objective, structure.start, limit=100 if estimated else None)
+            ends.append((solution, objective, delay))
+
     for delay in _delays(spec, readings, omega, unit):
         for poles in _starting_poles(spec, readings, omega, delay):
-            at = Delay(delay, unit)
-            unknown, known = ([at], []) if estimated else ([], [at] if late else [])
-            model = _with_gains(chained(spec, poles, scale, names), experiments, delay)
-            structure = GreyStructure(model, None, unknown, known, anonymous=True)
-            objective = Objective(structure, experiments)
-            if objective.point(structure.start) is None:
-                continue
-            solution = minimise(objective, structure.start, limit=100 if estimated else None)
-            if best is None or solution.cost < best[0].cost:
-                best = solution, objective
-    if best is None:
+            descend(poles, delay)
+    if not ends:
         raise InputError("no start for the transfer function could be computed; change its order")
-    objective = best[1]
-    return _estimate(spec, Minimum(objective, minimise(objective, best[0].x)), first.hold, unit)
+    best = min(ends, key=lambda end: end[0].cost)
+    asked = options.n_starts if options is not None and options.n_starts is not None else 1
+    rng = np.random.default_rng(options.seed if options is not None else 0)
+    for _ in range(asked - len(ends)):
+        descend(_by_chance(spec.poles, omega, rng), best[2])
+    solution, objective, _ = min(ends, key=lambda end: end[0].cost)
+    agreed = sum(end[0].cost <= (1 + _SAME) * solution.cost for end in ends)
+    est = _estimate(spec, Minimum(objective, minimise(objective, solution.x)), first.hold, unit)
+    return dataclasses.replace(est, n_starts=len(ends), n_agreed=agreed)
+
+
+def _by_chance(count: int, omega: FloatArray, rng: np.random.Generator) -> ComplexArray:
+    """Poles (rad/s) anywhere in the band, resonant or not; of an odd number one is real."""
+    pairs = count // 2
+    size = np.exp(rng.uniform(np.log(omega[0]), np.log(omega[-1]), pairs + count % 2))
+    damping = np.exp(rng.uniform(np.log(3e-3), 0, pairs))
+    one = size[:pairs] * (-damping + 1j * np.sqrt(1 - damping**2))
+    return np.concatenate([one, one.conj(), -size[pairs:]])
 
 
 def _delays(
