@@ -21,7 +21,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.reading import Reading
-from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.search.descent import Solution, best_so_far, minimise, polish
 from freqid.fitting.search.log_stage import Smooth, log_targets
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Bound, Found, Search
@@ -30,10 +30,8 @@ from freqid.models import GreyBox
 
 # lines on which the minimum is looked for, and how many times more for noise as large as the signal
 _LINES, _NOISY = 600, 10
-# lines on which many starts walk together
-_ROUND_LINES = 60
-# evaluations from the start itself to a minimum of data that are down to rounding
-_DIRECT = 40
+# lines on which many starts walk together, and evaluations down to data's own rounding
+_ROUND_LINES, _DIRECT = 60, 40
 # samples of an unknown delay that are tried
 _DELAYS = 20
 # starts of experiments at many places beside which there are no black boxes
@@ -52,7 +50,24 @@ def search_grey(
     readings: Sequence[Reading],
     options: SearchOptions,
 ) -> Found:
-    """The best minimum; a fit in time looks for it at the lines of the same data, then polishes."""
+    """The best minimum; at Ctrl-C the best point so far, which says so."""
+    scouts = [objective]
+    try:
+        return _search(structure, objective, readings, options, scouts)
+    except KeyboardInterrupt:
+        if (best := best_so_far(scouts, structure.start)) is None:
+            raise
+        return Found(best)
+
+
+def _search(
+    structure: GreyStructure,
+    objective: Objective,
+    readings: Sequence[Reading],
+    options: SearchOptions,
+    scouts: list[Objective],
+) -> Found:
+    """A fit in time looks for its minimum at the lines of the same data, then polishes."""
     at_lines = [r.at_lines() for r in readings]
     spectral = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
     in_time = len(spectral) < len(objective.experiments)
@@ -60,11 +75,12 @@ def search_grey(
         return Found(polish(objective, structure.start))
     if in_time:
         spectral = [r.lines() for r in at_lines]
-    # a long record has more lines than it takes to find the minimum: refine on all of them last
+    # long records have more lines than it takes: refine on all of them last
     floor = noise_floor(spectral)
     lines = _lines_wanted(spectral, floor)
     few = thinned_to(spectral, lines)
     scout = objective if few is spectral and not in_time else Objective(structure, few)
+    scouts.append(scout)
     found = None if in_time else _without_noise(scout, structure, few, floor)
     if found is not None:
         objective.n_evaluations = scout.n_evaluations

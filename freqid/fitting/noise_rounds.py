@@ -15,6 +15,7 @@ from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.search.descent import INTERRUPTED
 from freqid.fitting.witness import Testimony
 from freqid.models import GreyBox
 
@@ -37,13 +38,15 @@ def noise_weighted(
     work = partial(fitter_of(alone), alone)
     first = est = work(readings, options)
     for _ in range(_NOISE_ROUNDS):
+        if est.message == INTERRUPTED:
+            break
         readings = [_learnt(est, r, options.estimated_hold) for r in readings]
         before, near = est, again(est, options)
         est = work(readings, near)
         std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
-    if known:
+    if known and est.message != INTERRUPTED:
         est = fitter_of(model)(model, readings, again(est, options))
     testimony = est.testimony
     if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):

@@ -124,6 +124,8 @@ class Objective:
         # a cost this small is nothing but the rounding of the data's own sums
         self.rounding = 1e-20 * self.energy
         self._points: dict[bytes, Point | None] = {}
+        # the least cost of all points so far: what an interrupted search gives back
+        self.least: tuple[FloatArray, float] | None = None
 
     def of(self, structure: Structure, prior: Prior | None) -> Objective:
         """The cost of another structure on the same experiments, evaluations counted on."""
@@ -139,7 +141,9 @@ class Objective:
                 self._points.pop(next(iter(self._points)))
             self.n_evaluations += 1
             with np.errstate(all="ignore"):
-                self._points[key] = self._compute(x)
+                self._points[key] = found = self._compute(x)
+            if found is not None and (self.least is None or found.cost < self.least[1]):
+                self.least = x.copy(), found.cost
         return self._points[key]
 
     def _compute(self, x: FloatArray) -> Point | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ import scipy.optimize
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective, Point, Structure
 from freqid.fitting.search.bounded import within_bounds
+
+# what a search says that was ended from the keyboard
+INTERRUPTED = "interrupted: this is the best point so far"
 
 
 @dataclass(frozen=True)
@@ -178,3 +182,14 @@ def _padded(rows: FloatArray, size: int) -> FloatArray:
     if len(rows) == size:
         return rows
     return np.concatenate([rows, np.zeros((size - len(rows), *rows.shape[1:]))])
+
+
+def best_so_far(objectives: Sequence[Objective], start: FloatArray) -> Solution | None:
+    """What an interrupted search has found on the first of some costs, by the others, or its start.
+
+    None where the cost cannot be computed there.
+    """
+    known = [cost.least[0] for cost in objectives if cost.least is not None]
+    x = known[0] if known else start
+    point = objectives[0].point(x)
+    return None if point is None else Solution(x, point, False, INTERRUPTED)

@@ -1,0 +1,77 @@
+"""Ctrl-C in a fit: the best point so far comes back, and says so."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+RECORD = fq.simulate(fq.first_order(), fq.chirp(2, 40, 4, 5e-3), 5e-3).with_noise(0.01)
+
+
+def plant(after, slow=False, always=False):
+    """A lag whose matrices are interrupted when they have been asked for so many times."""
+    calls = []
+
+    def matrices(b, a):
+        calls.append(1)
+        if len(calls) == after or (always and len(calls) > after):
+            if slow:
+                # as a function that never returns would be
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(30)
+            raise KeyboardInterrupt
+        return [[-a]], [[b]], [[1.0]], [[0.0]]
+
+    parameters = [fq.Parameter("b", 150.0), fq.Parameter("a", 60.0)]
+    return fq.GreyBox(matrices, parameters), calls
+
+
+def whole():
+    model, calls = plant(10**9)
+    est = fq.fit(model, RECORD)
+    return est, len(calls)
+
+
+def test_the_best_point_so_far_comes_back():
+    full, count = whole()
+    done = 0
+    before = plant(10**9)
+    begun = len(before[1])
+    for after in range(begun + 8, count - 3, 2):
+        model, _ = plant(after)
+        est = fq.fit(model, RECORD)
+        done += 1
+        if est.message.startswith("interrupted"):
+            assert not est.converged
+            assert any("interrupted" in w for w in est.warnings)
+            assert est.cost >= full.cost * (1 - 1e-9)
+            assert np.isfinite(est.values).all()
+            assert est.verdict.grade != "trust"
+    assert done > 3
+
+
+def test_a_function_that_does_not_return_ends_with_ctrl_c():
+    _, count = whole()
+    model, _ = plant(count - 4, slow=True)
+    begin = time.perf_counter()
+    est = fq.fit(model, RECORD)
+    assert time.perf_counter() - begin < 10
+    assert est.message.startswith("interrupted")
+
+
+def test_nothing_known_is_nothing_given_back():
+    _, calls = plant(10**9)
+    again, _ = plant(len(calls) + 1, always=True)
+    with pytest.raises(KeyboardInterrupt):
+        fq.fit(again, RECORD)
+
+
+def test_rounds_of_weights_end_too():
+    _, count = whole()
+    model, _ = plant(count + 10)
+    est = fq.fit(model, RECORD, weights="noise")
+    assert est["a"] == pytest.approx(100, rel=0.05)
