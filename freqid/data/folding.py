@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
+import scipy
 from numpy.typing import ArrayLike
 
 from freqid.checks import BoolArray, FloatArray, InputError, IntArray, positive, whole

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
-import scipy.optimize
+import scipy
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, IntArray, choice, numbers, positive, steps, whole

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
+import scipy
 
 from freqid.checks import FloatArray, InputError, choice, few_enough, finite, positive, whole
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, StampedRecord, channel_counts

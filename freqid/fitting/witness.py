@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import Record, StampedRecord

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.fft
-import scipy.ndimage
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError, steps, whole
 from freqid.data import (

@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Band, Record, Stream, as_band

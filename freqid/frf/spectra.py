@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, IntArray
 from freqid.data import Band, Record, as_band

@@ -9,7 +9,7 @@ basis, where it is triangular and always well conditioned.
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from freqid.checks import Array, ComplexArray, FloatArray
 from freqid.lti.eigen_basis import EigenBasis

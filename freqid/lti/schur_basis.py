@@ -6,7 +6,7 @@ import copy
 import dataclasses
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from freqid.checks import Array, FloatArray
 from freqid.lti.holds import Hold, PeriodicHold, Sampled, ZeroOrderHold

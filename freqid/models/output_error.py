@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError, whole
 from freqid.lti import Hold, PeriodicHold, StateSpace, as_hold

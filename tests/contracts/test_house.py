@@ -107,6 +107,17 @@ def test_the_front_is_clean_and_lazy():
     assert out.stdout.strip() == "[]"
 
 
+def test_a_command_starts_without_what_it_may_not_need():
+    """scipy.signal and scipy.stats took two of three seconds of every command."""
+    code = (
+        "import sys, freqid.cli.commands; "
+        "print([m for m in ('scipy.signal', 'scipy.stats', 'matplotlib', 'pandas', 'control') "
+        "if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
 def test_signatures_say_what_they_take():
     count = 0
     for path in FILES:

@@ -131,7 +131,7 @@ def test_error_bars_of_black_boxes_hold_in_coloured_noise(spec):
     """Noise with a resonance beside the plant's: bars of white noise hold in two cases of three."""
     from scipy.signal import lfilter
 
-    runs, dt = 100, 0.01
+    runs, dt = 60, 0.01
     a = np.poly([0.7 + 0.5j, 0.7 - 0.5j])
     colour = np.poly([0.7 + 0.55j, 0.7 - 0.55j])
     rng = np.random.default_rng(7)

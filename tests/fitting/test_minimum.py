@@ -79,7 +79,7 @@ def test_the_right_hold_is_not_rejected_for_a_prior(plant, slow):
 @pytest.mark.parametrize("spec", [fq.OutputError(2), fq.TransferFunction(1, 2)])
 def test_modes_of_black_boxes_hold_in_coloured_noise(spec):
     """Noise with a resonance beside the plant's: bars of white noise are half of the scatter."""
-    runs, dt = 60, 0.01
+    runs, dt = 40, 0.01
     a = np.poly([0.7 + 0.5j, 0.7 - 0.5j])
     colour = np.poly([0.72 + 0.55j, 0.72 - 0.55j])
     rng = np.random.default_rng(11)

@@ -310,9 +310,9 @@ def test_error_bars_beside_inputs_with_holds_of_their_own():
     u = np.column_stack([fq.white_noise(1200, seed=1), np.sin(9 * t) + np.cos(31 * t)])
     clean = fq.simulate(plant, u, 5e-3, hold={"u1": "zoh", "u2": "foh"})
     pulls, grades = [], []
-    for seed in range(30):
+    for seed in range(20):
         est = fq.fit(plant, clean.with_noise(0.3, seed=seed))
         pulls.append([(est[n] - v) / est.parameters["std"][n] for n, v in true.items()])
         grades.append(est.verdict.grade)
     assert (np.abs(np.std(pulls, axis=0) - 1) < 0.4).all()
-    assert grades.count("trust") >= 27
+    assert grades.count("trust") >= 18

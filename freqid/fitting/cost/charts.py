@@ -9,7 +9,7 @@ any order and for any number of channels, where coefficients of polynomials are 
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.lti import (

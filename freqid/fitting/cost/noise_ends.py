@@ -10,7 +10,7 @@ whatever jump the plant's own signals have there.
 from __future__ import annotations
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
 

@@ -13,7 +13,7 @@ intervals are cut. No eigenvectors are needed: a double integrator is a plant li
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import StampedRecord

@@ -8,7 +8,7 @@ the linearised cost with its bounds is solved as it is (Stark and Parker, Comput
 from __future__ import annotations
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from freqid.checks import FloatArray
 from freqid.fitting.cost.objective import Objective, Point

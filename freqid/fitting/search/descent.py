@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective, Point, Structure

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TypeAlias, cast
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective, ScannableStructure

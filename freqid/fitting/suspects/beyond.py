@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from freqid.checks import InputError
 from freqid.data import Record

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from freqid.checks import InputError
 from freqid.fitting.findings import Finding, Severity

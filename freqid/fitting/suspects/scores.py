@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from freqid.checks import FloatArray
 from freqid.fitting.suspects.scene import Scene

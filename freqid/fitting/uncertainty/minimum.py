@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
-import scipy.stats
+import scipy
 
 from freqid.checks import FloatArray
 from freqid.fitting.cost.experiments import Experiment

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.fft
-import scipy.ndimage
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment

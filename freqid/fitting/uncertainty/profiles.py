@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.optimize
-import scipy.stats
+import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Structure

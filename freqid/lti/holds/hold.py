@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
 from freqid.lti.holds.pulse import Pulse
