@@ -32,6 +32,7 @@ from .data import (
 )
 from .excitation import (
     ChirpSpectrum as ChirpSpectrum,
+    Design as Design,
     FilteredSpectrum as FilteredSpectrum,
     InputSpectrum as InputSpectrum,
     LineSpectrum as LineSpectrum,

@@ -3,6 +3,7 @@
 It may import what stands below it: checks, lti and data.
 """
 
+from freqid.excitation.designs import Design
 from freqid.excitation.filters import power_gain
 from freqid.excitation.input_spectra import (
     ChirpSpectrum,

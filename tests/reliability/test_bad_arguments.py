@@ -96,6 +96,12 @@ CASES = {
         dict(model=PLANT, u=[0.0, 1], dt=0.1),
         "model: model; u: samples; dt: positive; hold: hold; input_names: names"
     ),
+    "Design": (
+        dict(u=[0.0, 1], dt=0.1),
+        "u: samples; dt: positive; input_names: names; units: mapping"
+    ),
+    "Design.within": (fq.Design([0.0, 1], 0.1), "amplitude slew: positive"),
+    "Design.to_csv": (fq.Design([0.0, 1], 0.1), "path: path"),
     "ZeroOrderHold": (dict(period=0.1), "period: positive"),
     "FirstOrderHold": (dict(period=0.1), "period: positive"),
     "BandLimited": (dict(), ""),
