@@ -235,8 +235,6 @@ def test_the_fast_method_names_even_and_odd():
         by = found.table.groupby("line")["distortion"].median()
         other = "even" if loud == "odd" else "odd"
         assert by[loud] > 20 * by[other]
-    with pytest.raises(ValueError, match="no line left out"):
-        fq.distortion(fq.Record(fq.multisine((1, 9), 1, dt, 3), y[:3000], dt), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -262,3 +260,82 @@ def test_bad_input(call, match):
     record = fq.simulate(fq.first_order(), fq.white_noise(2000), 1e-3).with_noise(0.01, seed=1)
     with pytest.raises(ValueError, match=match):
         call(record)
+
+
+def loud(seed, level, cubic, noise=2e-3, periods=6):
+    u = level * fq.multisine((1, 100), 1.0, 1e-3, periods, "random", seed=seed)
+    rng = np.random.default_rng([seed, int(1000 * level)])
+    return fq.Record(u, nonlinear(u, cubic, 0) + noise * rng.standard_normal(len(u)), 1e-3)
+
+
+def test_a_response_that_depends_on_the_level_is_named():
+    false = 0
+    for seed in range(0, 120, 4):
+        runs = [loud(seed + s, level, 0.0) for level in (0.3, 1.0) for s in range(4)]
+        found = fq.distortion(runs, 1.0, skip=1)
+        assert found.levels["level"].to_numpy() == pytest.approx([0.3, 1.0], rel=0.01)
+        false += bool(found.warnings)
+    assert false <= 1
+    runs = [loud(s, level, 0.5) for level in (0.3, 1.0) for s in range(4)]
+    found = fq.distortion(runs, 1.0, skip=1)
+    assert "depends on the amplitude" in found.warnings[0]
+    assert found.levels["p_value"].iloc[1] < 1e-6
+    # one realisation a level, as far as its noise tells
+    single = fq.distortion([loud(1, 0.3, 0.5), loud(1, 1.0, 0.5)], 1.0, skip=1)
+    assert single.method == "noise"
+    assert single.warnings
+    with pytest.raises(ValueError, match="cannot be compared"):
+        fq.distortion([loud(1, 0.3, 0, periods=3), loud(1, 1.0, 0, periods=3)], 1.0, skip=1)
+
+
+def test_one_full_realisation_tells_its_noise():
+    """It was refused."""
+    found = fq.distortion(loud(3, 1.0, 0.0), 1.0, skip=1)
+    assert found.method == "noise"
+    assert found.table["distortion"].isna().all()
+    level = 2e-3 * np.sqrt(2 / 1000 / 5)
+    assert found.table["noise"].median() == pytest.approx(level, rel=0.2)
+
+
+def test_an_actuator_that_distorts_excites_no_line():
+    """Its own distortion at lines that were left out was taken for excitation."""
+    dt, n = 1e-3, 2000
+    odd = np.array([k for k in range(1, 200, 2) if k % 8 != 5])
+    rng = np.random.default_rng(7)
+    X = np.zeros(n // 2 + 1, complex)
+    X[odd] = np.exp(2j * np.pi * rng.uniform(size=len(odd)))
+    r = np.tile(np.fft.irfft(X) * n / np.sqrt(2 * len(odd)), 6)
+    u = r + 0.02 * r**3
+    y = np.column_stack([nonlinear(u, 0, 0), 2 * nonlinear(u, 0, 0)])
+    y = y + 1e-4 * rng.standard_normal(y.shape)
+    for found in (
+        fq.distortion(fq.Record(u, y, dt), n * dt, skip=1),
+        fq.distortion(fq.Record(u, y, dt, reference=r), n * dt, skip=1, reference=True),
+    ):
+        assert np.allclose(found.response.frequency, odd / (n * dt))
+        assert found.response.response.shape == (2, 1, len(odd))
+        z = np.exp(2j * np.pi * found.response.frequency * dt)
+        assert np.allclose(found.response.response[1, 0], 0.2 / (1 - 0.9 / z), rtol=1e-2)
+        assert set(found.table["channel"]) == {"y1", "y2"}
+        assert found.noise_variance.shape == (2, len(odd))
+
+
+def test_distortion_in_a_loop_through_its_reference():
+    """y − G u is noise that the loop feeds back: over the reference it leaves no bias."""
+    dt, n, pole, gain, feed = 1e-3, 500, 0.9, 0.1, 4.0
+    errors = []
+    for use in (True, None):
+        runs = []
+        for s in range(40):
+            r = fq.multisine((2, 200), 0.5, dt, 8, "random", seed=s)
+            e = 0.4 * np.random.default_rng(s).standard_normal(len(r))
+            u, y, x = np.zeros(len(r)), np.zeros(len(r)), 0.0
+            for k in range(len(r)):
+                y[k] = x + e[k]
+                u[k] = r[k] - feed * y[k]
+                x = pole * x + gain * u[k]
+            runs.append(fq.Record(u, y, dt, reference=r))
+        G = fq.distortion(runs, n * dt, skip=2, reference=use).response
+        z = np.exp(2j * np.pi * G.frequency * dt)
+        errors.append(np.abs((G.response[0, 0] - gain / (z - pole)).mean()))
+    assert errors[0] < 0.25 * errors[1]

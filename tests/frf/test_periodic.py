@@ -148,3 +148,28 @@ def test_black_boxes_and_bands_take_it_too():
     part = fq.fit(LAG, frf, band=(5, 40))
     assert part["a"] == pytest.approx(60, rel=0.05)
     assert fq.fit(LAG, frf, weights="noise")["a"] == fq.fit(LAG, frf)["a"]
+
+
+def test_the_aircraft_depends_on_its_level(measured):
+    """All lines from 2 to 15 Hz were excited; the wing torsion near 7.3 Hz falls with the level."""
+    import scipy.io
+
+    runs = []
+    for level in (1, 3):
+        data = scipy.io.loadmat(
+            measured / "f16" / f"F16Data_FullMSine_Level{level}.mat", squeeze_me=True
+        )
+        runs.append(
+            fq.Record(
+                data["Force"], data["Acceleration"].T, 1 / 400, hold="bl", reference=data["Voltage"]
+            )  # fmt: skip
+        )
+    for reference in (None, True):
+        found = fq.distortion(runs[1], 8192 / 400, skip=1, reference=reference, band=(1, 60))
+        # peaks at 16.5 and 43 Hz were the shaker's own distortion
+        assert len(found.response.frequency) == 267
+        assert found.response.frequency[-1] < 15
+        assert found.method == "noise"
+    both = fq.distortion(runs, 8192 / 400, skip=1, reference=True, band=(1, 60))
+    assert 7.2 < both.levels["frequency"].iloc[1] < 7.5
+    assert "depends on the amplitude" in both.warnings[0]
