@@ -162,7 +162,7 @@ def test_the_aircraft_depends_on_its_level(measured):
         runs.append(
             fq.Record(
                 data["Force"], data["Acceleration"].T, 1 / 400, hold="bl", reference=data["Voltage"]
-            )  # fmt: skip
+            )
         )
     for reference in (None, True):
         found = fq.distortion(runs[1], 8192 / 400, skip=1, reference=reference, band=(1, 60))
