@@ -61,7 +61,8 @@ class Setting:
             return np.resize(fq.prbs(9, dt, clock=2), N)
         if self.input == "multisine":
             period = N * dt / 2
-            return np.resize(fq.multisine((1 / period, 0.3 / dt), period, dt, seed=seed), N)
+            u = fq.multisine((1 / period, 0.3 / dt), period, dt, crest="random", seed=seed)
+            return np.resize(u, N)
         return fq.white_noise(N, seed=seed)
 
     def noise(self, number=0):

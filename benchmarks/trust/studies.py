@@ -38,7 +38,7 @@ def covered(case):
 
 def _periodic(case):
     rng = np.random.default_rng([13, case])
-    u = np.tile(fq.multisine((1, 40), 1, 0.01, seed=case), 9)
+    u = np.tile(fq.multisine((1, 40), 1, 0.01, crest="random", seed=case), 9)
     y = fq.simulate(fq.first_order(b=50.0, a=20.0), u, 0.01, hold="bl").y
     noisy = [x + 0.1 * x.std() * rng.standard_normal(len(x)) for x in (u, y)]
     return fq.periodic(fq.Record(*noisy, 0.01, hold="bl"), 1.0, skip=1)
