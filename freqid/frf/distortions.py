@@ -18,8 +18,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, steps, whole
-from freqid.data import FrequencyResponse, Record, as_band, as_records, chosen
-from freqid.data.record_sets import Reference, references_of
+from freqid.data import (
+    FrequencyResponse,
+    Record,
+    Reference,
+    as_band,
+    as_records,
+    chosen,
+    references_of,
+)
 from freqid.frf.distortion_levels import between_levels, grouped
 from freqid.frf.measured import measured
 

@@ -75,6 +75,10 @@ def mechanical(
     return GreyBox(matrices, parameters, conditions=conditions, name=name, **options)
 
 
+# matrices of a moment ago that are kept
+_KEPT = 7
+
+
 class _Named:
     """A matrix as a function that is given all values and takes those that it names."""
 
@@ -82,6 +86,8 @@ class _Named:
         self.letter, self.given = letter, given
         self.names: tuple[str, ...] = ()
         self.takes_all = False
+        # derivatives by one parameter leave most matrices as they were a moment ago
+        self._kept: tuple[tuple[tuple[object, ...], Array], ...] = ()
         if callable(given):
             taken = inspect.signature(given).parameters.values()
             own = inspect.Parameter
@@ -93,9 +99,19 @@ class _Named:
         if not callable(self.given):
             return np.atleast_2d(np.asarray(self.given, dtype=float))
         chosen = values if self.takes_all else {name: values[name] for name in self.names}
-        found = self.given(**chosen)
-        kind = complex if any(np.iscomplexobj(v) for v in chosen.values()) else float
-        return np.atleast_2d(np.asarray(found, dtype=kind))
+        key = tuple(chosen.values())
+        plain = not self.takes_all and all(isinstance(v, (float, complex, int)) for v in key)
+        if plain:
+            for known, matrix in self._kept:
+                if known == key:
+                    return matrix
+        kind = complex if any(np.iscomplexobj(v) for v in key) else float
+        # a copy: the function may fill the same array at every call
+        made = np.atleast_2d(np.array(self.given(**chosen), dtype=kind))
+        if plain:
+            made.flags.writeable = False
+            self._kept = (*self._kept[-_KEPT:], (key, made))
+        return made
 
 
 def _named(letter: str, given: MatrixLike | None) -> _Named | None:
@@ -115,6 +131,7 @@ class _Mechanical:
         measured: str,
     ) -> None:
         self.parts, self.measured = (M, K, D, B, C), measured
+        self._sound: Array | None = None
 
     def __call__(self, **values: Any) -> tuple[Array, Array, Array, Array]:
         M, K, D, B, C = (None if part is None else part(values) for part in self.parts)
@@ -134,15 +151,10 @@ class _Mechanical:
                 f"measured={self.measured!r} beside C of shape {seen.shape}, which takes positions "
                 f"and velocities already; give C (outputs, {n}), or leave measured out"
             )
-        if not np.allclose(M, M.T, rtol=1e-9, atol=1e-12 * float(np.abs(M).max(initial=0))):
-            raise InputError("the mass matrix M is not symmetric; check its off-diagonal elements")
+        if M is not self._sound:
+            self._check_mass(M, values)
         if seen.shape[1] not in (n, 2 * n):
             raise InputError(f"C has shape {seen.shape}; expected (outputs, {n}) or (…, {2 * n})")
-        try:
-            np.linalg.cholesky(M.real)
-        except np.linalg.LinAlgError:
-            where = ", ".join(f"{k}={np.real(v):g}" for k, v in values.items())
-            raise InputError(f"the mass matrix M is not positive definite at {where}") from None
         solved = np.linalg.solve(M, np.concatenate([K, damping, force], axis=1))
         A = np.zeros((2 * n, 2 * n), solved.dtype)
         A[:n, n:] = np.eye(n)
@@ -158,3 +170,15 @@ class _Mechanical:
         output = np.zeros((len(seen), 2 * n), seen.dtype)
         output[:, place] = seen
         return A, driven, output, direct
+
+    def _check_mass(self, M: Array, values: Mapping[str, Any]) -> None:
+        """ValueError for a mass matrix that no machine has."""
+        if not np.allclose(M, M.T, rtol=1e-9, atol=1e-12 * float(np.abs(M).max(initial=0))):
+            raise InputError("the mass matrix M is not symmetric; check its off-diagonal elements")
+        try:
+            np.linalg.cholesky(M.real)
+        except np.linalg.LinAlgError:
+            where = ", ".join(f"{k}={np.real(v):g}" for k, v in values.items())
+            raise InputError(f"the mass matrix M is not positive definite at {where}") from None
+        # the same array comes again as long as what it is a function of stays
+        self._sound = M
