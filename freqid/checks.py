@@ -76,9 +76,10 @@ def an(name: str, value: object, *kinds: type[T]) -> T:
 
 def listed(name: str, values: Iterable[T]) -> list[T]:
     """The values as a list; ValueError for what has none."""
-    if isinstance(values, Iterable):
+    try:
         return list(values)
-    raise InputError(f"{name}={values!r:.80} must be a list")
+    except TypeError:
+        raise InputError(f"{name}={values!r:.80} must be a list") from None
 
 
 def named_values(name: str, values: Mapping[str, T] | None) -> dict[str, T]:
@@ -113,11 +114,13 @@ def few_enough(name: str, count: float) -> int:
     return round(count)
 
 
-def whole(name: str, value: object, least: int = 1) -> int:
-    """Return ``value`` as an int; ValueError unless it is a whole number of at least ``least``."""
+def whole(name: str, value: object, least: int = 1, most: float = math.inf) -> int:
+    """Return ``value`` as an int; ValueError unless it is whole and from ``least`` to ``most``."""
     number = finite(name, value)
     if not number.is_integer() or number < least:
         raise InputError(f"{name}={value!r} must be a whole number of at least {least}")
+    if number > most:
+        raise InputError(f"{name}={value!r:.40} must be at most {most:g}")
     return int(number)
 
 

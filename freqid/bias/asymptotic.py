@@ -106,7 +106,8 @@ def asymptotic_fit(
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
     conditions = Conditions(spectrum, sampling, band, prefilter, noise_model)
     # data without noise may have two minima that are nearly as good: look for both
-    count = _STARTS if n_starts == "auto" else whole("n_starts", n_starts)
+    auto = isinstance(n_starts, str) and n_starts == "auto"
+    count = _STARTS if auto else whole("n_starts", n_starts, most=100_000)
     options = SearchOptions(count, whole("seed", seed, least=0), start, hold == "estimate")
     if duration is not None:
         positive("duration", duration, "s")

@@ -11,9 +11,10 @@ from freqid.data.data_set import (
     channel_counts,
     common_names,
     input_dt,
+    output_dt,
     rate_factor,
 )
-from freqid.data.files import read, whole_file, write
+from freqid.data.files import check_name, read, whole_file, write
 from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.logged import channels

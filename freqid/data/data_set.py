@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from freqid.checks import InputError
+from freqid.checks import InputError, listed
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.data.streams import Stream
@@ -20,7 +20,7 @@ def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
         data = FrequencyResponse.from_control(data)
     if not isinstance(data, DataSet | Iterable):
         raise InputError(f"data={data!r} holds no experiment; give a record or a response")
-    sets = (data,) if isinstance(data, DataSet) else tuple(data)
+    sets = (data,) if isinstance(data, DataSet) else tuple(listed("data", data))
     sets = tuple(FrequencyResponse.from_control(d) if hasattr(d, "frdata") else d for d in sets)
     if not sets:
         raise InputError("data=[] holds no experiment; give at least one record or response")
@@ -44,7 +44,15 @@ def common_names(sets: Sequence[DataSet]) -> tuple[Sequence[str], Sequence[str]]
 
 def input_dt(data: DataSet) -> float:
     """Sample time of the input in s; 0 for a response in continuous time."""
-    return data.input_dt if isinstance(data, Record) else data.dt
+    if isinstance(data, Record):
+        # lines may be of samples that came faster than those that are kept
+        return float(getattr(data, "line_dt", data.input_dt))
+    return data.dt
+
+
+def output_dt(data: DataSet) -> float:
+    """Sample time of the output in s, as it came; 0 for a response in continuous time."""
+    return float(getattr(data, "line_dt", data.dt))
 
 
 def rate_factor(data: DataSet) -> int:

@@ -171,19 +171,19 @@ def write(record: Record, path: str | Path) -> None:
 
 
 def _check_names(record: Record, path: Path) -> None:
-    """ValueError for a channel whose name means something else in a file."""
     for name in (*record.input_names, *record.output_names):
-        own = (
-            name == "time"
-            or is_kept(name)
-            or (name == "reference" and record.reference is not None)
+        check_name(name, path, record.reference is not None)
+
+
+def check_name(name: str, path: Path, has_reference: bool = False) -> None:
+    """ValueError for a channel whose name means something else in a file."""
+    own = name == "time" or is_kept(name) or (name == "reference" and has_reference)
+    if own or name != name.strip(" \t\"'") or not name or not name.isprintable():
+        why = "files use that name themselves" if own else "it would be read back as another"
+        raise InputError(
+            f"{path}: the channel {name!r} cannot be written, {why}; rename it with "
+            "input_names=, output_names="
         )
-        if own or name != name.strip(" \t\"'") or not name or not name.isprintable():
-            why = "files use that name themselves" if own else "it would be read back as another"
-            raise InputError(
-                f"{path}: the channel {name!r} cannot be written, {why}; rename it with "
-                "input_names=, output_names="
-            )
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from freqid.data.remembered import (
     kept_conditions,
     kept_hold,
     kept_notes,
+    kept_reference,
     kept_step,
 )
 from freqid.lti import Hold
@@ -50,6 +51,8 @@ def record_of(
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
+    if reference is None:
+        reference = kept_reference(frame)
     told = kept_channels(frame, signals, reference)
     u_names, y_names = _channels(signals, inputs, outputs, reference, told)
     between = kept_hold(frame, u_names) if hold is None else hold
@@ -88,7 +91,9 @@ def samples_frame(record: Record) -> pd.DataFrame:
     columns: dict[str, Any] = dict(zip(record.input_names, record.inputs.T, strict=True))
     slow = dict(zip(record.output_names, record.outputs.T, strict=True))
     if record.reference is not None:
-        slow |= {"reference": record.reference}
+        if record.reference.ndim > 1 and record.reference.shape[1] > 1:
+            raise InputError("a table keeps one reference, and this record has several")
+        slow |= {"reference": record.reference.reshape(-1)}
     for name, values in slow.items():
         columns[name] = np.full(len(record.u), np.nan)
         columns[name][:: record.factor] = values

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, listed, numbers
 from freqid.data.record import Record
 from freqid.data.stamped_record import StampedRecord
 
@@ -26,7 +26,7 @@ def as_records(records: Record | Sequence[Record], varying: bool = True) -> list
             f"records={type(records).__name__} is neither a Record nor a list of Records; of a "
             "stream take h1, h2 or hv, or load() it"
         )
-    sets = [records] if isinstance(records, Record) else list(records)
+    sets = [records] if isinstance(records, Record) else listed("records", records)
     if not sets or not all(isinstance(r, Record) for r in sets):
         raise InputError("records must be a Record or a list of Records, at least one")
     if any(isinstance(r, StampedRecord) for r in sets):
@@ -71,11 +71,11 @@ def references_of(sets: Sequence[Record], reference: Reference | None) -> list[F
     elif len(sets) == 1 and not (isinstance(reference, (list, tuple)) and len(reference) == 1):
         given = [reference]
     else:
-        given = list(reference)
+        given = listed("reference", reference)
     if len(given) != len(sets):
         raise InputError(f"reference has {len(given)} signals for {len(sets)} records")
-    arrays = [np.asarray(x, dtype=float) for x in given]
-    signals = [x.reshape(len(x), -1) for x in arrays]
+    arrays = [numbers("reference", x) for x in given]
+    signals = [x.reshape(max(x.shape[:1], default=1), -1) for x in arrays]
     for x, r in zip(signals, sets, strict=True):
         if len(x) != r.n_samples or x.shape[1] != r.n_inputs:
             raise InputError(

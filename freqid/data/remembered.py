@@ -23,13 +23,15 @@ _CONDITION = "condition "
 _ALIASED, _INPUTS = "aliased share", "input count"
 # the sample time where the times do not say it to the last bit, and what was done before
 _STEP, _NOTE = "sample time", re.compile(r"note \d+: ")
+# beside a column "reference" that is what the loop was told
+_LOOP = "closed loop"
 _ROUNDING = 1e-9
 
 
 def is_kept(column: object) -> bool:
     """Whether a column is about the record and no signal."""
     name = str(column)
-    other = name in (_ALIASED, _INPUTS, _STEP) or name.startswith(_CONDITION)
+    other = name in (_ALIASED, _INPUTS, _STEP, _LOOP) or name.startswith(_CONDITION)
     other = other or _NOTE.match(name) is not None
     return other or name.split(" ")[0] in _holds()
 
@@ -81,6 +83,8 @@ def kept_in_files(record: Record) -> dict[str, float | bool]:
         kept[_INPUTS] = record.n_inputs
     if record.aliased > _ROUNDING:
         kept[_ALIASED] = record.aliased
+    if record.reference is not None:
+        kept[_LOOP] = 1.0
     if as_printed(record.input_dt) != record.input_dt:
         kept[_STEP] = record.input_dt
     # the words are the name of the column: a table has no other place for them in every format
@@ -95,6 +99,11 @@ def as_printed(step: float) -> float:
 def kept_step(frame: pd.DataFrame) -> float | None:
     """The time between rows in s that a table remembers."""
     return positive(_STEP, _one(frame, _STEP), "s") if _STEP in frame.columns else None
+
+
+def kept_reference(frame: pd.DataFrame) -> str | None:
+    """The column of the reference, where the table was written from a record that had one."""
+    return "reference" if {_LOOP, "reference"} <= set(map(str, frame.columns)) else None
 
 
 def kept_notes(frame: pd.DataFrame) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from freqid.checks import (
     positive,
     samples,
 )
-from freqid.data import named_with, whole_file
+from freqid.data import check_name, named_with, whole_file
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -53,9 +53,13 @@ class Design:
     ) -> None:
         checked = samples("u", u)
         names = channel_names("input_names", input_names, checked.size // len(checked), "u")
-        for name in named_values("units", units):
-            if name not in names:
-                raise InputError(f"units: {name!r} is not one of {', '.join(names)}")
+        if len(set(names)) < len(names):
+            raise InputError(f"input_names={list(names)} hold a name twice; names must differ")
+        for name, unit in named_values("units", units).items():
+            if name not in names or not isinstance(unit, str):
+                raise InputError(
+                    f"units: {name!r}: {unit!r}; expected a text for any of {', '.join(names)}"
+                )
         self.__dict__.update(
             u=checked, dt=positive("dt", dt, "s"), input_names=names, units=dict(units or {})
         )
@@ -99,7 +103,11 @@ class Design:
         [0.0, 2.0, 0.0, -2.0]
         """
         duration = len(self.u) * self.dt
-        turns = positive("frequency", frequency, "Hz") * duration
+        if positive("frequency", frequency, "Hz") >= 0.5 / self.dt:
+            raise InputError(
+                f"frequency={frequency:g} Hz must stay below {0.5 / self.dt:g} Hz, Nyquist"
+            )
+        turns = frequency * duration
         if abs(turns - round(turns)) > 1e-6 or round(turns) < 1:
             raise InputError(
                 f"frequency={frequency:g} Hz turns {turns:g} times in {duration:g} s; take a "
@@ -122,6 +130,8 @@ class Design:
         path = path_of("path", path)
         if path.suffix.lower() != ".csv":
             raise InputError(f"{path}: a design is written as .csv")
+        for name in self.input_names:
+            check_name(name, path)
         flat = self.u.reshape(len(self.u), -1)
         names = [named_with(n, self.units.get(n, "")) for n in self.input_names]
         frame = pd.DataFrame(flat, columns=names)

@@ -9,7 +9,17 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, IntArray, choice, numbers, positive, steps, whole
+from freqid.checks import (
+    FloatArray,
+    InputError,
+    IntArray,
+    choice,
+    few_enough,
+    numbers,
+    positive,
+    steps,
+    whole,
+)
 from freqid.excitation.signal_spectra import multisine_lines
 
 # starts, rounds of clipping of each, the norms then taken in turn, and the steps of each
@@ -71,6 +81,7 @@ def multisine(
     choice("crest", crest, ("minimise", "schroeder", "random"))
     choice("grid", grid, tuple(_GRIDS))
     count = whole("n_inputs", n_inputs)
+    few_enough("periods, n_inputs", float(N) * repeats * count * (count if orthogonal else 1))
     if crest == "schroeder" and count > 1 and not orthogonal:
         raise InputError(
             f"crest='schroeder', n_inputs={count}: it makes one signal, the others would be it "

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Literal
 
 from freqid.checks import InputError, choice, listed, named_values, whole
-from freqid.data import DataSet, FrequencyResponse, Stream, as_data_sets, as_holds
+from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.closed_loop import through_references, with_loop_noise
@@ -108,7 +108,8 @@ def fit(
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
     near = isinstance(start, Near)
     start = None if start is None else named_values("start", start)
-    count = None if n_starts == "auto" else whole("n_starts", n_starts)
+    auto = isinstance(n_starts, str) and n_starts == "auto"
+    count = None if auto else whole("n_starts", n_starts, most=_STARTS)
     whole("seed", seed, least=0)
     fitter_of(model)
     choice("loss", loss, ("linear", "huber"))
@@ -118,13 +119,14 @@ def fit(
     if not isinstance(reference, bool):
         choice("reference", reference, ("auto",))
     passed: list[str] = []
+    asked_hold = hold
     if isinstance(data, Stream):
-        if hold == "estimate":
-            raise InputError("hold='estimate' needs the samples: give stream.load()")
-        # a name means the hold at the rate of the stream, not at that of what its band needs
-        hold = as_holds(hold, data.dt, data.hold, data.input_names)
-        origin, data = data.origin, stretches(data, band)
-        passed = [f"{origin} was read in one pass, as {len(data)} experiments that follow on"]
+        data, told = _in_one_pass(data, hold, band, {
+            "hold": hold == "estimate", "domain": domain == "time", "separate": bool(separate),
+            "initial_state": initial_state != "estimate",
+        })  # fmt: skip
+        hold = None
+        passed = [told]
     given_sets = as_data_sets(data)
     sets = tuple(in_order_of(model, d) for d in given_sets)
     estimated = isinstance(hold, str) and hold == "estimate"
@@ -165,7 +167,7 @@ def fit(
     if loops:
         est = with_loop_noise(est, readings, loops)
     given = {
-        "hold": hold, "band": band, "weights": weights, "initial_state": initial_state,
+        "hold": asked_hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
         "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
         "error": error,
@@ -176,6 +178,27 @@ def fit(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *notes, *est.notes],
     )  # fmt: skip
+
+
+# starts that may be asked for: more would never end
+_STARTS = 100_000
+
+
+def _in_one_pass(
+    stream: Stream,
+    hold: Hold | str | Mapping[str, Hold | str] | None,
+    band: tuple[float, float] | None,
+    refused: Mapping[str, bool],
+) -> tuple[list[Record], str]:
+    """The experiments of a stream under the hold that is asked for; what was done, in words."""
+    for name, asked in refused.items():
+        if asked:
+            raise InputError(f"{name}: what is asked needs the samples of the stream; load() it")
+    # a name means the hold at the rate of the stream, not at that of what its band needs
+    held = as_holds(hold, stream.dt, stream.hold, stream.input_names)
+    found = stretches(dataclasses.replace(stream, hold=held), band)
+    follow = f"{len(found)} experiments that follow on" if len(found) > 1 else "one experiment"
+    return found, f"{stream.origin} was read in one pass, as {follow}"
 
 
 def _fitted(

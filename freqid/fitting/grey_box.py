@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from freqid.checks import InputError, unknown
-from freqid.data import Record, input_dt, rate_factor
+from freqid.data import Record, input_dt, output_dt, rate_factor
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -175,7 +175,7 @@ def _estimate(
         "" if minimum.solution.converged else minimum.solution.message,
         minimum.determined.sentences,
         held,
-        reading.data.dt,
+        output_dt(reading.data),
         minimum.objective.n_rows,
         len(values),
         out_of_sight=out_of_sight(structure.at(minimum.x).poles, hold),
@@ -190,7 +190,7 @@ def _estimate(
         uncertainty=spread,
         problem=minimum,
         hold=hold,
-        dt=reading.data.dt,
+        dt=output_dt(reading.data),
         n_starts=found.n_starts,
         # the descent from a start itself, beside its first stage, is no start of its own
         n_agreed=min(found.n_agreed, found.n_starts),

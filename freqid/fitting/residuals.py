@@ -10,6 +10,7 @@ import scipy
 from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, StampedRecord, channel_counts
 from freqid.fitting.reading import Reading, read_for
+from freqid.frf import lines_of
 from freqid.lti import Hold, Plane, eliminate
 from freqid.models import Model
 
@@ -26,12 +27,16 @@ class LineErrors:
     multiplicity: FloatArray
     n_samples: int
     dt: float
+    # samples that show the lines, where there are fewer of them
+    shown: int
 
     def in_time(self) -> FloatArray:
         """The same errors as signals (N, outputs); lines that are left out are zero."""
-        N = self.n_samples
+        N, scale = self.shown, self.shown / self.n_samples
         E = np.zeros((len(self.error), N // 2 + 1), complex)
-        E[:, np.round(self.omega * N * self.dt / (2 * np.pi)).astype(int)] = self.error
+        E[:, np.round(self.omega * self.n_samples * self.dt / (2 * np.pi)).astype(int)] = (
+            scale * self.error
+        )
         signals: FloatArray = scipy.fft.irfft(E, N, axis=-1).T
         return signals
 
@@ -91,7 +96,7 @@ def errors_of(model: Model, reading: Reading) -> LineErrors:
         Q, _ = eliminate(evaluation.transient, rows)
         rows = rows - (Q @ rows) @ Q
     error = rows.view(complex).reshape(channel_counts(record)[0], -1) / lines.scale[:, 0]
-    N = len(record.u) // record.factor
-    number = np.round(lines.omega * N * record.dt / (2 * np.pi))
+    N, dt = lines_of(record)
+    number = np.round(lines.omega * N * dt / (2 * np.pi))
     multiplicity = np.where((number == 0) | (2 * number == N), 1.0, 2.0)
-    return LineErrors(lines.omega, error, multiplicity, N, record.dt)
+    return LineErrors(lines.omega, error, multiplicity, N, dt, len(record.u) // record.factor)

@@ -9,4 +9,4 @@ from freqid.frf.empirical import etfe
 from freqid.frf.local_models import local_polynomial, local_rational
 from freqid.frf.means import periodic
 from freqid.frf.one_pass import stretches
-from freqid.frf.spectra import Spectra, spectra
+from freqid.frf.spectra import Spectra, lines_of, spectra

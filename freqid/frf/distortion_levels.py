@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 _APART = 0.15
 # probability below which a response is said to depend on the amplitude
 _CHANCE = 1e-3
+# degrees of freedom below which an F-distributed term has no variance
+_FEWEST = 4.5
 
 
 def grouped(size: FloatArray) -> list[list[int]]:
@@ -49,18 +51,20 @@ def between_levels(
         if frf is base:
             rows.append([own, 0.0, 0.0, np.nan, 1.0])
             continue
-        least = min(free, freedom[0])
-        if least <= 4:
+        if free + freedom[0] <= 4:
             raise InputError(
-                "levels cannot be compared with so few periods or realisations: give three "
-                "realisations of each level, or four periods"
+                "levels cannot be compared with so few periods or realisations: give three of each"
             )
         assert frf.variance is not None
         assert base.variance is not None
         change = frf.response - base.response
-        each = np.abs(change) ** 2 / np.maximum(frf.variance + base.variance, 1e-300)
-        mean = least / (least - 2)
-        scatter = mean * np.sqrt(least / (least - 4) / each.size)
+        both = np.maximum(frf.variance + base.variance, 1e-300)
+        each = np.abs(change) ** 2 / both
+        # of a sum of two variances (Satterthwaite, Biometrics Bulletin 2, 1946)
+        own_freedom = both**2 / (frf.variance**2 / free + base.variance**2 / freedom[0])
+        d = np.maximum(own_freedom, _FEWEST)
+        mean = (d / (d - 2)).mean()
+        scatter = np.sqrt((d**3 / ((d - 2) ** 2 * (d - 4))).sum()) / each.size
         p = float(scipy.stats.norm.sf((each.mean() - mean) / scatter))
         at = np.unravel_index(int(each.argmax()), each.shape)
         part = float(np.abs(change[at] / base.response[at]))

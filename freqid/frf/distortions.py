@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 # part of the strongest line's amplitude below which a line is not excited, and the ratio of a gap
 # between lines that are and an actuator's own distortion at lines that were never asked for
 _SILENT, _GAP = 1e-3, 3.0
+# part of its rms by which an input may differ between periods, and a likeness that is no chance
+_APERIODIC, _ALIKE = 0.65, 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +109,14 @@ def distortion(
             "are needed to tell the noise"
         )
     commanded = references_of(sets, reference)
+    for r in sets if commanded is None else ():
+        kept = r.inputs[skip * n : (skip + periods) * n].reshape(periods, n, -1)
+        away = np.sqrt(((kept - kept.mean(axis=0)) ** 2).mean() / max((kept**2).mean(), 1e-300))
+        if away > _APERIODIC:
+            raise InputError(
+                f"period={period:g} s: the input differs from one period to the next by "
+                f"{100 * away:.0f} % of its rms; check the period, or skip the beginning"
+            )
 
     def lines(signals: Sequence[FloatArray]) -> ComplexArray:
         """DFTs of the periods, (realisations, periods, channels, lines), scaled to amplitudes."""
@@ -124,6 +134,8 @@ def distortion(
     driven = R.mean(axis=1)[:, None, excited] if commanded is not None else None
     size = np.sqrt((np.abs(R.mean(axis=1)[:, excited]) ** 2).sum(axis=1) / 2)
     groups = grouped(size)
+    for g in groups:
+        _unlike(R.mean(axis=1)[g][:, excited])
     # below and above the excited lines a distortion says nothing of what it is among them
     quiet = inside & ~excited & (f > f[excited][0]) & (f < f[excited][-1])
     every = [
@@ -153,16 +165,29 @@ def _of_one_level(
     return _fast(first, f, U[0], Y[0], excited, quiet)
 
 
+def _unlike(R: ComplexArray) -> None:
+    """ValueError for realisations that are one and the same."""
+    unit = R / np.linalg.norm(R, axis=1, keepdims=True)
+    alike = np.abs(unit @ unit.conj().T) - np.eye(len(R))
+    if len(R) > 1 and alike.max() > _ALIKE:
+        i, j = np.unravel_index(int(alike.argmax()), alike.shape)
+        raise InputError(
+            f"two records of one level have the same phases ({i} and {j} of it): distortion is the "
+            "same in both; give realisations of other phases, or join them as periods of one"
+        )
+
+
 def _excited(level: FloatArray, inside: BoolArray) -> BoolArray:
     """Lines that were driven, not ones that an actuator's own distortion reaches."""
-    most = level[inside].max()
-    down = np.sort(np.maximum(level[inside], _SILENT * most))[::-1]
+    # of all lines: a band may hold none that are excited
+    most = level[1:].max()
+    down = np.sort(np.maximum(level[1:], _SILENT * most))[::-1]
     ratio = down[:-1] / down[1:]
     least = _SILENT * most
     if len(ratio) and ratio.max() >= _GAP:
         i = int(ratio.argmax())
         least = np.sqrt(down[i] * down[i + 1])
-    return inside & (level > least)
+    return inside & (level > least) & (level > 0)
 
 
 def _mean_variance(X: ComplexArray, axis: int) -> FloatArray:

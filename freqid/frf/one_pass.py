@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import scipy
@@ -34,13 +35,23 @@ class Stretch(KnownLines):
     Its samples ``u`` and ``y`` are these lines alone, at a rate that just holds them.
     """
 
-    lines: Spectra
-    limits: Band
+    limits: Band | None
 
-    def __init__(self, record: Record, lines: Spectra, limits: Band) -> None:
-        own = {f.name: getattr(record, f.name) for f in dataclasses.fields(Record)}
-        super().__init__(**own)
+    def __init__(
+        self,
+        *args: Any,
+        lines: Spectra | None = None,
+        limits: Band | None = None,
+        **fields: Any,
+    ) -> None:
+        super().__init__(*args, **fields)
         self.__dict__.update(lines=lines, limits=limits)
+
+    @classmethod
+    def of(cls, record: Record, lines: Spectra | None, limits: Band | None) -> Stretch:
+        """With the samples of a record that shows the lines."""
+        own = {f.name: getattr(record, f.name) for f in dataclasses.fields(Record)}
+        return cls(**own, lines=lines, limits=limits)
 
     def select(
         self,
@@ -49,10 +60,12 @@ class Stretch(KnownLines):
     ) -> Stretch:
         """The stretch with some of its channels, in the order given."""
         part = self.plain().select(inputs, outputs)
+        if self.lines is None:
+            return Stretch.of(part, None, None)
         u = [self.input_names.index(n) for n in part.input_names]
         y = [self.output_names.index(n) for n in part.output_names]
         lines = dataclasses.replace(self.lines, U=self.lines.U[u], Y=self.lines.Y[y])
-        return Stretch(part, lines, self.limits)
+        return Stretch.of(part, lines, self.limits)
 
     def plain(self) -> Record:
         """The samples that show the lines, as a record of their own."""
@@ -60,6 +73,8 @@ class Stretch(KnownLines):
 
     def spectra(self, limits: Iterable[float] | None) -> Spectra:
         """The lines, or those in a band within its own; ValueError for another."""
+        assert self.lines is not None
+        assert self.limits is not None
         band = as_band(limits)
         if band is None or band == self.limits:
             return self.lines
@@ -112,7 +127,7 @@ def _in_band(record: Record, limits: Band, every: int) -> Stretch:
 
     dt = every * record.dt
     shown = dataclasses.replace(record, u=thinned(s.U[:, :, 0]), y=thinned(s.Y), dt=dt, input_dt=dt)
-    return Stretch(shown, s, limits)
+    return Stretch.of(shown, s, limits)
 
 
 def _flat(columns: FloatArray) -> FloatArray:

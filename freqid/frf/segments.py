@@ -119,9 +119,11 @@ def taper(window: Window, length: int) -> FloatArray:
     """The window's samples, (length,); ValueError for what is none."""
     try:
         given = isinstance(window, (list, np.ndarray))
-        w = np.asarray(window, float) if given else scipy.signal.get_window(window, length)
-    except (TypeError, ValueError) as error:
+        w = np.asarray(window) if given else scipy.signal.get_window(window, length)
+    except (TypeError, ValueError, IndexError) as error:
         raise InputError(f"window={window!r:.60} is none that scipy knows: {error}") from None
+    if w.dtype.kind not in "fiu" or not np.isfinite(w).all() or not w.any():
+        raise InputError("window must hold finite real numbers that are not all zero")
     if w.shape != (length,):
         raise InputError(f"window has shape {w.shape}; expected ({length},), one for each sample")
     return w

@@ -64,11 +64,28 @@ class Spectra:
 
 
 class KnownLines(Record):
-    """A record that brings its lines along, which are of more than its samples."""
+    """A record that brings its ``lines`` along, which are of more than its samples.
+
+    None where the samples were changed since, and are all that is known.
+    """
+
+    lines: Spectra | None
+
+    @property
+    def line_dt(self) -> float:
+        """Sample time of what the lines are of, in s."""
+        return self.input_dt if self.lines is None else self.lines.dt
 
     def spectra(self, limits: Iterable[float] | None) -> Spectra:
         """The lines, or those in ``limits`` (Hz)."""
         raise NotImplementedError
+
+
+def lines_of(record: Record) -> tuple[int, float]:
+    """How many output samples the lines of a record are of, and their sample time in s."""
+    if isinstance(record, KnownLines) and record.lines is not None:
+        return record.lines.n_samples, record.lines.dt
+    return len(record.u) // record.factor, record.dt
 
 
 def spectra(
@@ -82,7 +99,7 @@ def spectra(
 
     A record never changes, so it keeps its spectra: each is computed once, however many fits ask.
     """
-    if isinstance(record, KnownLines):
+    if isinstance(record, KnownLines) and record.lines is not None:
         return record.spectra(limits)
     inside = as_band(limits, 0.5 / record.input_dt)
     key = inside, lifted and record.factor > 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -25,9 +26,14 @@ _OF_ONE: dict[str, Callable[..., Any]] = {
         "arctanh", "abs", "sign", "deg2rad", "rad2deg", "radians", "degrees",
     )
 }  # fmt: skip
+# as Python's own math calls them
+_OF_ONE |= {
+    f"a{name}": _OF_ONE[f"arc{name}"] for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")
+}
 _OF_TWO: dict[str, Callable[..., Any]] = {
     name: getattr(np, name) for name in ("arctan2", "hypot", "minimum", "maximum", "power")
 }
+_OF_TWO |= {"atan2": np.arctan2, "min": np.minimum, "max": np.maximum, "pow": np.power}
 _CONSTANTS = {"pi": np.pi, "e": np.e}
 # beyond this an expression is no relation between parameters
 _LONGEST, _DEEPEST = 1000, 50
@@ -47,7 +53,7 @@ class Ties:
     computed.
     """
 
-    def __init__(self, expressions: Mapping[str, str], names: Sequence[str]) -> None:
+    def __init__(self, expressions: Mapping[str, str | float], names: Sequence[str]) -> None:
         self.expressions = dict(expressions)
         self._trees: dict[str, ast.expr] = {}
         for name, text in self.expressions.items():
@@ -55,12 +61,13 @@ class Ties:
                 raise InputError(unknown("ties", name, names))
             tree = _parsed(name, text)
             try:
-                _check(tree, [n for n in names if n not in self.expressions], self.expressions)
+                free = [_plain(n) for n in names if n not in self.expressions]
+                _check(tree, free, [_plain(n) for n in self.expressions])
             except InputError as error:
                 raise InputError(f"tie {name}={text!r:.80} {error}") from None
             self._trees[name] = tree
 
-    def __setstate__(self, state: dict[str, dict[str, str]]) -> None:
+    def __setstate__(self, state: dict[str, dict[str, str | float]]) -> None:
         """Restore; what version 0.1.0 wrote has trees of another kind."""
         self.expressions = state["expressions"]
         self._trees = {name: _parsed(name, text) for name, text in self.expressions.items()}
@@ -68,10 +75,13 @@ class Ties:
     def resolve(self, values: Values) -> dict[str, Any]:
         """Values (numbers or arrays) with the tied ones computed from the others."""
         resolved = dict(values)
+        if not self._trees:
+            return resolved
+        plain = {_plain(n): v for n, v in values.items()}
         for name, tree in self._trees.items():
             try:
                 with np.errstate(all="ignore"):
-                    found = _computed(tree, values)
+                    found = _computed(tree, plain)
             except (ArithmeticError, TypeError, ValueError):
                 raise InputError(
                     f"tie {name}={self.expressions[name]!r} cannot be computed"
@@ -84,13 +94,22 @@ class Ties:
         return resolved
 
 
+def _plain(name: str) -> str:
+    """A name as Python's parser has it, which takes µ (micro) and μ (mu) for one letter."""
+    return name if name.isascii() else unicodedata.normalize("NFKC", name)
+
+
 def _parsed(name: str, text: object) -> ast.expr:
     """The tree of an expression; ValueError for what is none, or too large to be one."""
     problem = InputError(
         f"tie {name}={text!r:.80} is not an expression; expected one like '2 * Jm'"
     )
+    if isinstance(text, (int, float)) and not isinstance(text, bool):
+        text = repr(float(text))
     if not isinstance(text, str):
         raise problem
+    if "^" in text:
+        raise InputError(f"tie {name}={text!r:.80}: a power is written **, not ^")
     if len(text) > _LONGEST:
         raise InputError(f"tie {name} has {len(text)} characters; expected at most {_LONGEST}")
     try:
@@ -99,7 +118,7 @@ def _parsed(name: str, text: object) -> ast.expr:
         raise problem from None
 
 
-def _check(tree: ast.expr, free: Sequence[str], tied: Mapping[str, str], depth: int = 0) -> None:
+def _check(tree: ast.expr, free: Sequence[str], tied: Sequence[str], depth: int = 0) -> None:
     """ValueError for a tree that holds anything but what a tie may compute."""
     if depth > _DEEPEST:
         raise InputError(f"is nested more than {_DEEPEST} deep; write it shorter")

@@ -10,7 +10,7 @@ import numpy as np
 
 from freqid.checks import InputError, an, listed, whole
 from freqid.data import Record
-from freqid.fitting import Estimate, Near, Weights, fit
+from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
 from freqid.models import GreyBox
 from freqid.validation.comparison import compare
 
@@ -103,6 +103,7 @@ def cross_validate(model: object, records: Sequence[Record], **options: Any) -> 
     rows = []
     for i, held_out in enumerate(sets):
         est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
+        uninterrupted(est.message)
         fits = compare(est, held_out).fit_percent
         named = {f"fit {n}": float(v) for n, v in zip(held_out.output_names, fits, strict=True)}
         rows.append({"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))})
@@ -129,11 +130,14 @@ def bootstrap(
         raise InputError(f"records holds {len(sets)}; a bootstrap needs three or more repeats")
     rng = np.random.default_rng(whole("seed", seed, least=0))
     whole_fit = fit(model, sets, **options)
+    uninterrupted(whole_fit.message)
     if "start" not in options and hasattr(whole_fit.model, "values"):
         free = [p.name for p in whole_fit.model.free_parameters]
         options = {**options, "start": Near({k: whole_fit[k] for k in free}), "n_starts": 1}
     rows = []
     for _ in range(count):
         drawn = [sets[i] for i in rng.integers(0, len(sets), len(sets))]
-        rows.append(fit(model, drawn, **options).values)
+        est = fit(model, drawn, **options)
+        uninterrupted(est.message)
+        rows.append(est.values)
     return pd.DataFrame(rows, columns=list(whole_fit.names))

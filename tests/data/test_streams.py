@@ -258,3 +258,49 @@ def test_streams_that_a_fit_cannot_take():
 
     with pytest.raises(ValueError, match="sample 100 is NaN"):
         fq.fit(plant, fq.open(broken, dt=DT))
+
+
+def test_what_a_stream_is_asked_afterwards(monkeypatch, tmp_path):
+    """Turned channels, holds of their own, weights: as the record has them."""
+    monkeypatch.setattr("freqid.frf.one_pass._SHORTEST", 1000)
+    record = fq.simulate(PLANT, fq.white_noise(20_000, seed=2), 5e-4).with_noise(0.5, seed=1)
+    stream = fq.open(np.column_stack([record.u, record.y]), dt=5e-4)
+    for options in ({"hold": "foh"}, {"weights": "noise"}, {}):
+        whole = fq.fit(PLANT, record, band=(10, 80), **options)
+        parts = fq.fit(PLANT, stream, band=(10, 80), **options)
+        assert parts.verdict.grade == whole.verdict.grade
+        assert parts.cost / parts.n_rows == pytest.approx(whole.cost / whole.n_rows, rel=0.1)
+        assert len(parts.suspects)
+        assert parts.dt == whole.dt
+    parts.report(tmp_path / "est.html")
+    parts.save(tmp_path / "est.json")
+    assert fq.load(tmp_path / "est.json")["k"] == parts["k"]
+    for name, value in (
+        ("hold", "estimate"), ("separate", ["fm"]), ("initial_state", "zero"), ("domain", "time"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=name):
+            fq.fit(PLANT, stream, band=(10, 80), **{name: value})
+
+
+def test_channels_of_a_stream_turn_with_their_holds(monkeypatch):
+    monkeypatch.setattr("freqid.frf.one_pass._SHORTEST", 1000)
+
+    def driven(a, b, c):
+        return [[-a, 0], [1, 0]], [[b, c], [0, 0]], np.eye(2), np.zeros((2, 2))
+
+    model = fq.GreyBox(
+        driven, [fq.Parameter(n, v) for n, v in (("a", 20.0), ("b", 50.0), ("c", 10.0))],
+        inputs=["f", "g"], outputs=["vel", "pos"],
+    )  # fmt: skip
+    u = np.random.default_rng(0).standard_normal((20_000, 2))
+    names = {"input_names": ["f", "g"], "output_names": ["vel", "pos"]}
+    holds = {"f": "foh", "g": "zoh"}
+    record = fq.simulate(model, u, 1e-3, hold=holds, **names)
+    rows = np.column_stack([record["pos"], record["g"], record["vel"], record["f"]])
+    stream = fq.open(
+        rows, ["g", "f"], ["pos", "vel"], 1e-3, holds, columns=["pos", "g", "vel", "f"]
+    )
+    est = fq.fit(model, stream, band=(2, 30), start={"a": 25.0})
+    assert est.values == pytest.approx([20, 50, 10], rel=1e-8)
+    assert fq.fit(fq.TransferFunction(1, 2), stream, band=(2, 30)).fit_percent > 99.9
+    assert fq.fit(fq.OutputError(2), stream, band=(2, 30)).fit_percent > 95

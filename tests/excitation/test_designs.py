@@ -68,3 +68,9 @@ def test_the_file_is_what_is_sent(tmp_path, wave):
         design.to_csv(tmp_path / "sequence.txt")
     with pytest.raises(ValueError, match="units"):
         fq.Design(wave, DT, units={"x": "V"})
+    with pytest.raises(ValueError, match="twice"):
+        fq.Design(np.column_stack([wave, wave]), DT, ["a", "a"])
+    with pytest.raises(ValueError, match="rename it"):
+        fq.Design(wave, DT, ["time"]).to_csv(tmp_path / "b.csv")
+    with pytest.raises(ValueError, match="Nyquist"):
+        fq.Design(wave, DT).moving(1.0, 500.0)

@@ -328,7 +328,7 @@ def test_distortion_in_a_loop_through_its_reference():
         runs = []
         for s in range(40):
             r = fq.multisine((2, 200), 0.5, dt, 8, "random", seed=s)
-            e = 0.4 * np.random.default_rng(s).standard_normal(len(r))
+            e = 0.15 * np.random.default_rng(s).standard_normal(len(r))
             u, y, x = np.zeros(len(r)), np.zeros(len(r)), 0.0
             for k in range(len(r)):
                 y[k] = x + e[k]
@@ -339,3 +339,25 @@ def test_distortion_in_a_loop_through_its_reference():
         z = np.exp(2j * np.pi * G.frequency * dt)
         errors.append(np.abs((G.response[0, 0] - gain / (z - pole)).mean()))
     assert errors[0] < 0.25 * errors[1]
+
+
+def test_what_no_distortion_can_be_told_from():
+    """Found by trying: 1e13 where nothing was driven, and zero of one realisation taken twice."""
+    runs = [loud(s, 1.0, 0.2) for s in range(3)]
+    with pytest.raises(ValueError, match="no energy in band"):
+        fq.distortion(runs, 1.0, band=(150, 200), skip=1)
+    for wrong in (0.9, 0.5):
+        with pytest.raises(ValueError, match="differs from one period"):
+            fq.distortion(runs, wrong)
+    with pytest.raises(ValueError, match="same phases"):
+        fq.distortion([runs[0], loud(0, 1.0, 0.2)], 1.0, skip=1)
+
+
+def test_three_realisations_of_each_level_are_enough():
+    false = 0
+    for seed in range(0, 90, 3):
+        runs = [loud(seed + s, level, 0.0) for level in (0.3, 1.0) for s in range(3)]
+        false += bool(fq.distortion(runs, 1.0, skip=1).warnings)
+    assert false <= 1
+    runs = [loud(s, level, 0.5) for level in (0.3, 1.0) for s in range(3)]
+    assert fq.distortion(runs, 1.0, skip=1).warnings

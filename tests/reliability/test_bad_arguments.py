@@ -17,10 +17,10 @@ KINDS = {
     "not negative": ["a", NAN, INF, -1, [1.0, 2.0]],
     "window": ["nonsense", "", ["a"]],
     "prior": [5, (1, 0), ("a", "b"), (1,)],
-    "count": ["a", 2.5, -1, NAN, 10**400, [1]],
+    "count": [np.array("a"), "a", 2.5, -1, NAN, 10**400, [1]],
     "choice": ["nonsense", 5, "", ["no"]],
     "band": ["a", (9, 1), (NAN, 3), (1,), 5, (1, 2, 3), ("a", "b")],
-    "record": [5, "x", None, [], {}, [5]],
+    "record": [np.array("a"), 5, "x", None, [], {}, [5]],
     "response": [5, "x", None, [1.0]],
     "estimate": [5, "x", None, [1.0]],
     "model": [5, "x", None, [1.0], object()],
@@ -39,7 +39,7 @@ KINDS = {
     "parameters": [5, ["k"], [5], "k"],
     "frequencies": ["a", [1.0, NAN], [[1.0, 2.0]], [2.0, 1.0], [1.0, 1.0]],
     "whole numbers": ["a", ["a"], [2.5], [-1]],
-    "iterable": [5, [], ["a"], [2.5], [-1]],
+    "iterable": [np.array("a"), 5, [], ["a"], [2.5], [-1]],
     "text": [5, "", None, ["a"]],
     "bound": ["a", NAN, (1, 2)],
     "pair": [5, (3, 1), ("a", "b"), (1,)],
@@ -280,7 +280,9 @@ def entries():
                     getattr(fq, name) if "." not in name else getattr(works, name.split(".")[1])
                 )
                 known = inspect.signature(function).parameters.get(argument)
-                if known is not None and ((bad is None and known.default is None) or bad == []):
+                if known is not None and (
+                    (bad is None and known.default is None) or (isinstance(bad, list) and not bad)
+                ):
                     continue
                 yield pytest.param(name, works, argument, bad, id=f"{name}-{argument}-{kind}{i}")
 

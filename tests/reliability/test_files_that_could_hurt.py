@@ -185,3 +185,31 @@ def test_written_files_have_the_rights_of_any_new_file(tmp_path):
     finally:
         os.umask(before)
     assert (tmp_path / "a.csv").stat().st_mode & 0o777 == 0o640
+
+
+def test_what_lies_beside_the_channels_does_not_matter(tmp_path):
+    """Empty arrays, coefficients and scalars of a session; what is left out is said."""
+    beside = {"E": np.zeros((0, 0)), "gain": [1.0, 2, 3], "pair": [1.0, 2.0], "text": "", "n": 3}
+    channels = {"time": T, "u": np.sin(T), "y": np.cos(T)}
+    long = {n: np.tile(x, 6) for n, x in channels.items()} | {"time": 0.01 * np.arange(6 * N)}
+    scipy.io.savemat(tmp_path / "a.mat", {**long, **beside})
+    np.savez(tmp_path / "a.npz", **long, E=beside["E"], gain=beside["gain"])
+    for name in ("a.mat", "a.npz"):
+        record = fq.read(tmp_path / name, "u", "y")
+        assert record.n_samples == 6 * N
+        assert any("'gain' of 3 numbers" in n for n in record.notes)
+    np.savez(tmp_path / "b.npz", **channels, half=T[:40])
+    with pytest.raises(InputError, match="lengths must agree"):
+        fq.read(tmp_path / "b.npz", "u", "y")
+
+
+def test_line_ends_and_blank_lines_of_any_machine(tmp_path):
+    rows = ["# made by hand", "", "t;u;y", "", *(f"{k * 0.1:.1f};{k};{k * k}" for k in range(9))]
+    for end in ("\n", "\r\n", "\r"):
+        (tmp_path / "a.csv").write_bytes(end.join(rows).encode())
+        record = fq.read(tmp_path / "a.csv")
+        assert record.u.tolist() == list(range(9))
+        assert record.y.tolist() == [k * k for k in range(9)]
+    spaced = "\n".join(f"   {k * 0.1:.1f}   {k}  {k * k}  " for k in range(9))
+    (tmp_path / "b.txt").write_text("  time  u  y\n" + spaced)
+    assert fq.read(tmp_path / "b.txt").y.tolist() == [k * k for k in range(9)]

@@ -75,3 +75,16 @@ def test_rounds_of_weights_end_too():
     model, _ = plant(count + 10)
     est = fq.fit(model, RECORD, weights="noise")
     assert est["a"] == pytest.approx(100, rel=0.05)
+
+
+def test_what_goes_on_after_a_fit_ends_too(tmp_path):
+    """A fleet kept the unfinished row, and cross-validation judged a start."""
+    _, count = whole()
+    for job in (
+        lambda m: fq.fit_many(m, [RECORD, RECORD], tmp_path / "a.parquet", n_jobs=1, chunk=1),
+        lambda m: fq.cross_validate(m, [RECORD, RECORD]),
+        lambda m: fq.bootstrap(m, [RECORD] * 3, n=4),
+    ):
+        model, _ = plant(count - 4)
+        with pytest.raises(KeyboardInterrupt):
+            job(model)

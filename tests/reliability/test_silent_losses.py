@@ -138,7 +138,7 @@ BAD_TIES = [
     "k if k else 2",
     "-" * 900 + "1", "(" * 300 + "1" + ")" * 300, "1" * 5000, "d", "sqrt(x=2)", "sqrt", "1e999",
     "", "k\n+ 1", "k; 1", "1j", "__import__('os')", "f'{k}'", "k := 2", "k < 2", "sqrt(1, 2)",
-    "(-8) ** (1 / 3)", "1 / 0", None, 2, "*k", "hypot(*k)", "k[0]", "{1}", "True", "...",
+    "(-8) ** (1 / 3)", "1 / 0", None, "k ^ 2", "*k", "hypot(*k)", "k[0]", "{1}", "True", "...",
 ]  # fmt: skip
 
 
@@ -171,3 +171,29 @@ def test_ties_carry_arrays_and_derivatives():
     )  # fmt: skip
     at = model._function.linearise({"k": 4.0, "c": 0.0}, names[:1])
     assert at.derivative.A[0, 1, 1] == pytest.approx(-4 * np.arctan2(4, 3) * 3 / 25, rel=1e-6)
+
+
+def test_ties_as_users_write_them():
+    plant = fq.two_mass()
+    for text, value in (
+        ("max(k, 1)", 1.5e5), ("min(2, 3)", 2), ("pow(3, 2)", 9), ("atan2(1, 1)", np.pi / 4),
+        ("2 * asin(1)", np.pi), ("3", 3), (5, 5), (0.25, 0.25), ("-+k / k", -1),
+    ):  # fmt: skip
+        assert plant.tie(d=text)["d"] == pytest.approx(value)
+    # the micro sign of keyboards is another letter to Python's parser
+    model = fq.GreyBox(
+        lambda **v: ([[-v["a"]]], [[v["\u00b5"]]], [[1.0]], [[0.0]]),
+        [fq.Parameter("\u00b5", 2.0), fq.Parameter("a", 1.0)], ties={"a": "3 * \u00b5"},
+    )  # fmt: skip
+    assert model["a"] == 6
+
+
+def test_a_reference_comes_back(tmp_path):
+    for kind in KINDS:
+        fq.write(record(reference=U + Y), tmp_path / f"a{kind}")
+        back = fq.read(tmp_path / f"a{kind}")
+        assert np.array_equal(back.reference, U + Y)
+        assert (back.input_names, back.output_names) == (("u",), ("y",))
+    two = fq.Record(np.c_[U, U[::-1]], Y, 0.01, reference=np.c_[U, Y])
+    with pytest.raises(InputError, match="one reference"):
+        fq.write(two, tmp_path / "b.csv")

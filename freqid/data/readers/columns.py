@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# numbers of an array that is beside the channels, and how much shorter than these it is
+_FEW = 16
+
+
 def in_numbers(values: object) -> object:
     """Dates and durations as seconds, since the first of them; others as they are."""
     array = np.asarray(values)
@@ -30,6 +34,7 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     import pandas as pd
 
     columns: dict[str, Array] = {}
+    left_out: list[str] = []
     scalars: dict[str, float] = {}
     for name, value in arrays.items():
         try:
@@ -37,6 +42,8 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
             # complex samples stay so: who uses that column is told
             x = x if x.dtype.kind == "c" and x.imag.any() else x.real.astype(float)
         except (TypeError, ValueError):
+            continue
+        if not x.size:
             continue
         if x.ndim == 0:
             scalars[name] = float(x.real)
@@ -52,6 +59,9 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     for name, x in columns.items():
         if len(x) == N:
             full[name] = x
+        elif len(x) <= _FEW and _FEW * len(x) < N:
+            # coefficients, sizes, a list of names' lengths: no channel beside so many samples
+            left_out.append(f"array {name!r} of {len(x)} numbers is no channel: left out")
         elif len(x) > 1 and N % len(x) == 0 and name != "time":
             full[name] = np.full(N, np.nan, dtype=x.dtype)
             full[name][:: N // len(x)] = x
@@ -63,4 +73,6 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
         step = 1 / rate
     if "time" not in full and step is not None:
         full["time"] = step * np.arange(N)
-    return pd.DataFrame(full)
+    frame = pd.DataFrame(full)
+    frame.attrs["notes"] = left_out
+    return frame

@@ -79,8 +79,6 @@ class _Walk:
             raise self.wrong(
                 f"{size} bytes announced, {max(len(self.content) - first, 0)} are there", place
             )
-        if kind in _SIZES and size % _SIZES[kind]:
-            raise self.wrong(f"{size} bytes of numbers of {_SIZES[kind]} bytes", place)
         self.at += step
         return kind, self.content[first : first + size]
 
@@ -97,7 +95,12 @@ class _Walk:
         word = int.from_bytes(flags[:4], self.order)
         which, is_complex = word & 0xFF, bool(word & _COMPLEX)
         if which == _OPAQUE:
-            raise self.wrong("an object of MATLAB's own; save its numbers as arrays", self.begin)
+            # an object of MATLAB's own: names, and what they stand for
+            while self.at < len(self.content):
+                part, data = self.element()
+                if part == _MATRIX:
+                    _Walk(self.path, self.order, data, self.begin).matrix(depth + 1)
+            return
         count = self._count()
         self._of({1, 2, 16}, "the name of an array")
         if which == _CELL:
@@ -139,8 +142,9 @@ class _Walk:
         kind, data = self.element()
         if kind not in _SIZES:
             raise self.wrong(f"numbers of type {kind}", self.begin)
-        if len(data) // _SIZES[kind] != count and not (text and kind == 16):
-            raise self.wrong(f"{len(data) // _SIZES[kind]} numbers for {count} entries", self.begin)
+        told = len(data) / _SIZES[kind]
+        if data and told != count and not (text and kind == 16):
+            raise self.wrong(f"{told:g} numbers for {count} entries", self.begin)
         check_size(self.path, 8 * count)
 
     def _parts(self, count: int, depth: int) -> None:

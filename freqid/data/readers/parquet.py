@@ -23,7 +23,8 @@ def read_parquet(path: Path) -> pd.DataFrame:
 
         layout = pyarrow.parquet.read_metadata(path)
         check_size(path, 8.0 * layout.num_rows * layout.num_columns)
-        return pd.read_parquet(path)
+        frame = pd.read_parquet(path)
+        return frame if frame.index.name in (None, "time") else frame.reset_index()
     except InputError:
         raise
     except ImportError:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # part of a text that may be no plain characters
 _ODD = 0.2
+_TWICE = 4
 _OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
 
 
@@ -29,16 +30,21 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     import pandas as pd
 
     text = _text(path)
+    if "\n" not in text:
+        # line ends of old machines
+        text = text.replace("\r", "\n")
     lines = [line for line in text[: 400 * LOOK].splitlines()[:LOOK] if line.strip()]
     if not lines:
         raise InputError("is empty; expected columns of samples under a line of names")
     layout = layout_of(_complete(lines, text), sep, decimal)
-    body = text.splitlines()
-    kept = [line for line in body if line.strip()][layout.first :]
+    begin = _begin(text, layout.first)
+    rows = (len(text) - begin) * len(lines) / max(sum(map(len, lines)) + len(lines), 1)
+    check_size(path, 8 * rows * len(layout.names), "its columns")
+    body = text[begin:].encode()
+    del text
     try:
         frame = pd.read_csv(
-            io.StringIO("\n".join(line.lstrip() if layout.separator == " " else line
-                                  for line in kept)),
+            io.BytesIO(body),
             sep=r"\s+" if layout.separator == " " else layout.separator,
             decimal=layout.decimal, header=None, comment="#", skipinitialspace=True,
             index_col=False,
@@ -46,6 +52,18 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise damaged("CSV", error) from None
     return _with_names(frame, layout)
+
+
+def _begin(text: str, skipped: int) -> int:
+    """Where the lines that are not blank begin of which so many are left out."""
+    at = 0
+    while skipped:
+        end = text.find("\n", at)
+        if end < 0:
+            return len(text)
+        skipped -= bool(text[at:end].strip())
+        at = end + 1
+    return at
 
 
 def _text(path: Path) -> str:
@@ -56,10 +74,11 @@ def _text(path: Path) -> str:
         else:
             stream: IO[bytes] = opener(path, "rb")  # type: ignore[operator]
             with stream:
-                limit = limit_of(path)
+                # the text itself is there twice for a moment, beside its columns
+                limit = limit_of(path) // _TWICE
                 raw = stream.read(limit + 1)
                 if len(raw) > limit:
-                    check_size(path, len(raw), "its text")
+                    check_size(path, _TWICE * len(raw), "its text")
     except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
         raise damaged("a compressed table", error) from None
     if b"\x00" in raw[:1000] and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):

@@ -20,6 +20,7 @@ from freqid.fitting.many.identity import at_conditions, fingerprint
 from freqid.fitting.many.progress import Bar
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
+from freqid.fitting.search.descent import uninterrupted
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
@@ -182,6 +183,7 @@ def _row(task: _Task, name: str, source: Source) -> Row:
         given = isinstance(source, (str, Path))
         data = read(source, **task.reading) if given else source  # type: ignore[arg-type]
         est = fit(task.model, data, **task.options)  # type: ignore[arg-type]
+        uninterrupted(est.message)
         std = np.sqrt(np.diag(est.covariance_matrix))
         row |= dict(zip(est.names, est.values.tolist(), strict=True))
         row |= {f"{n}_std": s for n, s in zip(est.names, std.tolist(), strict=True)}

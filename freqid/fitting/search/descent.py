@@ -184,6 +184,12 @@ def _padded(rows: FloatArray, size: int) -> FloatArray:
     return np.concatenate([rows, np.zeros((size - len(rows), *rows.shape[1:]))])
 
 
+def uninterrupted(message: str) -> None:
+    """KeyboardInterrupt where a fit says so: for what goes on after one, such as many fits."""
+    if message == INTERRUPTED:
+        raise KeyboardInterrupt
+
+
 def best_so_far(objectives: Sequence[Objective], start: FloatArray) -> Solution | None:
     """What an interrupted search has found on the first of some costs, by the others, or its start.
 
