@@ -45,6 +45,11 @@ def write_mat73(path, data):
 
 
 def write_uff(path, data):
+    write_uff_channels(path, {n: (data["time"], data[n]) for n in ("motor", "angle")})
+
+
+def write_uff_channels(path, channels):
+    """Channels (times, samples) by name."""
     units = {
         f"{axis}_{what}": value
         for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
@@ -56,12 +61,12 @@ def write_uff(path, data):
     sets = [
         pyuff.prepare_58(
             func_type=1, ver_num=0, load_case_id=0, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1,
-            rsp_ent_name="NONE", ref_ent_name="NONE", ord_data_type=4, num_pts=len(data["time"]),
-            data=data[name], x=data["time"], id1=name, id2="NONE", id3="NONE", id4="NONE",
-            id5="NONE", binary=0, abscissa_inc=2e-3, abscissa_spacing=1, abscissa_min=0.0,
-            z_axis_value=0.0, **units,
+            rsp_ent_name="NONE", ref_ent_name="NONE", ord_data_type=4, num_pts=len(x), data=y,
+            x=x, id1=name, id2="NONE", id3="NONE", id4="NONE", id5="NONE", binary=0,
+            abscissa_inc=x[1] - x[0], abscissa_spacing=1, abscissa_min=0.0, z_axis_value=0.0,
+            **units,
         )
-        for name in ("motor", "angle")
+        for name, (x, y) in channels.items()
     ]  # fmt: skip
     pyuff.UFF(str(path)).write_sets(sets, "overwrite")
 

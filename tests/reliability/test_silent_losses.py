@@ -92,27 +92,12 @@ def test_dates_in_arrays_are_times(tmp_path, unit):
 
 
 def test_channels_of_one_file_share_their_times(tmp_path):
-    pyuff = pytest.importorskip("pyuff")
-    path = str(tmp_path / "a.uff")
-    units = {
-        f"{axis}_{what}": value
-        for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
-        for what, value in {
-            "spec_data_type": 0, "len_unit_exp": 0, "force_unit_exp": 0, "temp_unit_exp": 0,
-            "axis_units_lab": "NONE",
-        }.items()
-    }  # fmt: skip
-    sets = [
-        pyuff.prepare_58(
-            func_type=1, ver_num=0, load_case_id=0, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1,
-            rsp_ent_name="NONE", ref_ent_name="NONE", ord_data_type=4, num_pts=60, data=U,
-            x=step * np.arange(60), id1=name, id2="NONE", id3="NONE", id4="NONE", id5="NONE",
-            binary=0, abscissa_inc=step, abscissa_spacing=1, abscissa_min=0.0, z_axis_value=0.0,
-            **units,
-        )
-        for name, step in (("u", 0.01), ("y", 0.02))
-    ]  # fmt: skip
-    pyuff.UFF(path).write_sets(sets, "overwrite")
+    pytest.importorskip("pyuff")
+    from tests.data.test_readers import write_uff_channels
+
+    path = tmp_path / "a.uff"
+    t = 0.01 * np.arange(60)
+    write_uff_channels(path, {"u": (t, U), "y": (2 * t, U)})
     with pytest.raises(InputError, match="times of its own"):
         fq.read(path)
 
