@@ -68,12 +68,19 @@ def bode(
     curves = shown(responses, labels, omega, styles, hold)
     between = hold or common_hold(responses)
     models = any(isinstance(r, Model | Estimate) for r in responses)
+    smooth = [
+        isinstance(given, Model | Estimate) or one.response.variance is None
+        for given, one in zip(responses, curves, strict=True)
+    ]
+    # turns cannot be counted along noise: where a model is drawn, each point of what is measured
+    # is put next to it
+    along = curves[smooth.index(True)].response if any(smooth) else curves[0].response
     with stacked(ax, 2) as ax:
         amplitude, phase = ax
-        for one in curves:
+        for one, known in zip(curves, smooth, strict=True):
             for pair in np.ndindex(one.response.response.shape[:2]):
                 named = one if not any(pair) else one._replace(label=None)
-                curve = bode_curve(named, curves[0].response, pair)
+                curve = bode_curve(named, along, pair, scattered=any(smooth) and not known)
                 _draw(curve, amplitude, phase, unit, decibel)
         if decibel:
             amplitude.set(xscale="log", ylabel="amplitude / dB")

@@ -1,6 +1,7 @@
 """Pictures take anything that has a response, and name their units."""
 
 import control
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -88,3 +89,24 @@ def test_no_global_setting_is_changed(plant):
     before = dict(mpl.rcParams)
     fq.bode(plant)
     assert dict(mpl.rcParams) == before
+
+
+def test_noise_turns_no_phase_away_from_its_model():
+    """Counted along the noise of an antiresonance a measured phase ended a turn off its model's."""
+    plant, f = fq.two_mass(), np.linspace(5, 60, 200)
+    G = plant.frequency_response(2 * np.pi * f).response
+    for seed in range(5):
+        e = np.random.default_rng(seed).standard_normal((2, *G.shape))
+        size = 0.3 * np.abs(G).min() + 0.02 * np.abs(G).mean()
+        noisy = fq.FrequencyResponse(
+            f, G + size * (e[0] + 1j * e[1]), variance=np.full(G.shape, 2 * size**2)
+        )
+        for order in ((noisy, plant), (plant, noisy)):
+            axes = fq.bode(*order, unit="Hz")
+            measured, model = (
+                next(x for x in axes[1].lines if len(x.get_xdata()) == len(f)),
+                next(x for x in axes[1].lines if len(x.get_xdata()) != len(f)),
+            )
+            along = np.interp(f, model.get_xdata(), model.get_ydata())
+            assert np.abs(measured.get_ydata() - along).max() < 181
+            plt.close("all")
