@@ -9,7 +9,17 @@ import pytest
 
 matplotlib.use("agg")
 
+import scipy.linalg
+from threadpoolctl import threadpool_limits
+
 import freqid as fq
+
+# as many processes as cores, each with one thread: idle workers of BLAS would take their turns.
+# Commands and examples that tests start inherit it.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    assert scipy.linalg
+    threadpool_limits(1, "blas")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 T1, T2 = 0.5e-3, 5e-3
 BAND = (10, 80)
