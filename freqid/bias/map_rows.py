@@ -112,17 +112,21 @@ def _together(
         coarse = np.flatnonzero(batch.unresolved(found.values, 10 * TOLERANCE) & found.converged)
         if len(coarse) == 0:
             break
+        finer: list[int] = []
         for i in coarse.tolist():
             try:
                 problems[i] = _problem(model, rows[i], shared, found.values[i])
+                finer.append(i)
             except InputError:
                 # told by the fit of that row alone
                 found.converged[i] = False
+        if not finer:
+            break
         batch = Batch(model, problems)
-        part = Batch(model, [problems[i] for i in coarse.tolist()])
-        again = descend(part, found.values[coarse])
-        found.values[coarse], found.cost[coarse] = again.values, again.cost
-        found.converged[coarse] = again.converged
+        part = Batch(model, [problems[i] for i in finer])
+        again = descend(part, found.values[finer])
+        found.values[finer], found.cost[finer] = again.values, again.cost
+        found.converged[finer] = again.converged
     settled = found.converged & _determined(batch, found)
     for place, i in enumerate(kept):
         if settled[place]:

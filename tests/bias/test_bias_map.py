@@ -224,3 +224,27 @@ def test_a_d_optimal_spectrum_satisfies_the_equivalence_theorem(plant):
     variance = np.einsum("ijk,ji->k", each, np.linalg.inv(H))
     assert variance.max() < 5 * 1.02
     assert np.allclose(variance[place], 5, rtol=0.03)
+
+
+def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
+    """Nodes that are too coarse for its end are no reason to call a row of the batch settled."""
+    from freqid.bias import map_rows
+
+    alone, made = [], map_rows._problem
+
+    def problem(model, row, shared, at=None):
+        if at is not None:
+            raise fq.checks.InputError("too dear")
+        return made(model, row, shared)
+
+    fit_alone = map_rows._alone
+    monkeypatch.setattr(map_rows, "_problem", problem)
+    monkeypatch.setattr(map_rows, "_alone", lambda *a: alone.append(1) or fit_alone(*a))
+    monkeypatch.setattr(
+        map_rows.Batch, "unresolved", lambda self, x, tolerance: np.ones(len(x), bool)
+    )
+    table = fq.bias_map(
+        fq.first_order(), {"2-40": fq.ChirpSpectrum(2, 40)}, [2, 5], ["zoh"], 5e-3, n_jobs=1
+    )
+    assert len(alone) == 2
+    assert table["converged"].all()

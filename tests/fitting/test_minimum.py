@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 import freqid as fq
@@ -148,3 +149,22 @@ def test_the_bias_bar_takes_band_and_weights_from_the_estimate(plant, fast):
         est = fq.fit(model, noisy, band=(10, 80), weights="noise")
         bars = fq.hold_bias(est, noisy)
         assert (bars["bias"].abs() < 1e-3 * bars["std"]).all()
+
+
+@pytest.mark.parametrize("bounds", [(0, 90), (110, 400), (0, 400)])
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
+def test_a_search_within_bounds_ends_where_an_exact_one_does(bounds, noise):
+    """Against a golden section over a, b eliminated: on the bound, or between them."""
+    u = fq.white_noise(600, seed=4)
+    record = fq.simulate(fq.first_order(), u, 1e-3).with_noise(noise, seed=5)
+    model = fq.first_order(a=sum(bounds) / 2).with_bounds(a=bounds)
+    est = fq.fit(model, record)
+
+    def cost(a):
+        return fq.fit(fq.first_order(a=a).fix("a"), record).cost
+
+    best = minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-6})
+    least = min(best.fun, *(cost(max(end, 1.0)) for end in bounds))
+    assert est.cost <= least * (1 + 1e-6) + 1e-12
+    assert bounds[0] <= est["a"] <= bounds[1]
+    assert est.converged

@@ -72,9 +72,17 @@ def test_nothing_known_is_nothing_given_back():
 
 def test_rounds_of_weights_end_too():
     _, count = whole()
-    model, _ = plant(count + 10)
-    est = fq.fit(model, RECORD, weights="noise")
-    assert est["a"] == pytest.approx(100, rel=0.05)
+    model, calls = plant(10**9)
+    full = fq.fit(model, RECORD, weights="noise")
+    assert not full.message.startswith("interrupted")
+    # in the rounds that follow the first fit: a step more, and no further round
+    for after in range(count + 2, len(calls) - 2, 3):
+        model, used = plant(after)
+        est = fq.fit(model, RECORD, weights="noise")
+        assert est.message.startswith("interrupted")
+        # what the estimate itself takes, and no round
+        assert len(used) <= after + 5
+        assert est["a"] == pytest.approx(full["a"], rel=0.05)
 
 
 def test_what_goes_on_after_a_fit_ends_too(tmp_path):
