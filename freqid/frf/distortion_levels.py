@@ -21,6 +21,8 @@ _APART = 0.15
 _CHANCE = 1e-3
 # degrees of freedom below which an F-distributed term has no variance
 _FEWEST = 4.5
+# relative variance of a response in double precision, with room
+_ROUNDING = 1e-26
 
 
 def grouped(size: FloatArray) -> list[list[int]]:
@@ -58,10 +60,13 @@ def between_levels(
         assert frf.variance is not None
         assert base.variance is not None
         change = frf.response - base.response
-        both = np.maximum(frf.variance + base.variance, 1e-300)
+        # data without noise have that of their rounding
+        least = _ROUNDING * np.abs(base.response) ** 2 + 1e-300
+        own_noise, its_noise = (np.maximum(v, least) for v in (frf.variance, base.variance))
+        both = own_noise + its_noise
         each = np.abs(change) ** 2 / both
         # of a sum of two variances (Satterthwaite, Biometrics Bulletin 2, 1946)
-        own_freedom = both**2 / (frf.variance**2 / free + base.variance**2 / freedom[0])
+        own_freedom = 1 / ((own_noise / both) ** 2 / free + (its_noise / both) ** 2 / freedom[0])
         d = np.maximum(own_freedom, _FEWEST)
         mean = (d / (d - 2)).mean()
         scatter = np.sqrt((d**3 / ((d - 2) ** 2 * (d - 4))).sum()) / each.size

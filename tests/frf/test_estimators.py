@@ -361,3 +361,12 @@ def test_three_realisations_of_each_level_are_enough():
     assert false <= 1
     runs = [loud(s, level, 0.5) for level in (0.3, 1.0) for s in range(3)]
     assert fq.distortion(runs, 1.0, skip=1).warnings
+
+
+def test_levels_without_noise():
+    """No scatter at all is no reason to say nothing."""
+    for cubic in (0.0, 0.5):
+        runs = [loud(1, level, cubic, noise=0.0) for level in (0.3, 1.0)]
+        found = fq.distortion(runs, 1.0, skip=1)
+        assert bool(found.warnings) == (cubic > 0)
+        assert np.isfinite(found.levels["p_value"]).all()
