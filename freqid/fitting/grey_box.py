@@ -21,7 +21,7 @@ from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading, enough_rows, read_for
 from freqid.fitting.search.descent import Solution, minimise
-from freqid.fitting.search.stages import Found
+from freqid.fitting.search.stopping import Found
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
 from freqid.lti import ZeroOrderHold

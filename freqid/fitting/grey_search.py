@@ -8,36 +8,30 @@ from dataclasses import dataclass
 from functools import partial
 from typing import cast
 
-import numpy as np
-
-from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import rate_factor
-from freqid.fitting.black_box.late import in_step, whole_samples
-from freqid.fitting.black_box.reference import Reference
+from freqid.checks import FloatArray, InputError
+from freqid.fitting.beside import Beside, beside_of, guide_of
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
-from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, best_so_far, minimise, polish
-from freqid.fitting.search.log_stage import Smooth, log_targets
+from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.noise_floor import noise_floor
-from freqid.fitting.search.stages import Bound, Found, Search
+from freqid.fitting.search.stages import Search
+from freqid.fitting.search.stopping import Found
 from freqid.lti import Hold
-from freqid.models import GreyBox
 
 # lines on which the minimum is looked for, and how many times more for noise as large as the signal
 _LINES, _NOISY = 600, 10
-# lines on which many starts walk together, and evaluations down to data's own rounding
-_ROUND_LINES, _DIRECT = 60, 40
-# samples of an unknown delay that are tried
-_DELAYS = 20
+# and how many times more where these leave a doubt
+_MORE = 8
+# evaluations down to data's own rounding
+_DIRECT = 40
 # starts of experiments at many places beside which there are no black boxes
 _ALONE = 3
-# lines that each of several black boxes takes at least
-_LEAST_LINES = 100
 # a start that costs so many times more on a part of the lines costs more on all
 _FAR = 1.1
 # local noise, and a cost, of this part of the data's energy are those of their rounding
@@ -82,35 +76,68 @@ def _search(
     scout = objective if few is spectral and not in_time else Objective(structure, few)
     scouts.append(scout)
     found = None if in_time else _without_noise(scout, structure, few, floor)
-    if found is not None:
-        objective.n_evaluations = scout.n_evaluations
-        if scout is objective:
-            return found
-        return dataclasses.replace(found, solution=_on_all(objective, scout, found))
-    beside = _reference(structure, at_lines, lines)
-    start = structure.start
-    if isinstance(beside, Beside) and structure.model.delay_sources:
-        start = beside.begun(structure, start)
-    smooth = None if beside is None else beside.at_place
-    targets = log_targets(few, smooth)
-    rounds = None if smooth is None else partial(log_targets, few, smooth, _ROUND_LINES)
-    # a hold whose period is unknown is not one that the black box has
-    share = sum(e.n_lines for e in few) / sum(e.n_lines for e in spectral)
-    bound = None if beside is None or structure.unknown else _bound(beside, structure, share)
-    # who begins with a mode out of sight means it
-    hidden = partial(_hidden, structure, [r.hold for r in at_lines])
-    aliased = (lambda x: False) if hidden(start) else hidden
-    search = Search(scout, targets, floor, bound, rounds, aliased)
-    if beside is None and isinstance(structure, PlacedStructure):
-        # nothing says when it is enough, and each start is a fit of everything
-        search.most = _ALONE
-    found = search.run(start, options.n_starts, options.seed)
+    if found is None:
+        every = sum(e.n_lines for e in spectral)
+        share = sum(e.n_lines for e in few) / every
+        beside = Surveyed(structure, at_lines, floor, lines, share)
+        found = _searched(beside, scout, options)
+        if not found.sure and share < 1 and options.n_starts is None:
+            # what so many lines leave open more of them may tell
+            more = thinned_to(spectral, _MORE * lines)
+            wide = Objective(structure, more)
+            scouts.append(wide)
+            wide.n_evaluations = scout.n_evaluations
+            share = sum(e.n_lines for e in more) / every
+            beside = Surveyed(structure, at_lines, floor, _MORE * lines, share)
+            again = _searched(beside, wide, options, found.solution.x)
+            starts = found.n_starts + again.n_starts - 1
+            found, scout = dataclasses.replace(again, n_starts=starts), wide
     objective.n_evaluations = scout.n_evaluations
     if in_time:
         return dataclasses.replace(found, solution=_in_time(objective, structure, found))
     if scout is objective:
         return found
     return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """What is searched: a structure on about so many ``lines`` of its data, a ``share`` of all."""
+
+    structure: GreyStructure
+    readings: Sequence[Reading]
+    floor: float
+    lines: int
+    share: float
+
+
+def _searched(
+    data: Surveyed, scout: Objective, options: SearchOptions, known: FloatArray | None = None
+) -> Found:
+    """The minimum on these lines, aimed at black boxes on the same, no worse than what is known."""
+    structure, readings, start = data.structure, data.readings, data.structure.start
+    beside = beside_of(structure, readings, data.lines)
+    if isinstance(beside, Beside) and structure.model.delay_sources:
+        start = beside.begun(structure, start)
+    few = cast("Sequence[SpectralExperiment]", scout.experiments)
+
+    def deepened(x: FloatArray) -> Guide | None:
+        nonlocal beside
+        deeper = None if beside is None else beside.deepened(structure, x, readings)
+        if deeper is None:
+            return None
+        beside = deeper
+        return guide_of(beside, structure, few, data.share)
+
+    # who begins with a mode out of sight means it
+    hidden = partial(_hidden, structure, [r.hold for r in readings])
+    aliased = (lambda x: False) if hidden(start) else hidden
+    guide = guide_of(beside, structure, few, data.share)
+    search = Search(scout, guide, data.floor, aliased, deepened)
+    if beside is None and isinstance(structure, PlacedStructure):
+        # nothing says when it is enough, and each start is a fit of everything
+        search.most = _ALONE
+    return search.run(start, options.n_starts, options.seed, known)
 
 
 def _hidden(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:
@@ -142,133 +169,6 @@ def _lines_wanted(experiments: Sequence[SpectralExperiment], noise: float) -> in
     """How many lines tell one minimum from another: more of them where noise outweighs signal."""
     energy = sum(e.energy for e in experiments)
     return int(_LINES * (1 + _NOISY * noise / max(energy - noise, 1e-3 * energy)))
-
-
-@dataclass(frozen=True)
-class Beside:
-    """A black box of the plant's order, and by how many samples its inputs had been put in step."""
-
-    box: Reference
-    shifts: tuple[int, ...]
-    period: float
-
-    @property
-    def boxes(self) -> list[Reference]:
-        """It, and no other."""
-        return [self.box]
-
-    def at_place(self, place: int) -> Smooth:
-        """The response: it is the same at every place."""
-        return self.response
-
-    def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
-        """Response (outputs, inputs, K) at omega (rad/s), and its relative standard error."""
-        G, error = self.box.response(omega)
-        if not any(self.shifts):
-            return G, error
-        turns = np.outer(np.array(self.shifts) * self.period, omega)
-        return G * np.exp(-1j * turns), error
-
-    def begun(self, structure: GreyStructure, start: FloatArray) -> FloatArray:
-        """The start with its unknown delays within the samples in which the black box has them."""
-        moved = start.copy()
-        for source, q in zip(structure.model.delay_sources, self.shifts, strict=True):
-            if source in structure.physical_names:
-                i = structure.physical_names.index(source)
-                delay = start[i] * structure.scale[i] / self.period
-                if not q - 1.5 < delay < q + 0.5:
-                    inside = max(q - 0.5, 0.0) * self.period / structure.scale[i]
-                    moved[i] = np.clip(inside, structure.lower[i], structure.upper[i])
-        return moved
-
-
-@dataclass(frozen=True)
-class BesidePlaces:
-    """A black box for each group of experiments that meet the same plant."""
-
-    boxes: list[Reference]
-    number: dict[int, int]
-
-    @classmethod
-    def of(
-        cls, structure: PlacedStructure, readings: Sequence[Reading], lines: int
-    ) -> BesidePlaces | None:
-        """None where there are too many of them, or one has none."""
-        groups = structure.groups
-        if structure.black_boxes > MOST_UNKNOWNS or structure.model.delay_sources:
-            return None
-        count = max(lines // len(groups), _LEAST_LINES)
-        try:
-            boxes = [
-                Reference.of(structure.at(structure.start, g[0]), [readings[i] for i in g], count)
-                for g in groups
-            ]
-        except (InputError, np.linalg.LinAlgError):
-            return None
-        return cls(boxes, {i: n for n, group in enumerate(groups) for i in group})
-
-    def at_place(self, place: int) -> Smooth:
-        """The response that an experiment met."""
-        return self.boxes[self.number[place]].response
-
-
-def _reference(
-    structure: GreyStructure, readings: Sequence[Reading], lines: int
-) -> Beside | BesidePlaces | None:
-    """A black box of the plant's order on the lines of the search; None where there is none.
-
-    Of an output slower than its input a sampled one finds no minimum to rely on. Where a delay is
-    unknown, it is the best of those with whole samples of delay.
-    """
-    if any(rate_factor(r.data) > 1 for r in readings):
-        return None
-    if isinstance(structure, PlacedStructure):
-        return BesidePlaces.of(structure, readings, lines)
-    model, tried = structure.at(structure.start), []
-    for shifts in _candidates(structure, model, readings):
-        try:
-            seen = [in_step(r, shifts) for r in readings]
-            box = Reference.of(model, seen, lines)
-        except InputError:
-            continue
-        # each has lost a few samples more than the one before
-        rows = box.objective.n_rows - box.unknowns - box.solution.point.n_initial
-        tried.append((box.cost / max(rows, 1), box, shifts, readings[0].sample_time))
-    if not tried:
-        return None
-    _, box, shifts, period = min(tried, key=lambda t: t[0])
-    return Beside(box, shifts, period)
-
-
-def _candidates(
-    structure: GreyStructure, model: GreyBox, readings: Sequence[Reading]
-) -> list[tuple[int, ...]]:
-    """Whole samples of delay of each input: those of the start, and others where it is unknown."""
-    own = whole_samples(model, readings[0])
-    unknown = [s in structure.physical_names for s in model.delay_sources]
-    if not any(unknown):
-        return [own]
-    longest = max(_DELAYS, 3 * max(own))
-    shared = [q for q in range(longest + 1) if (q,) * len(own) != own]
-    return [own] + [
-        tuple(q if free else kept for free, kept in zip(unknown, own, strict=True)) for q in shared
-    ]
-
-
-def _bound(beside: Beside | BesidePlaces, structure: GreyStructure, share: float) -> Bound | None:
-    """What no plant of the order goes below; None where the black box itself has no minimum.
-
-    Lines that stand for others, a ``share`` of all, tell no more than themselves.
-    """
-    boxes = beside.boxes
-    # a delay leaves samples out, or is one that the black box does not have
-    if not all(b.solution.converged for b in boxes) or structure.model.delay_sources:
-        return None
-    rows = sum(
-        int(share * b.objective.n_rows) - b.unknowns - b.solution.point.n_initial for b in boxes
-    )
-    unknowns = sum(b.unknowns for b in boxes)
-    return Bound(sum(b.cost for b in boxes), unknowns - len(structure.names), rows)
 
 
 def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:

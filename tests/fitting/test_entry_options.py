@@ -30,7 +30,7 @@ def in_a_loop(seed, size=4000, feedback=3.0, level=1.5):
 
 
 def test_a_record_with_a_reference_is_fitted_through_it():
-    gains, through, inside = [], [], []
+    poles, through, inside = [], [], []
     for seed in range(12):
         record = in_a_loop(seed)
         est = fq.fit(LAG, record)
@@ -38,10 +38,10 @@ def test_a_record_with_a_reference_is_fitted_through_it():
         row = est.parameters.loc["b"]
         through.append(est["b"])
         inside.append(row["lower"] <= 50 <= row["upper"])
-        gains.append(fq.fit(LAG, record, reference=False)["b"])
+        poles.append(fq.fit(LAG, record, reference=False)["a"])
     assert abs(np.median(through) - 50) < 3
-    # a direct fit is drawn towards the inverse of the controller
-    assert abs(np.median(gains) - 50) > 8
+    # a direct fit is drawn towards the inverse of the controller, or to a pole that explains noise
+    assert np.abs(np.array(poles) - 20).min() > 8
     assert sum(inside) >= 9
 
 

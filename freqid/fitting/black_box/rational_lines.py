@@ -143,6 +143,13 @@ class RationalLines:
         assert basis is not None
         return basis, x
 
+    def residual(self, found: Fitted) -> ComplexArray:
+        """What a model leaves of the data, (K,)."""
+        n = len(found.poles)
+        columns = self._columns(found.basis, 1 / found.basis.denominator(found.x))
+        left: ComplexArray = self.Y - found.x[:-n] @ np.concatenate(columns)
+        return left
+
     def _columns(self, basis: PolynomialBasis, inverse: ComplexArray) -> list[ComplexArray]:
         """Those of b and of each t, over the denominator."""
         n = len(basis.Q) - 1

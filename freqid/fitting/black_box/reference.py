@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.refinement import exchanged_model, first_model
 from freqid.fitting.black_box.subspace import plane_for
+from freqid.fitting.cost.box_distance import Surroundings
 from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
@@ -24,6 +27,8 @@ from freqid.models import GreyBox, late_sampled
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
+# a cost that is less by this part is that of another minimum
+_DEEPER = 1e-4
 
 
 def lines_in_plane(
@@ -121,6 +126,43 @@ class Reference:
         """The same followed to the minimum on all lines of other readings of the same data."""
         return self._from(self.chart.moved(self.solution.x), readings)
 
+    def deepened(self, model: GreyBox, readings: Sequence[Reading]) -> Reference | None:
+        """One that leaves less, begun from the model or with modes exchanged; None where none does.
+
+        On the same lines.
+        """
+        best: Reference | None = None
+        for begin in (partial(self._around, model, readings), self._exchanged):
+            try:
+                found = self._beginning(begin())
+            except (InputError, np.linalg.LinAlgError):
+                continue
+            least = best or self
+            if found is None or found.cost > least.cost:
+                continue
+            ended = found.solution.converged and not least.solution.converged
+            if ended or found.cost < least.cost * (1 - _DEEPER):
+                best = found
+        return best
+
+    def _exchanged(self) -> StateSpace | None:
+        """A model on the same lines that leaves less, by modes exchanged."""
+        poles = np.linalg.eigvals(self.chart.matrices(self.solution.x).A).astype(complex)
+        lines = cast("Sequence[SpectralExperiment]", self.objective.experiments)
+        return exchanged_model(lines, poles, self.chart.feedthrough)
+
+    def _beginning(self, centre: StateSpace | None) -> Reference | None:
+        """The minimum next to a model in the plane of the chart, on the same lines."""
+        if centre is None or not all(np.isfinite(M).all() for M in centre):
+            return None
+        chart = Chart(centre, self.chart.feedthrough, self.chart.plane, self.chart.dt)
+        return self._descended(Objective(chart, self.objective.experiments), self.bilinear)
+
+    def _around(self, model: GreyBox, readings: Sequence[Reading]) -> StateSpace:
+        """The sampled model of a plant, in the plane of the chart."""
+        in_z = _bilinear(model, self.chart.dt) if self.bilinear else _held(model, readings[0].hold)
+        return to_plane(in_z, self.chart.plane)
+
     def _from(self, chart: Chart, readings: Sequence[Reading]) -> Reference:
         """The minimum next to the centre of a chart, on all lines."""
         seen = [r.at_lines() for r in readings]
@@ -132,8 +174,7 @@ class Reference:
     def beside(self, model: GreyBox, readings: Sequence[Reading]) -> Reference:
         """One that begins from a model: it leaves no more than the model does."""
         chart = self.chart
-        in_z = _bilinear(model, chart.dt) if self.bilinear else _held(model, readings[0].hold)
-        centre = to_plane(in_z, chart.plane)
+        centre = self._around(model, readings)
         return self._from(Chart(centre, chart.feedthrough, chart.plane, chart.dt), readings)
 
     def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -142,11 +183,22 @@ class Reference:
         seen = 2 * np.arctan(omega * dt / 2) / dt if self.bilinear else omega
         G, dG = self.chart.response(self.solution.x, seen, None)
         half = np.linalg.pinv(self.solution.point.jacobian)
-        freedom = self.objective.n_rows - self.unknowns - self.solution.point.n_initial
-        noise = self.cost / max(freedom, 1)
         spread = np.tensordot(half.T, dG, (1, 0))
-        std = np.sqrt(noise * (np.abs(spread) ** 2).sum(axis=0))
+        std = self.noise * np.sqrt((np.abs(spread) ** 2).sum(axis=0))
         return G, std / np.maximum(np.abs(G), 1e-300)
+
+    def surroundings(self, omega: FloatArray) -> Surroundings:
+        """The response at omega (rad/s), and what a small change of it costs."""
+        dt = self.chart.dt
+        seen = 2 * np.arctan(omega * dt / 2) / dt if self.bilinear else omega
+        G, dG = self.chart.response(self.solution.x, seen, None)
+        return Surroundings(omega, G, dG, self.solution.point.jacobian)
+
+    @property
+    def noise(self) -> float:
+        """Standard error of the rows that it leaves."""
+        freedom = self.objective.n_rows - self.unknowns - self.solution.point.n_initial
+        return float(np.sqrt(self.cost / max(freedom, 1)))
 
 
 def _held(model: GreyBox, hold: Hold) -> StateSpace:

@@ -14,6 +14,7 @@ from itertools import chain
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.exchange import exchanged
 from freqid.fitting.black_box.rational_lines import (
     FEW,
     Fitted,
@@ -55,6 +56,20 @@ def first_model(
         lines = RationalLines(experiments, feedthrough)
         best = lines.minimum(best.poles)
     return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
+
+
+def exchanged_model(
+    experiments: Sequence[SpectralExperiment], poles: ComplexArray, feedthrough: bool
+) -> StateSpace | None:
+    """A model that leaves less than the one with these poles, by modes exchanged; or None."""
+    if not all(e.single and e.one_to_one for e in experiments):
+        return None
+    lines = RationalLines(experiments, feedthrough)
+    before = lines.below(poles)
+    if before is None or before.cost <= lines.rounding:
+        return None
+    after = exchanged(lines, before, fewer_poles)
+    return None if after is before else lines.state_space(after)
 
 
 def best_of(
@@ -179,12 +194,12 @@ def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:
         if more == 0:
             yield poles
         elif (larger := lines.minimum(poles)) is not None:
-            yield _fewer(lines, larger.poles, order)
+            yield fewer_poles(lines, larger.poles, order)
     if order > FEW:
         yield nowhere
 
 
-def _fewer(lines: RationalLines, poles: ComplexArray, order: int) -> ComplexArray:
+def fewer_poles(lines: RationalLines, poles: ComplexArray, order: int) -> ComplexArray:
     """``order`` of the poles: taken away are, in turn, the real ones and pairs least missed."""
     groups = [[p] if p.imag == 0 else [p, p.conj()] for p in poles[poles.imag >= 0]]
     while (over := sum(map(len, groups)) - order) > 0:

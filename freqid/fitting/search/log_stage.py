@@ -82,7 +82,7 @@ def log_targets(
             targets.append(LogResponse(*response, e.hold, place=e.place))
             continue
         smooth = black_boxes(e.place)
-        omega = _told(e.lines.omega[e.lines.counted & (e.lines.omega > 0)], smooth, count)
+        omega = told(e.lines.omega[e.lines.counted & (e.lines.omega > 0)], smooth, count)
         if len(omega) < 2:
             return []
         at = omega * (1 - 1j * damping) if damping else omega
@@ -92,7 +92,7 @@ def log_targets(
     return targets
 
 
-def _told(omega: FloatArray, smooth: Smooth, count: int) -> FloatArray:
+def told(omega: FloatArray, smooth: Smooth, count: int) -> FloatArray:
     """About so many of the lines at which the response is known: where it turns and bends, half of
     them, and the others evenly, along the frequency and along its logarithm.
     """

@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from freqid.checks import Array, FloatArray
+from freqid.fitting.cost.box_distance import BoxDistance
 from freqid.fitting.cost.objective import ScannableStructure
 from freqid.fitting.search.batched import descend
 from freqid.fitting.search.log_stage import LogResponse, LogStructure
@@ -57,6 +58,26 @@ class _LogBatch:
         return cost, g + self.leash * x, H + self.leash * np.eye(P)
 
 
+class _NearBatch:
+    """What S plants cost more than black boxes, by their unknowns as they are: signs may change."""
+
+    def __init__(self, inner: ScannableStructure, near: Sequence[BoxDistance], count: int) -> None:
+        self.inner, self.near = inner, near
+        self.energy = np.full(count, sum(t.energy for t in near))
+
+    def normal(self, x: FloatArray, which: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Cost, JᵀR and JᵀJ of some."""
+        S, P = x.shape
+        cost, g, H = np.zeros(S), np.zeros((S, P)), np.zeros((S, P, P))
+        for target in self.near:
+            G, dG = self.inner.sensitivities(x, target.omega, target.hold, target.place)
+            r, J = target.error(G), target.relative(dG)
+            cost += np.einsum("sk,sk->s", r, r)
+            g += (J @ r[..., None])[..., 0]
+            H += J @ J.swapaxes(-1, -2)
+        return cost, g, H
+
+
 @dataclass(frozen=True)
 class Place:
     """Where walks have led: the unknowns, the first stage's cost, and how many came here."""
@@ -86,6 +107,23 @@ def walked(
         found = descend(batch, begin, last_step=_LAST_STEP, limit=limit)
         x = np.array([s.value(row) for s, row in zip(structures, found.values, strict=True)])
         cost = found.cost
+    return _places(x, cost)
+
+
+def nearest(
+    places: Sequence[Place], inner: ScannableStructure, boxes: Sequence[BoxDistance]
+) -> list[Place]:
+    """Where places lead in the distance from the black boxes themselves, nearest first."""
+    if not places:
+        return []
+    begin = np.array([place.x for place in places])
+    batch = _NearBatch(inner, boxes, len(begin))
+    found = descend(batch, begin, last_step=_LAST_STEP, limit=_SHARP)
+    return _places(found.values, found.cost)
+
+
+def _places(x: FloatArray, cost: FloatArray) -> list[Place]:
+    """Ends of walks (S, P), those that are alike as one, best first."""
     places: list[Place] = []
     for i in np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable"):
         if not np.isfinite(cost[i]):

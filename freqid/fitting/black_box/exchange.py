@@ -1,0 +1,98 @@
+"""One mode for another: out of a rational function's minimum where a different one is worth more.
+
+A black box of a fixed order explains the strongest modes that its descent has met. Where another
+one, which it has not, explains more than the weakest of them, no descent gets there: in between
+the cost is higher. So a mode is added where what is left asks for one, and the least missed of all
+is taken away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.black_box.rational_lines import Fitted, RationalLines
+
+# how often modes are exchanged at the most, how many are tried each time, and the least gain
+_ROUNDS, _TRIED, _GAIN = 4, 4, 1e-4
+# places of narrow modes, half as wide as so many lines, and of wide ones at so many radii
+_NARROW, _LINES_WIDE, _WIDE, _RADII = 160, 2.0, 24, (0.6, 0.9, 0.97)
+# poles that are closer than this part of their distance from the circle are one
+_NEAR = 0.5
+# real poles that are tried
+_REAL = (-0.9, -0.5, 0.2, 0.5, 0.8, 0.95, 0.99)
+
+# so many of some poles, the least missed taken away
+Fewer = Callable[[RationalLines, ComplexArray, int], ComplexArray]
+
+
+def exchanged(lines: RationalLines, best: Fitted, fewer: Fewer) -> Fitted:
+    """The least minimum to which exchanges of one mode lead, ``best`` itself where none does."""
+    order = len(best.poles)
+    for _ in range(_ROUNDS):
+        before = best.cost
+        for added in _asked_for(lines, best):
+            larger = lines.below(np.append(best.poles, added))
+            if larger is None:
+                continue
+            poles = fewer(lines, larger.poles, order)
+            found = None if _same(poles, best.poles) else lines.below(poles)
+            if found is not None and found.cost < best.cost and len(found.poles) == order:
+                best = found
+        if best.cost > before * (1 - _GAIN):
+            break
+    return best
+
+
+def _same(poles: ComplexArray, others: ComplexArray) -> bool:
+    """Whether poles lie where others do, compared to how far these are from the circle."""
+    if len(poles) != len(others):
+        return False
+    apart = np.abs(poles[:, None] - others)
+    return bool((apart.min(axis=1) <= _NEAR * np.abs(1 - np.abs(poles))).all())
+
+
+@np.errstate(all="ignore")
+def _asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
+    """The pairs, and the real pole, that explain most of what is left, one for each place."""
+    left = lines.residual(best)
+    pairs = _candidates(lines.w)
+    gains = _gains(lines, left, pairs)
+    picked: list[ComplexArray] = []
+    for i in np.argsort(-gains):
+        p = pairs[i]
+        near = [abs(p - q[0]) < 2 * max(1 - abs(p), 1 - abs(q[0])) for q in picked]
+        if not any(near):
+            picked.append(np.array([p, p.conj()]))
+        if len(picked) == _TRIED:
+            break
+    real = np.array(_REAL, complex)
+    costs = [lines.cost(np.append(best.poles, r)) for r in real]
+    return [*picked, real[[int(np.argmin(costs))]]]
+
+
+def _candidates(w: ComplexArray) -> ComplexArray:
+    """Poles next to lines, as wide as a few of them, and wide ones all over the circle."""
+    angle = np.unique(np.abs(np.angle(w)))
+    angle = angle[(angle > 0) & (angle < np.pi)]
+    if len(angle) < 3:
+        return np.zeros(0, complex)
+    width = np.clip(_LINES_WIDE * np.gradient(angle), 1e-6, 0.5)
+    at = np.unique(np.linspace(0, len(angle) - 1, _NARROW).astype(int))
+    narrow = np.exp(1j * angle[at]) * (1 - width[at])
+    spread = angle[np.unique(np.linspace(0, len(angle) - 1, _WIDE).astype(int))]
+    wide = np.outer(_RADII, np.exp(1j * spread)).ravel()
+    return np.concatenate([narrow, wide])
+
+
+def _gains(lines: RationalLines, left: ComplexArray, poles: ComplexArray) -> FloatArray:
+    """What a pair of poles alone explains of what is left, (poles,)."""
+    section = lines.driven / ((lines.w - poles[:, None]) * (lines.w - poles[:, None].conj()))
+    second = section * lines.w
+    a, b = (np.abs(section) ** 2).sum(axis=1), (np.abs(second) ** 2).sum(axis=1)
+    c = (section.conj() * second).real.sum(axis=1)
+    x, y = (section.conj() @ left).real, (second.conj() @ left).real
+    gains = (b * x**2 - 2 * c * x * y + a * y**2) / (a * b - c**2)
+    return np.where(np.isfinite(gains), gains, 0)
