@@ -40,11 +40,13 @@ def descend(
     known: FloatArray | None = None,
     last_step: float = _LAST_STEP,
     limit: int = _LIMIT,
+    gain: float = 0.0,
 ) -> Answers:
     """Levenberg-Marquardt steps of all problems together from scaled ``start`` (S, P).
 
     Damping after Nielsen (IMM-REP-1999-05, Technical University of Denmark). A problem leaves when
-    its steps have died out, or its cost is rounding, or it has come to a minimum that is ``known``.
+    its steps have died out, or gain less than the part ``gain`` of the cost, or its cost is
+    rounding, or it has come to a minimum that is ``known``.
     """
     x = start.copy()
     S = len(x)
@@ -69,6 +71,7 @@ def descend(
         better = (trial_cost < cost[on]) | settling
         ratio = (cost[on] - trial_cost) / predicted
         taken, refused = on[better], on[~better]
+        little = cost[taken] - trial_cost[better] < gain * cost[taken]
         x[taken], cost[taken] = trial[better], trial_cost[better]
         g[taken], H[taken] = trial_g[better], trial_H[better]
         last[taken] = size[better]
@@ -82,9 +85,8 @@ def descend(
         converged[refused[ended]] = True
         damping[refused] = np.maximum(damping[refused], 1e-4) * grow[refused]
         grow[refused] *= 2
-        converged[taken] |= (size[better] <= last_step) | (
-            cost[taken] <= 1e-26 * batch.energy[taken]
-        )
+        converged[taken] |= (size[better] <= last_step) | little
+        converged[taken] |= cost[taken] <= 1e-26 * batch.energy[taken]
         active &= ~converged & (damping < 1e12)
         if known is not None:
             active &= (np.abs(x - known) > 1e-4 * np.abs(known)).any(axis=1)

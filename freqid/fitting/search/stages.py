@@ -19,7 +19,7 @@ from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.log_stage import LogStructure
 from freqid.fitting.search.scatter import around, promising
 from freqid.fitting.search.stopping import BUDGET, ROUND, Found, StopRule
-from freqid.fitting.search.walks import Place, nearest, walked
+from freqid.fitting.search.walks import Place, distance, nearest, walked
 
 # a first stage this much worse than the best one so far is not followed up
 _HOPELESS = 4.0
@@ -32,8 +32,11 @@ _PROMISED, _LIKE = 2.0, 1e-5
 _LIMIT, _FIRST_LIMIT, _FIRST_STEP = 120, 80, 0.02
 # how often a black box is taken out of a minimum that was not its least
 _DEEPENED = 3
-# relative gain of the cost that ends the descent with signs kept
-_KEPT = 1e-5
+# a distance from a black box that is off the true gap by this part of it tells nothing; the part of
+# that of the best so far at which another is nearer; walks that are enough where none is
+_TRUE, _NEARER, _ENOUGH = 0.3, 0.9, 3
+# relative gain of the cost that ends a first stage, and the descent with signs kept
+_FIRST_GAIN, _KEPT = 1e-3, 1e-5
 
 
 # starts tried, starts that led to a place, the minimum below it, and whether a round ends here
@@ -62,6 +65,7 @@ class Search:
         self.aliased, self.deepened = aliased, deepened
         self.floor, self.most = floor, BUDGET
         self._best_log_cost = np.inf
+        self._best: Solution | None = None
 
     def run(
         self,
@@ -90,6 +94,7 @@ class Search:
             )
             if solution is not None:
                 found = self._better(found, solution, visits, rule)
+            self._best = found.solution
             # where there is doubt a round counts when all that it found was looked at
             over = rule.enough(found) and (ended or not rule.doubts(found))
             if over and not self.aliased(found.solution.x):
@@ -154,7 +159,15 @@ class Search:
             number += 1
             yield count, 0, None, False
             if near:
-                yield from self._below(nearest(places, structure, near), known)
+                promised = nearest(places, structure, near)
+                alike = self._alike(promised, structure) if rule.near(self._best) else 0
+                if alike:
+                    yield 0, alike, self._best, True
+                if alike >= _ENOUGH:
+                    return
+                if alike:
+                    continue
+                yield from self._below(promised, known)
             best = min([best, *(place.cost for place in places)])
             for place in places[:_FOLLOWED]:
                 if place.cost > _HOPELESS * best:
@@ -163,6 +176,20 @@ class Search:
                 if end is not None:
                     yield 0, place.visits, end, False
             yield 0, 0, None, True
+
+    def _alike(self, places: Sequence[Place], structure: ScannableStructure) -> int:
+        """How many walks lead as near to the black box as the best so far, where none leads nearer.
+
+        None, where one does, or where the distance does not say what the best costs.
+        """
+        best, bound = self._best, self.guide.bound
+        if best is None or bound is None or not places:
+            return 0
+        own, gap = distance(best.x, structure, self.guide.distances), best.cost - bound.cost
+        true = abs(own - gap) <= _TRUE * gap
+        if not true or places[0].cost < _NEARER * own:
+            return 0
+        return sum(place.visits for place in places if place.cost <= own / _NEARER)
 
     def _below(
         self, places: Sequence[Place], known: list[tuple[float, Solution | None]]
@@ -201,7 +228,9 @@ class Search:
                 return found
             own = self.objective.point(start)
             beside = own is None or found.solution.cost <= own.cost
-            if beside and (rule.sure(found) or own is None):
+            # other starts are tried where this one leaves a doubt
+            trusted = rule.sure(found) or (rule.n_starts is None and rule.bound is not None)
+            if beside and (trusted or own is None):
                 return found
             other = minimise(self.objective, start, limit=_LIMIT)
             # one start that ends twice in one place is no other that agrees
@@ -226,9 +255,7 @@ class Search:
         xi = np.where(structure.log, 0.0, start)
         try:
             # to a minimum which need only be near that of the second stage
-            walked = polish(first_stage, xi, last_step=_FIRST_STEP, limit=_FIRST_LIMIT)
-            if not walked.converged:
-                walked = minimise(first_stage, walked.x, tolerance=1e-6, limit=_FIRST_LIMIT)
+            walked = polish(first_stage, xi, _FIRST_STEP, _FIRST_LIMIT, _FIRST_GAIN)
         except InputError:
             return None
         finally:

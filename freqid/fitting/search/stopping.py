@@ -18,7 +18,7 @@ _EXPLAINED = 1.5
 _PATIENCE = 60
 # a cost of so much more than a black box's is all but its own
 _TOUCHES = 1e-3
-# and of so much more that of a minimum which few lines may have missed
+# and of so much more one beside which distances in its chart are true, and few lines may mislead
 _MISSED = 0.03
 # levels of a gap to a black box: below the second it is no chance, and above the first it is
 # no reason to go on
@@ -134,6 +134,15 @@ class StopRule:
         noise = found.solution.cost / max(self.bound.freedom, 1)
         std = np.sqrt(noise * (np.linalg.inv(R) ** 2).sum(axis=1))
         return bool((std <= _TOLD * np.abs(x)).all())
+
+    def near(self, solution: Solution | None) -> bool:
+        """Whether a minimum is so near the black box that distances from it tell what others cost.
+
+        A given count of starts is used up all the same.
+        """
+        if solution is None or self.bound is None or self.n_starts is not None:
+            return False
+        return solution.cost <= self.bound.cost * (1 + _MISSED)
 
     def doubts(self, found: Found) -> bool:
         """Whether the gap to the black box may be chance, or a minimum missed: more lines tell."""

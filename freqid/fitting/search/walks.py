@@ -16,6 +16,8 @@ from freqid.fitting.search.log_stage import LogResponse, LogStructure
 
 # steps far off the axis, where resonances are smooth, and on it; the last step of a walk
 _SMOOTH, _SHARP, _LAST_STEP = 12, 40, 1e-3
+# part of the cost below which a step gains too little to go on
+_GAIN = 1e-3
 # part of the rows' own weight with which an unknown is held to a neper from its start
 _LEASH = 1e-5
 # walks that differ by less than this part of their unknowns have come to one place
@@ -104,7 +106,7 @@ def walked(
         batch = _LogBatch(structures, now, leashed * _LEASH * sum(t.n_rows for t in now))
         begin = np.array([np.where(s.log, 0.0, s.start) for s in structures])
         limit = _SHARP if i == len(targets) - 1 else _SMOOTH
-        found = descend(batch, begin, last_step=_LAST_STEP, limit=limit)
+        found = descend(batch, begin, last_step=_LAST_STEP, limit=limit, gain=_GAIN)
         x = np.array([s.value(row) for s, row in zip(structures, found.values, strict=True)])
         cost = found.cost
     return _places(x, cost)
@@ -118,8 +120,14 @@ def nearest(
         return []
     begin = np.array([place.x for place in places])
     batch = _NearBatch(inner, boxes, len(begin))
-    found = descend(batch, begin, last_step=_LAST_STEP, limit=_SHARP)
+    found = descend(batch, begin, last_step=_LAST_STEP, limit=_SHARP, gain=_GAIN)
     return _places(found.values, found.cost)
+
+
+def distance(x: FloatArray, inner: ScannableStructure, boxes: Sequence[BoxDistance]) -> float:
+    """That of one plant from the black boxes."""
+    cost, _, _ = _NearBatch(inner, boxes, 1).normal(x[None], np.arange(1))
+    return float(cost[0])
 
 
 def _places(x: FloatArray, cost: FloatArray) -> list[Place]:
