@@ -26,7 +26,8 @@ IntArray = npt.NDArray[np.int64]
 T = TypeVar("T")
 # what a pickle keeps of an object
 State = dict[str, Any]
-# samples that a signal may have: 64 GiB of them
+# processes that may be asked for; samples that a signal may have: 64 GiB of them
+_PROCESSES = 10_000
 _MOST = 2**33
 
 
@@ -54,6 +55,20 @@ def finite(name: str, value: object) -> float:
     except OverflowError:
         raise InputError(f"{name} is beyond the numbers that a computer has, 1.8e308") from None
     raise InputError(f"{name}={value!r:.80} must be a finite real number")
+
+
+def flag(name: str, value: object) -> bool:
+    """The value; ValueError for what is neither true nor false."""
+    if isinstance(value, (bool, np.bool_)) or (type(value) is int and value in (0, 1)):
+        return bool(value)
+    raise InputError(f"{name}={value!r:.80} must be True or False")
+
+
+def processes(value: object) -> int | None:
+    """``n_jobs`` as joblib takes it; ValueError for what is no number of processes."""
+    if value is None or (isinstance(value, int) and value != 0 and abs(value) <= _PROCESSES):
+        return value
+    raise InputError(f"n_jobs={value!r:.80} must be a number of processes, -1 for all, or None")
 
 
 def numbers(name: str, values: ArrayLike, kind: type = float) -> Array:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, an, positive, samples
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, an, flag, positive, samples
 from freqid.data import FrequencyResponse, fold, low_pass_gain, merged_lines, unfold
 from freqid.excitation import InputSpectrum, power_gain
 from freqid.lti import (
@@ -52,6 +52,8 @@ class Sampling:
     ) -> Sampling:
         """From the sample time ``dt`` (s) that is kept; ValueError where the rates do not fit."""
         positive("dt", dt, "s")
+        if base_dt is not None:
+            positive("base_dt", base_dt, "s")
         hold = ZeroOrderHold(base_dt or dt) if true_hold is None else true_hold
         known_hold("true_hold", hold)
         if base_dt is None:
@@ -63,7 +65,7 @@ class Sampling:
                 f"dt={dt:g} s is {ratio:g} times base_dt={base_dt:g} s; only a whole number of "
                 "samples can be left out"
             )
-        return cls(hold, base_dt, factor, antialias)
+        return cls(hold, base_dt, factor, flag("antialias", antialias))
 
     @property
     def dt(self) -> float:

@@ -108,7 +108,9 @@ def asymptotic_fit(
     # data without noise may have two minima that are nearly as good: look for both
     auto = isinstance(n_starts, str) and n_starts == "auto"
     count = _STARTS if auto else whole("n_starts", n_starts, most=100_000)
-    options = SearchOptions(count, whole("seed", seed, least=0), start, hold == "estimate")
+    options = SearchOptions(
+        count, whole("seed", seed, least=0), start, isinstance(hold, str) and hold == "estimate"
+    )
     if duration is not None:
         positive("duration", duration, "s")
     if finite("noise_std", noise_std) < 0:

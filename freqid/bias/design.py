@@ -12,7 +12,17 @@ from freqid.bias.apparent import Sampling, true_plant
 from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
-from freqid.checks import FloatArray, InputError, an, choice, listed, positive, whole
+from freqid.checks import (
+    FloatArray,
+    InputError,
+    an,
+    choice,
+    flag,
+    listed,
+    positive,
+    processes,
+    whole,
+)
 from freqid.data import Band
 from freqid.excitation import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
 from freqid.fitting import GreyStructure
@@ -91,7 +101,9 @@ def experiment_design(
         for low, high in grid
     }
     edges = dict(zip(spectra, grid, strict=True))
-    assumed = list(holds)
+    assumed = listed("holds", holds)
+    flag("d_optimal", d_optimal)
+    processes(n_jobs)
     names = [p.name for p in plant.free_parameters]
     tables = [(counts, spectra)]
     if d_optimal:
@@ -210,7 +222,7 @@ def d_optimal_spectrum(
     k = multisine_lines(band, period)
     k = k[np.unique(np.linspace(0, len(k) - 1, _GRID_LINES).astype(int))]
     structure = GreyStructure(plant)
-    between = ZeroOrderHold(dt) if hold is None else hold
+    between = ZeroOrderHold(dt) if hold is None else known_hold("hold", hold)
     omega = 2 * np.pi * k / period
     if isinstance(between, PeriodicHold) and omega[-1] * dt > np.pi * (1 + 1e-9):
         raise InputError(f"band={band} Hz reaches beyond {0.5 / dt:g} Hz, the Nyquist limit")

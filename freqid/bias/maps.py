@@ -14,7 +14,7 @@ import numpy as np
 from freqid.bias.apparent import Sampling, weight_of
 from freqid.bias.conditions import Conditions
 from freqid.bias.map_rows import Answer, Row, answer_chunk
-from freqid.checks import Array, InputError, listed, named_values, path_of, whole
+from freqid.checks import Array, InputError, flag, listed, named_values, path_of, processes, whole
 from freqid.data import as_band
 from freqid.excitation import ChirpSpectrum, InputSpectrum
 from freqid.fitting import Bar, TableStore, unordered
@@ -80,7 +80,10 @@ def bias_map(
     sampling, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
     as_band(band)
     path = None if path is None else path_of("path", path)
-    sampling = dataclasses.replace(sampling, antialias=antialias)
+    sampling = dataclasses.replace(sampling, antialias=flag("antialias", antialias))
+    processes(n_jobs)
+    if progress is not None:
+        flag("progress", progress)
     # each row puts its own spectrum and factor in
     shared = Conditions(rows[0].spectrum, sampling, band, prefilter, noise_model)
     chunks = _chunks(rows, whole("chunk", chunk))
@@ -153,7 +156,7 @@ def _asked(
             )
         base_dt = true_hold.period
     for hold in assumed:
-        if hold == "estimate":
+        if isinstance(hold, str) and hold == "estimate":
             raise InputError("holds contains 'estimate'; a map compares holds that are assumed")
         as_hold(hold, base_dt, true_hold)
     rows = [

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import ComplexArray, InputError, whole
+from freqid.checks import ComplexArray, InputError, numbers, whole
 from freqid.data.frequency_response import FrequencyResponse, frozen
 
 
@@ -52,8 +52,8 @@ class PeriodicResponse(FrequencyResponse):
             output_names, reach, conditions,
         )  # fmt: skip
         p, m, K = self.response.shape
-        U, Y = np.array(inputs, dtype=complex), np.array(outputs, dtype=complex)
-        C = np.array(noise, dtype=complex)
+        U, Y = numbers("inputs", inputs, complex), numbers("outputs", outputs, complex)
+        C = numbers("noise", noise, complex)
         E = U.shape[1] if U.ndim == 3 else 0
         for name, given, shape in (
             ("inputs", U, (m, E, K)), ("outputs", Y, (p, E, K)), ("noise", C, (E, K, p + m, p + m)),

@@ -112,7 +112,7 @@ class Record(Signals):
         self.__dict__.update(
             u=fast, y=slow, dt=dt, hold=between, input_dt=step, input_names=u_names,
             output_names=y_names, units=dict(units or {}), reference=commanded, notes=notes,
-            aliased=float(aliased), conditions=as_conditions(conditions),
+            aliased=finite("aliased", aliased), conditions=as_conditions(conditions),
         )  # fmt: skip
 
     def __setstate__(self, state: State) -> None:

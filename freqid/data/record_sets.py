@@ -75,6 +75,8 @@ def references_of(sets: Sequence[Record], reference: Reference | None) -> list[F
     if len(given) != len(sets):
         raise InputError(f"reference has {len(given)} signals for {len(sets)} records")
     arrays = [numbers("reference", x) for x in given]
+    if any(x.size == 0 for x in arrays):
+        raise InputError("reference holds no samples")
     signals = [x.reshape(max(x.shape[:1], default=1), -1) for x in arrays]
     for x, r in zip(signals, sets, strict=True):
         if len(x) != r.n_samples or x.shape[1] != r.n_inputs:

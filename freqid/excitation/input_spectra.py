@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, choice, numbers, positive
+from freqid.checks import FloatArray, InputError, choice, numbers, positive, whole
 from freqid.data import Band, merged_lines, unfold
 from freqid.excitation.filters import Filter, known_filter, power_gain
 from freqid.lti import panel_nodes, resolved
@@ -76,7 +76,8 @@ class InputSpectrum:
         """Density and lines on the way to a file: frequency / Hz, density / (u²/Hz), power / u²."""
         import pandas as pd
 
-        f = np.linspace(0, 0.5 / (dt * factor), points)
+        top = 0.5 / (positive("dt", dt, "s") * whole("factor", factor))
+        f = np.linspace(0, top, whole("points", points, least=2, most=10_000_000))
         at, power = self.aliased_lines(dt, factor)
         frames = [pd.DataFrame({"frequency": at, "power": power})]
         if len(self.edges(dt)):

@@ -15,6 +15,7 @@ from freqid.checks import (
     IntArray,
     choice,
     few_enough,
+    flag,
     numbers,
     positive,
     steps,
@@ -81,6 +82,7 @@ def multisine(
     choice("crest", crest, ("minimise", "schroeder", "random"))
     choice("grid", grid, tuple(_GRIDS))
     count = whole("n_inputs", n_inputs)
+    flag("orthogonal", orthogonal)
     few_enough("periods, n_inputs", float(N) * repeats * count * (count if orthogonal else 1))
     if crest == "schroeder" and count > 1 and not orthogonal:
         raise InputError(

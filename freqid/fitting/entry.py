@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Literal
 
-from freqid.checks import InputError, choice, listed, named_values, whole
+from freqid.checks import InputError, choice, flag, listed, named_values, whole
 from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
@@ -160,6 +160,7 @@ def fit(
     if offset is not None:
         readings = [with_offset(r) for r in readings]
     options = SearchOptions(count, seed, start, estimated, own, near)
+    flag("progress", progress)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
     if offset is not None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, choice, unknown
+from freqid.checks import ComplexArray, FloatArray, InputError, choice, finite, unknown
 from freqid.data import DataSet, FrequencyResponse
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -285,7 +285,7 @@ class Estimate(Shown):
         from scipy.stats import norm
 
         choice("method", method, ("linear", "profile"))
-        if not 0 < level < 1:
+        if not 0 < finite("level", level) < 1:
             raise InputError(f"level={level!r} must lie between 0 and 1")
         if method == "profile":
             if not isinstance(self.model, GreyBox) or self.spread.given is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import InputError, an, choice, listed, whole
+from freqid.checks import InputError, an, choice, flag, listed, whole
 from freqid.data import FrequencyResponse, Record, channel_counts
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
@@ -59,13 +59,15 @@ def select_order(
     an("data", data, Record, FrequencyResponse)
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
-    if feedthrough not in (True, False, None):
-        raise InputError(f"feedthrough={feedthrough!r} must be True, False or None for both")
+    if feedthrough is not None:
+        flag("feedthrough", feedthrough)
+    flag("stable", stable)
     given = [orders] if isinstance(orders, int) else listed("orders", orders)
     wanted = [whole("orders", n) for n in given]
     if not wanted:
         raise InputError("orders is empty; give at least one, such as range(1, 7)")
-    late = [whole("delays", q, least=0) for q in ([delays] if isinstance(delays, int) else delays)]
+    tried = [delays] if isinstance(delays, int) else listed("delays", delays)
+    late = [whole("delays", q, least=0) for q in tried]
     if not late:
         raise InputError("delays is empty; give at least one, such as range(4)")
     reading = Reading.of(data, hold, band, initial_state=initial_state)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, finite, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, finite, flag, whole
 from freqid.data import Record, Stream
 
 # segments of a single record where none are asked for
@@ -49,6 +49,8 @@ class Averaging:
             raise InputError(
                 f"segment={length} is longer than the shortest record, {shortest} samples"
             )
+        if not isinstance(self.detrend, str):
+            flag("detrend", self.detrend)
         half = 0.0 if isinstance(self.window, str) and self.window in _WHOLE else 0.5
         overlap = half if self.overlap is None else self.overlap
         if not 0 <= finite("overlap", overlap) < 1:

@@ -11,14 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import (
-    FloatArray,
-    InputError,
-    channel_names,
-    listed,
-    named_values,
-    unknown,
-)
+from freqid.checks import FloatArray, InputError, channel_names, listed, named_values, unknown
 from freqid.data import as_conditions
 from freqid.lti import Linearisation, StateSpace
 from freqid.models.delays import delay_names, given_delays
@@ -150,7 +143,7 @@ class GreyBox(Model):
     def parameter(self, name: str) -> Parameter:
         """The Parameter called ``name``; ValueError if there is none."""
         for p in self.parameters:
-            if p.name == name:
+            if isinstance(name, str) and p.name == name:
                 return p
         raise InputError(unknown("parameter", name, self.values))
 
@@ -187,7 +180,8 @@ class GreyBox(Model):
 
     def met_at(self, conditions: Mapping[str, float]) -> GreyBox:
         """The plant as an experiment under these conditions meets it."""
-        return self.with_conditions(**conditions) if conditions else self
+        given = named_values("conditions", conditions)
+        return self.with_conditions(**given) if given else self
 
     def fix(self, *names: str) -> GreyBox:
         """The same plant with these parameters held at their values in a fit."""

@@ -151,6 +151,7 @@ class Model(ABC):
 
         Aliases of a line are such: an output slower than its input has several at each.
         """
+        omega = numbers("omega", omega)
         if isinstance(hold, InputHolds):
             if len(hold.holds) != self.n_inputs:
                 raise InputError(f"hold has {len(hold.holds)} entries for {self.n_inputs} inputs")

@@ -36,10 +36,9 @@ class Parameter:
             raise InputError(f"name={self.name!r} must be a non-empty string")
         object.__setattr__(self, "value", finite(f"parameter {self.name}", self.value))
         for side in ("lower", "upper"):
-            if not isinstance(getattr(self, side), Real):
-                raise InputError(
-                    f"parameter {self.name}: {side}={getattr(self, side)!r} must be a number"
-                )
+            limit = getattr(self, side)
+            if not isinstance(limit, Real) or (limit not in (-math.inf, math.inf)):
+                finite(f"parameter {self.name}: {side}", limit)
         if not self.lower < self.upper:
             raise InputError(
                 f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"

@@ -8,7 +8,16 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive, samples
+from freqid.checks import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    InputError,
+    listed,
+    numbers,
+    positive,
+    samples,
+)
 from freqid.data import Record, as_holds
 from freqid.lti import Hold, InputHolds, PeriodicHold, Sampled, ZeroOrderHold
 from freqid.models.conversion import ModelLike, as_model
@@ -148,7 +157,7 @@ def simulate(
     plant = as_model(model)
     system = plant.state_space()
     inputs = u.reshape(len(u), -1)
-    names = input_names or plant.inputs or ()
+    names = plant.inputs or () if input_names is None else listed("input_names", input_names)
     between = as_holds(hold, dt, ZeroOrderHold(dt), names)
     for each in InputHolds.each(between, 1):
         if isinstance(each, PeriodicHold) and abs(each.period - dt) > 1e-9 * dt:
@@ -158,7 +167,7 @@ def simulate(
     n, m = system.B.shape
     if inputs.shape[1] != m:
         raise InputError(f"u has {inputs.shape[1]} channels and the model {m} inputs; give as many")
-    x0 = np.zeros(n) if initial_state is None else np.asarray(initial_state, dtype=float)
+    x0 = np.zeros(n) if initial_state is None else numbers("initial_state", initial_state)
     if x0.shape != (n,):
         raise InputError(f"initial_state has shape {x0.shape}; the model has {n} states")
     if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:

@@ -40,7 +40,7 @@ class TransferFunction:
             raise InputError(
                 f"zeros={self.zeros} is more than poles={self.poles}; no plant has that"
             )
-        if self.delay != "estimate":
+        if not (isinstance(self.delay, str) and self.delay == "estimate"):
             delay = finite("delay", self.delay)
             if delay < 0:
                 raise InputError(f"delay={delay:g} s must not be negative")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.bias import apparent_response, asymptotic_fit
-from freqid.checks import InputError, table_with, unknown
+from freqid.checks import InputError, listed, table_with, unknown
 from freqid.data import FrequencyResponse
 from freqid.excitation import InputSpectrum
 from freqid.fitting import Estimate
@@ -17,7 +17,7 @@ from freqid.models import Model
 from freqid.plots.bode_nyquist import bode, nyquist
 from freqid.plots.curves import resonances
 from freqid.plots.heat_maps import heat_map
-from freqid.plots.style import COLOURS, Panels, context, line, stacked
+from freqid.plots.style import COLOURS, Panels, context, line, several_axes, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,6 +46,8 @@ def plot_bias_map(
 
     rows = _of_parameter(table, parameter)
     holds = list(dict.fromkeys(rows["hold"]))
+    marked = [] if mark is None else listed("mark", mark)
+    several_axes(ax, len(holds))
     factors = sorted(set(rows["factor"]))
     names, labels, title = _spectra(table)
     finite = np.abs(rows["relative_bias"].where(rows["converged"])).max()
@@ -71,7 +73,7 @@ def plot_bias_map(
                 dark=lambda part: abs(part - 0.5) > 0.32,
             )  # fmt: skip
             axis.set(xlabel=title, title=hold_title(hold))
-            for name in mark or ():
+            for name in marked:
                 if name in names:
                     at = names.index(name)
                     frame = plt.Rectangle((at, 0), 1, len(factors), fill=False, linewidth=2)
@@ -110,7 +112,7 @@ def plot_bias_curves(
     """
     table_with(table, "parameter", "bias_map")
     known = list(dict.fromkeys(table["parameter"]))
-    wanted = list(parameters or known)
+    wanted = known if parameters is None else listed("parameters", parameters) or known
     chosen = int(table["factor"].max()) if factor is None else factor
     if not isinstance(chosen, int) or chosen not in set(table["factor"]):
         raise InputError(unknown("factor", chosen, sorted(set(table["factor"]))))
@@ -232,7 +234,7 @@ def _sentence(est: Estimate, plant: Model) -> str:
 def _of_parameter(table: pd.DataFrame, parameter: str) -> pd.DataFrame:
     table_with(table, "parameter", "bias_map")
     known = list(dict.fromkeys(table["parameter"]))
-    if parameter not in known:
+    if not isinstance(parameter, str) or parameter not in known:
         raise InputError(unknown("parameter", parameter, known))
     return table[table["parameter"] == parameter]
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, TypeAlias, TypedDict
 import numpy as np
 import numpy.typing as npt
 
+from freqid.checks import InputError, listed
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -64,11 +66,30 @@ def context() -> AbstractContextManager[None]:
     return matplotlib.rc_context(SETTINGS)
 
 
+def an_axes(ax: object) -> None:
+    """ValueError for what nothing can be drawn on."""
+    if ax is not None and not hasattr(ax, "plot"):
+        raise InputError(f"ax is a {type(ax).__name__}; expected axes of matplotlib, or None")
+
+
+def several_axes(ax: object, count: int) -> None:
+    """ValueError for what are not so many axes, or more."""
+    if ax is None:
+        return
+    given = [ax] if hasattr(ax, "plot") else listed("ax", ax)  # type: ignore[arg-type]
+    for each in given:
+        if not hasattr(each, "plot"):
+            raise InputError(f"ax holds a {type(each).__name__}; expected axes of matplotlib")
+    if len(given) < count:
+        raise InputError(f"ax holds {len(given)} axes; expected {count}")
+
+
 @contextmanager
 def drawing(ax: Axes | None, size: tuple[float, float] | None = None) -> Iterator[Axes]:
     """The settings, and axes to draw on: new ones of a ``size`` (inches) where not given."""
     import matplotlib.pyplot as plt
 
+    an_axes(ax)
     with context():
         yield plt.subplots(figsize=size)[1] if ax is None else ax
 
@@ -84,6 +105,7 @@ def stacked(
     """The settings, and axes above each other: new ones, of such heights, where not given."""
     import matplotlib.pyplot as plt
 
+    several_axes(ax, rows)
     with context():
         if ax is None:
             ax = plt.subplots(

@@ -39,7 +39,8 @@ def hold_bias(
     an("est", est, Estimate)
     if any("[" in n for n in est.names) and isinstance(est.model, GreyBox):
         raise InputError("hold_bias knows no parameters that each experiment has for itself")
-    band, weights = band or est.band, est.weights if weights is None else weights
+    band = est.band if band is None else band
+    weights = est.weights if weights is None else weights
     if not isinstance(est.model, GreyBox):
         spec = est.model.spec
         if "delay" in est.names:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError, listed, named_values, path_of, unknown, whole
+from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
@@ -85,6 +85,9 @@ def fit_many(
     import pandas as pd
 
     fitter_of(model)
+    processes(n_jobs)
+    if progress is not None:
+        flag("progress", progress)
     path = None if path is None else path_of("path", path)
     size = whole("chunk", chunk)
     named = _named(records)
@@ -145,19 +148,23 @@ def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source
     if isinstance(records, (str, Path, Record, FrequencyResponse)):
         records = [records]
     if isinstance(records, Mapping):
+        for name, r in records.items():
+            _source(f"records[{name!r}]", r)
         return {str(name): r for name, r in records.items()}
     named: dict[str, Source] = {}
     for i, r in enumerate(listed("records", records)):
-        if not isinstance(r, (str, Path, Record, FrequencyResponse)):
-            raise InputError(
-                f"records[{i}] is a {type(r).__name__}; expected a Record, a FrequencyResponse or "
-                "a path"
-            )
+        _source(f"records[{i}]", r)
         name = str(r) if isinstance(r, (str, Path)) else f"record {i}"
         if name in named:
             raise InputError(f"records: {name} is there twice")
         named[name] = r
     return named
+
+
+def _source(name: str, given: object) -> None:
+    if not isinstance(given, (str, Path, Record, FrequencyResponse)):
+        kind = type(given).__name__
+        raise InputError(f"{name} is a {kind}; expected a Record, a FrequencyResponse or a path")
 
 
 def _checked(what: str, function: Callable[..., object], options: Mapping[str, Any]) -> Row:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray
+from freqid.checks import ComplexArray, FloatArray, InputError, numbers
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.uncertainty.minimum import Spread
 from freqid.lti import Hold
@@ -30,7 +30,9 @@ def derived(
 
     ``covariance`` is that of the free parameters, in their order.
     """
-    at = np.asarray(function(model), dtype=float)
+    if not callable(function):
+        raise InputError(f"function is a {type(function).__name__}; expected one of the model")
+    at = numbers("function(model)", function(model))
     slope = []
     for p in model.free_parameters:
         step = _STEP * max(abs(p.value), 1e-12)
