@@ -28,6 +28,8 @@ from freqid.lti import Hold
 _LINES, _NOISY = 600, 10
 # and how many times more where these leave a doubt
 _MORE = 8
+# part of the cost on all lines that a step from the minimum on few may gain
+_WON = 0.02
 # evaluations down to data's own rounding
 _DIRECT = 40
 # starts of experiments at many places beside which there are no black boxes
@@ -79,25 +81,35 @@ def _search(
     if found is None:
         every = sum(e.n_lines for e in spectral)
         share = sum(e.n_lines for e in few) / every
-        beside = Surveyed(structure, at_lines, floor, lines, share)
-        found = _searched(beside, scout, options)
-        if not found.sure and share < 1 and options.n_starts is None:
+        found = _searched(Surveyed(structure, at_lines, floor, lines, share), scout, options)
+        partial_ = share < 1 and options.n_starts is None
+        if partial_ and (not found.sure or (not in_time and _misled(objective, found))):
             # what so many lines leave open more of them may tell
             more = thinned_to(spectral, _MORE * lines)
             wide = Objective(structure, more)
             scouts.append(wide)
             wide.n_evaluations = scout.n_evaluations
             share = sum(e.n_lines for e in more) / every
-            beside = Surveyed(structure, at_lines, floor, _MORE * lines, share)
-            again = _searched(beside, wide, options, found.solution.x)
+            data = Surveyed(structure, at_lines, floor, _MORE * lines, share)
+            again = _searched(data, wide, options, found.solution.x)
             starts = found.n_starts + again.n_starts - 1
             found, scout = dataclasses.replace(again, n_starts=starts), wide
-    objective.n_evaluations = scout.n_evaluations
+    # those on all lines were counted as they were made
+    objective.n_evaluations += scout.n_evaluations if scout is not objective else 0
     if in_time:
         return dataclasses.replace(found, solution=_in_time(objective, structure, found))
     if scout is objective:
         return found
     return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+
+
+def _misled(objective: Objective, found: Found) -> bool:
+    """Whether the minimum on a part of the lines is none on all of them."""
+    there = objective.point(found.solution.x)
+    if there is None:
+        return True
+    left = there.triangle[:-1, -1]
+    return float(left @ left) > _WON * there.cost + objective.rounding
 
 
 @dataclass(frozen=True)

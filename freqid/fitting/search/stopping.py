@@ -142,7 +142,8 @@ class StopRule:
         """
         if solution is None or self.bound is None or self.n_starts is not None:
             return False
-        return solution.cost <= self.bound.cost * (1 + _MISSED)
+        small = solution.cost <= self.bound.cost * (1 + _MISSED) and self.explains(solution.cost)
+        return small and solution.converged
 
     def doubts(self, found: Found) -> bool:
         """Whether the gap to the black box may be chance, or a minimum missed: more lines tell."""
