@@ -79,3 +79,19 @@ def test_distance_from_a_black_box_is_what_its_own_cost_says():
     for i, other in enumerate(moved):
         by_steps = (distance.error(other) - distance.error(at)) / 1e-6
         assert np.abs(by_steps - slope[i]).max() < 1e-4 * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("stable", [False, True])
+def test_output_error_in_noise_ends_no_higher_than_from_the_true_poles(stable):
+    """Two weak modes in noise as large as they are, 12 records."""
+    lost = 0
+    for seed in range(12):
+        record = noisy(2, 1.0, 500, seed)
+        lines, plane = lines_in_plane([Reading(record, record.hold)])
+        rational = RationalLines(lines, False, stable)
+        poles = np.exp(np.linalg.eigvals(modes(W[:2], ZETA[:2], GAIN[:2])[0]))
+        true = rational.below((poles - plane.a) / (1 - plane.a * poles))
+        est = fq.fit(fq.OutputError(4, stable=stable), record)
+        lost += est.cost > true.cost * rational.sizes[0] ** 2 * (1 + 1e-3)
+    # stable ones may not leave the circle on their way
+    assert lost <= stable

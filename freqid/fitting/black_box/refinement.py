@@ -131,6 +131,8 @@ def nested_model(
             break
     if best is None or len(best.poles) < order:
         return identify(experiments, order, feedthrough)
+    if not _believed(lines, best):
+        best = exchanged(lines, best, fewer_poles)
     if few is not experiments:
         lines = RationalLines(experiments, feedthrough, stable)
         best = lines.below(best.poles) or best
