@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Literal
@@ -24,6 +25,8 @@ from freqid.fitting.suspects import Inquiry
 from freqid.frf import stretches
 from freqid.lti import Hold, in_one_blas_thread
 from freqid.models import GreyBox
+
+_LOG = logging.getLogger(__name__)
 
 # the kinds of model that fit takes are known by the files that fit them
 _KNOWN = (grey_box, black_box)
@@ -163,6 +166,8 @@ def fit(
     flag("progress", progress)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
+    what, said = type(model).__name__, est.message.rstrip(".")
+    _LOG.info("%s: cost %.6g, starts: %d; %s", what, est.cost, est.n_starts, said)
     if offset is not None:
         notes += offsets(est, readings)
     if loops:

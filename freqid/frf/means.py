@@ -22,6 +22,10 @@ from freqid.data import (
 _SILENT = 1e-3
 # a lag at which a signal repeats itself so well is a period
 _REPEATS = 0.9
+# multiples of a period that is given, of which one may be the true one
+_MULTIPLES = 12
+# a period that repeats less than this part of what a multiple does is wrong, and so little, none
+_WORSE, _NOT_AT_ALL = 0.75, 0.05
 # degrees of freedom that a covariance should have; lines around one are taken for it until it does
 _FREEDOM = 14
 # amplitude of a line in standard errors of its noise from which it is excited for certain
@@ -71,6 +75,9 @@ def periodic(
         reference = True
     signals = references_of(sets, reference)
     n = _samples(sets, signals, period)
+    for i, record in enumerate(sets):
+        driven = record.inputs if signals is None else signals[i]
+        _check_period(f"records[{i}]", driven - driven.mean(axis=0), n, first.dt)
     skip = whole("skip", skip, least=0)
     counts = [r.n_samples // n - skip for r in sets]
     if min(counts) < 2:
@@ -101,10 +108,10 @@ def _samples(
 ) -> int:
     """Samples of a period, given or found; ValueError where there is none."""
     first = sets[0]
-    if period is not None:
-        return steps("period", period, first.dt, least=2)
     x = (first.inputs if signals is None else signals[0])[:, 0]
     x = x - x.mean()
+    if period is not None:
+        return steps("period", period, first.dt, least=2)
     N = len(x)
     size = scipy.fft.next_fast_len(2 * N)
     r = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, size)) ** 2, size)[: N // 2 + 1]
@@ -121,6 +128,33 @@ def _samples(
         raise InputError("the excitation does not repeat itself; give period= in s")
     near = found[found <= found[0] * 1.05 + 2]
     return int(near[np.argmax(alike[near])])
+
+
+def _check_period(name: str, x: FloatArray, n: int, dt: float) -> None:
+    """ValueError where n samples do not repeat, or a multiple of them does so much better."""
+    own, period = _repeats(x, n), n * dt
+    for m in range(2, min(len(x) // n // 2, _MULTIPLES) + 1):
+        better = _repeats(x, m * n)
+        if better > _REPEATS and own < _WORSE * better:
+            raise InputError(
+                f"{name}: the excitation repeats after {m * period:g} s; after period={period:g} s "
+                f"only {100 * max(own, 0):.0f} % of its power does; give period={m * period:g}"
+            )
+    if len(x) >= 2 * n and own < _NOT_AT_ALL:
+        raise InputError(
+            f"{name}: only {100 * max(own, 0):.0f} % of the excitation's power repeats after "
+            f"period={period:g} s; give that of all records"
+        )
+
+
+def _repeats(x: FloatArray, n: int) -> float:
+    """Part of a signal's power (samples, channels) that n samples repeat; about 0 for noise."""
+    rows = x[: len(x) // n * n].reshape(-1, n, x.shape[1])
+    P, power = len(rows), float((rows**2).mean())
+    if P < 2 or not power:
+        return 0.0
+    share = float((rows.mean(axis=0) ** 2).mean()) / power
+    return (P * share - 1) / (P - 1)
 
 
 def _spectra(record: Record, n: int, skip: int, periods: int) -> ComplexArray:

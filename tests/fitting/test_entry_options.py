@@ -141,3 +141,18 @@ def test_hubers_loss_costs_little_where_nothing_is_wrong():
 def test_progress_is_shown_and_changes_nothing(capsys):
     record = fq.simulate(LAG, fq.white_noise(300), DT).with_noise(0.1)
     assert np.array_equal(fq.fit(LAG, record, progress=True).values, fq.fit(LAG, record).values)
+
+
+def test_a_fit_says_what_it_does_to_those_who_listen(caplog, capsys):
+    record = fq.simulate(LAG, fq.white_noise(300, seed=3), 5e-3).with_noise(0.3, seed=1)
+    fq.fit(LAG, record, start={"b": 400.0, "a": 2.0})
+    assert not caplog.text
+    with caplog.at_level("DEBUG", logger="freqid"):
+        est = fq.fit(LAG, record, start={"b": 400.0, "a": 2.0})
+    assert "first start: cost" in caplog.text
+    assert f"GreyBox: cost {est.cost:.6g}" in caplog.text
+    with caplog.at_level("INFO", logger="freqid"):
+        fq.fit_many(LAG, {"gone": "no/such/file.csv"}, progress=False)
+    assert "gone: " in caplog.text
+    # nobody listens: nothing is printed
+    assert capsys.readouterr() == ("", "")

@@ -173,3 +173,24 @@ def test_the_aircraft_depends_on_its_level(measured):
     both = fq.distortion(runs, 8192 / 400, skip=1, reference=True, band=(1, 60))
     assert 7.2 < both.levels["frequency"].iloc[1] < 7.5
     assert "depends on the amplitude" in both.warnings[0]
+
+
+def test_a_period_that_is_none_is_refused_by_name():
+    """Half of the true one, and that of another record."""
+    u = fq.multisine((2, 100), 1.0, 1e-3, 6, crest="random", seed=2)
+    record = fq.simulate(fq.first_order(), u, 1e-3).with_noise(0.01, seed=1)
+    assert fq.periodic(record, period=1.0).response.shape[-1] == 99
+    # two of the true ones are a period, too
+    assert fq.periodic(record, period=2.0).response.shape[-1] == 99
+    with pytest.raises(ValueError, match=r"repeats after 1 s; .* [45]\d % of its power"):
+        fq.periodic(record, period=0.5)
+    other = fq.multisine((2, 100), 0.8, 1e-3, 6, crest="random", seed=3)
+    second = fq.simulate(fq.first_order(), other, 1e-3).with_noise(0.01, seed=2)
+    with pytest.raises(ValueError, match=r"records\[1\]: only \d+ % of the excitation"):
+        fq.periodic([record, second])
+    # as much noise as signal on the input is no other period
+    rng = np.random.default_rng(0)
+    noisy = fq.Record(
+        record.u + record.u.std() * rng.standard_normal(len(record.u)), record.y, 1e-3
+    )
+    assert fq.periodic(noisy, period=1.0).response.shape[-1] > 10

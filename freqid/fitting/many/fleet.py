@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import logging
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -25,6 +26,8 @@ from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_LOG = logging.getLogger(__name__)
 
 # records of a chunk, which is kept or lost as one, and from how many on processes are worth it
 _CHUNK, _FEW = 8, 16
@@ -204,6 +207,7 @@ def _row(task: _Task, name: str, source: Source) -> Row:
         row["error"] = ""
     except Exception as error:
         # one bad record, or a plant that fails there, must not take the other rows along
+        _LOG.info("%s: %s", name, error)
         row["error"] = f"{type(error).__name__}: {error}"
     row["seconds"] = time.perf_counter() - begin
     return row

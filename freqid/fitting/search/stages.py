@@ -7,6 +7,7 @@ second, on the true cost, sets them free again.
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias, cast
 
@@ -20,6 +21,8 @@ from freqid.fitting.search.log_stage import LogStructure
 from freqid.fitting.search.scatter import around, promising
 from freqid.fitting.search.stopping import BUDGET, ROUND, Found, StopRule
 from freqid.fitting.search.walks import Place, distance, nearest, walked
+
+_LOG = logging.getLogger(__name__)
 
 # a first stage this much worse than the best one so far is not followed up
 _HOPELESS = 4.0
@@ -85,6 +88,8 @@ class Search:
         if n_starts is None and not (self.guide.settled and rule.convinced(found)):
             found = self._deeper(found, start, rule)
         tried = found.n_starts
+        least = "none" if self.guide.bound is None else f"{self.guide.bound.cost:.6g}"
+        _LOG.debug("first start: cost %.6g, of a black box %s", found.solution.cost, least)
         more = self._together if self.guide.rounds else self._one_by_one
         ends = iter(()) if self._done(found, rule) else more(start, rule, seed)
         for count, visits, solution, ended in ends:
@@ -97,6 +102,13 @@ class Search:
             self._best = found.solution
             # where there is doubt a round counts when all that it found was looked at
             over = rule.enough(found) and (ended or not rule.doubts(found))
+            if ended:
+                _LOG.debug(
+                    "%d starts: least cost %.6g, met %d times",
+                    tried,
+                    self._best.cost,
+                    found.n_agreed,
+                )
             if over and not self.aliased(found.solution.x):
                 break
         return dataclasses.replace(self._finished(found), sure=not rule.doubts(found))
