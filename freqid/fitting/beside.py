@@ -182,6 +182,9 @@ def bound_of(beside: Beside | BesidePlaces, structure: GreyStructure, share: flo
     rows = sum(
         int(share * b.objective.n_rows) - b.unknowns - b.solution.point.n_initial for b in boxes
     )
+    # lines that share their windows tell less than as many of their own
+    tied = 1 + max(getattr(e, "reach", 0) for b in boxes for e in b.objective.experiments)
+    rows //= tied
     unknowns = sum(b.unknowns for b in boxes)
     return Bound(sum(b.cost for b in boxes), unknowns - len(structure.names), rows)
 

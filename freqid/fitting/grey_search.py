@@ -106,8 +106,8 @@ def _search(
 def _misled(objective: Objective, found: Found) -> bool:
     """Whether the minimum on a part of the lines is none on all of them."""
     there = objective.point(found.solution.x)
-    if there is None:
-        return True
+    if there is None or found.n_agreed < 2:
+        return False
     left = there.triangle[:-1, -1]
     return float(left @ left) > _WON * there.cost + objective.rounding
 

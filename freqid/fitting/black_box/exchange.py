@@ -19,6 +19,8 @@ from freqid.fitting.black_box.rational_lines import Fitted, RationalLines
 _ROUNDS, _TRIED, _GAIN = 4, 4, 1e-4
 # places of narrow modes, half as wide as so many lines, and of wide ones at so many radii
 _NARROW, _LINES_WIDE, _WIDE, _RADII = 160, 2.0, 24, (0.6, 0.9, 0.97)
+# steps of a descent on trial
+_STEPS = 12
 # poles that are closer than this part of their distance from the circle are one
 _NEAR = 0.5
 # real poles that are tried
@@ -30,20 +32,20 @@ Fewer = Callable[[RationalLines, ComplexArray, int], ComplexArray]
 
 def exchanged(lines: RationalLines, best: Fitted, fewer: Fewer) -> Fitted:
     """The least minimum to which exchanges of one mode lead, ``best`` itself where none does."""
-    order = len(best.poles)
+    order, first = len(best.poles), best
     for _ in range(_ROUNDS):
         before = best.cost
         for added in _asked_for(lines, best):
-            larger = lines.below(np.append(best.poles, added))
+            larger = lines.below(np.append(best.poles, added), _STEPS)
             if larger is None:
                 continue
             poles = fewer(lines, larger.poles, order)
-            found = None if _same(poles, best.poles) else lines.below(poles)
+            found = None if _same(poles, best.poles) else lines.below(poles, _STEPS)
             if found is not None and found.cost < best.cost and len(found.poles) == order:
                 best = found
         if best.cost > before * (1 - _GAIN):
             break
-    return best
+    return best if best is first else lines.below(best.poles) or best
 
 
 def _same(poles: ComplexArray, others: ComplexArray) -> bool:

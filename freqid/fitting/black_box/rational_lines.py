@@ -93,11 +93,14 @@ class RationalLines:
         except np.linalg.LinAlgError:
             return None
 
-    def below(self, poles: ComplexArray) -> Fitted | None:
-        """The minimum below the best model with these poles, never above that; or None."""
+    def below(self, poles: ComplexArray, steps: int = _DESCENTS) -> Fitted | None:
+        """The minimum below the best model with these poles, never above that; or None.
+
+        In so many steps at the most.
+        """
         try:
             with np.errstate(all="ignore"):
-                return self._descend(*self._held(poles))
+                return self._descend(*self._held(poles), steps)
         except np.linalg.LinAlgError:
             return None
 
@@ -156,12 +159,12 @@ class RationalLines:
         parts = [basis.Q[: n + self.feedthrough] * (self.driven * inverse)]
         return parts + [basis.Q[:n] * (own * inverse) for own in self.free]
 
-    def _descend(self, basis: PolynomialBasis, x: FloatArray) -> Fitted:
+    def _descend(self, basis: PolynomialBasis, x: FloatArray, steps: int = _DESCENTS) -> Fitted:
         """Gauss-Newton steps from x, damped (Levenberg and Marquardt) where they fail."""
         n = len(basis.Q) - 1
         best, damping, straight = Fitted(basis, x, np.inf, True), 0.0, True
         R = np.zeros((0, 0))
-        for _ in range(_DESCENTS):
+        for _ in range(steps):
             inverse = 1 / basis.denominator(x)
             columns = self._columns(basis, inverse)
             output = x[:-n] @ np.concatenate(columns)

@@ -38,6 +38,8 @@ _DEEPENED = 3
 # a distance from a black box that is off the true gap by this part of it tells nothing; the part of
 # that of the best so far at which another is nearer; walks that are enough where none is
 _TRUE, _NEARER, _ENOUGH = 0.3, 0.9, 3
+# evaluations of the last descent, which may follow a valley without an end
+_LAST_LIMIT = 400
 # relative gain of the cost that ends a first stage, and the descent with signs kept
 _FIRST_GAIN, _KEPT = 1e-3, 1e-5
 
@@ -111,7 +113,9 @@ class Search:
                 )
             if over and not self.aliased(found.solution.x):
                 break
-        return dataclasses.replace(self._finished(found), sure=not rule.doubts(found))
+        # where unknowns are left open more lines settle nothing
+        doubted = rule.doubts(found) and rule.determined(found)
+        return dataclasses.replace(self._finished(found), sure=not doubted)
 
     def _done(self, found: Found, rule: StopRule) -> bool:
         """Whether the first start is enough, however many were asked for."""
@@ -281,7 +285,7 @@ class Search:
         """The best minimum, run to the end where its start had been cut short."""
         if found.solution.converged:
             return found
-        again = minimise(self.objective, found.solution.x)
+        again = minimise(self.objective, found.solution.x, limit=_LAST_LIMIT)
         if again.cost > found.solution.cost:
             return found
         return dataclasses.replace(found, solution=again)

@@ -27,7 +27,7 @@ _CHANCE = 1e-3
 # relative standard error from which data leave an unknown open
 _TOLD = 0.3
 # level of a gap above which nothing is doubted
-_CONVINCED = 0.5
+_CONVINCED = 0.2
 # above that level of the gap so many starts that agree are enough; else the last number
 _AGREEMENT, _DOUBTED = ((0.2, 1), (_RARE, 2)), 4
 # starts that agree without an exception where a black box explains more
@@ -168,8 +168,10 @@ class StopRule:
         if cost > self.bound.cost * (1 + _MISSED) and not self.explains(cost):
             # the model lacks something, or this is not its minimum
             return found.n_agreed >= (_DOUBTED if both else _ALIKE)
-        wanted = agreement(self.bound.level(cost))
+        level = self.bound.level(cost)
+        wanted = agreement(level)
         if not self.determined(found):
-            wanted = _DOUBTED
+            # along what the data leave open no two starts need end alike
+            wanted = 1 if both and level > _RARE else _DOUBTED
         # a gap that is hardly chance is not believed before both kinds of starts were tried
-        return found.n_agreed >= wanted and (both or self.bound.level(cost) > _RARE)
+        return found.n_agreed >= wanted and (both or level > _RARE)
