@@ -1,6 +1,7 @@
 """Shared plants, records and switches of the suite."""
 
 import os
+import sys
 from pathlib import Path
 
 import matplotlib
@@ -23,6 +24,15 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 T1, T2 = 0.5e-3, 5e-3
 BAND = (10, 80)
+
+
+@pytest.fixture(scope="module")
+def benchmarks():
+    """The folder of the long studies, from which a module may import for as long as it runs."""
+    folder = str(Path(__file__).resolve().parents[1] / "benchmarks")
+    sys.path.insert(0, folder)
+    yield folder
+    sys.path.remove(folder)
 
 
 @pytest.fixture(scope="session")

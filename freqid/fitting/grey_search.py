@@ -106,7 +106,8 @@ def _search(
 def _misled(objective: Objective, found: Found) -> bool:
     """Whether the minimum on a part of the lines is none on all of them."""
     there = objective.point(found.solution.x)
-    if there is None or found.n_agreed < 2:
+    # where no two of many starts end alike more lines settle nothing
+    if there is None or found.n_starts > 1 == found.n_agreed:
         return False
     left = there.triangle[:-1, -1]
     return float(left @ left) > _WON * there.cost + objective.rounding

@@ -1,22 +1,16 @@
 """The short version of the studies in ``benchmarks/search``: a few cases of each."""
 
-import sys
-from pathlib import Path
-
 import pandas as pd
 import pytest
 
+import freqid as fq
+
 
 @pytest.fixture(scope="module")
-def studies():
-    folder = Path(__file__).resolve().parents[2] / "benchmarks"
-    sys.path.insert(0, str(folder))
-    try:
-        from search import minima, orders, store, witness
+def studies(benchmarks):
+    from search import minima, orders, store, witness
 
-        yield minima, orders, store, witness
-    finally:
-        sys.path.remove(str(folder))
+    return minima, orders, store, witness
 
 
 def test_a_study_goes_on_where_it_was_interrupted(studies, tmp_path):
@@ -47,3 +41,14 @@ def test_orders_and_witness(studies):
     _, orders, _, witness = studies
     assert [orders.one(case)["mdl"] for case in range(3)] == [4, 4, 4]
     assert all(0 <= witness.one(case)["p"] <= 1 for case in range(4))
+
+
+@pytest.mark.parametrize("case", [540, 582, 586, 1198])
+def test_plants_whose_black_box_was_lost_itself(studies, case):
+    """A weak mode in noise, an open mass, a lost mass, and steps whose few lines mislead."""
+    from search import plants
+
+    plant, record, _, rng = plants.random_experiment(case)
+    est = fq.fit(plant, record, start=plants.moved(plant, rng, 3.0))
+    from_truth = fq.fit(plant, record, n_starts=1)
+    assert est.cost <= from_truth.cost * (1 + studies[0].WORSE)

@@ -1,22 +1,14 @@
 """The short version of the studies in ``benchmarks/trust``: a few cases of each."""
 
-import sys
-from pathlib import Path
-
 import pandas as pd
 import pytest
 
 
 @pytest.fixture(scope="module")
-def studies():
-    folder = Path(__file__).resolve().parents[2] / "benchmarks"
-    sys.path.insert(0, str(folder))
-    try:
-        from trust import studies
+def studies(benchmarks):
+    from trust import studies
 
-        yield studies
-    finally:
-        sys.path.remove(str(folder))
+    return studies
 
 
 def test_every_fault_is_mostly_named_and_seldom_trusted(studies, tmp_path):

@@ -1,21 +1,14 @@
 """The short version of ``benchmarks/oracle.py``: random plants against fifty digits."""
 
-import sys
-from pathlib import Path
-
+import mpmath
 import pytest
 
 
 @pytest.fixture(scope="module")
-def oracle():
-    folder = Path(__file__).resolve().parents[2] / "benchmarks"
-    sys.path.insert(0, str(folder))
-    try:
-        import oracle
+def oracle(benchmarks):
+    import oracle
 
-        yield oracle
-    finally:
-        sys.path.remove(str(folder))
+    return oracle
 
 
 def test_random_plants_against_fifty_digits(oracle):
@@ -27,6 +20,4 @@ def test_random_plants_against_fifty_digits(oracle):
 
 
 def test_the_oracle_sees_a_wrong_digit(oracle):
-    import mpmath
-
     assert oracle._apart(1 + 1e-10, mpmath.matrix([[1]])) > oracle.WANTED

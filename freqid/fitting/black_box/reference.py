@@ -179,9 +179,8 @@ class Reference:
 
     def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Response (outputs, inputs, K) at omega (rad/s), and its relative standard error."""
-        dt = self.chart.dt
-        seen = 2 * np.arctan(omega * dt / 2) / dt if self.bilinear else omega
-        G, dG = self.chart.response(self.solution.x, seen, None)
+        at = self.surroundings(omega)
+        G, dG = at.response, at.derivative
         half = np.linalg.pinv(self.solution.point.jacobian)
         spread = np.tensordot(half.T, dG, (1, 0))
         std = self.noise * np.sqrt((np.abs(spread) ** 2).sum(axis=0))

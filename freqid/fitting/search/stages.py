@@ -86,10 +86,12 @@ class Search:
         rule = StopRule(n_starts, self.objective.rounding, self.floor, self.guide.bound, self.most)
         found = self._first(start, rule)
         if known is not None:
-            found = found.joined(polish(self.objective, known, limit=_LIMIT), rule.rounding)
+            # it comes of the same start, and is no other that agrees
+            end = polish(self.objective, known, limit=_LIMIT)
+            found = found.joined(end, rule.rounding, visits=0)
         if n_starts is None and not (self.guide.settled and rule.convinced(found)):
             found = self._deeper(found, start, rule)
-        tried = found.n_starts
+        self._best, tried = found.solution, found.n_starts
         least = "none" if self.guide.bound is None else f"{self.guide.bound.cost:.6g}"
         _LOG.debug("first start: cost %.6g, of a black box %s", found.solution.cost, least)
         more = self._together if self.guide.rounds else self._one_by_one

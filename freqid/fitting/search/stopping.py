@@ -20,16 +20,13 @@ _PATIENCE = 60
 _TOUCHES = 1e-3
 # and of so much more one beside which distances in its chart are true, and few lines may mislead
 _MISSED = 0.03
-# levels of a gap to a black box: below the second it is no chance, and above the first it is
-# no reason to go on
-_RARE = 0.05
-_CHANCE = 1e-3
+# levels of a gap to a black box: above the first nothing is doubted, below the second both kinds of
+# starts are tried, and below the third it is no chance
+_CONVINCED, _RARE, _CHANCE = 0.2, 0.05, 1e-3
 # relative standard error from which data leave an unknown open
 _TOLD = 0.3
-# level of a gap above which nothing is doubted
-_CONVINCED = 0.2
 # above that level of the gap so many starts that agree are enough; else the last number
-_AGREEMENT, _DOUBTED = ((0.2, 1), (_RARE, 2)), 4
+_AGREEMENT, _DOUBTED = ((_CONVINCED, 1), (_RARE, 2)), 4
 # starts that agree without an exception where a black box explains more
 _ALIKE = 6
 # costs that agree to this belong to one minimum

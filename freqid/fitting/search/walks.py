@@ -47,17 +47,14 @@ class _LogBatch:
         some = [self.structures[i] for i in which]
         values = np.array([s.value(row) for s, row in zip(some, x, strict=True)])
         by = np.array([s.slope(row) for s, row in zip(some, x, strict=True)])
-        S, P = x.shape
-        cost, g, H = np.zeros(S), np.zeros((S, P)), np.zeros((S, P, P))
+        rows = []
         for target in self.targets:
             at = target.omega, target.hold, target.place
             G, dG = self.inner.sensitivities(values, *at)
-            r, J = target.error(G), target.relative(G, dG) * by[..., None]
-            cost += np.einsum("sk,sk->s", r, r)
-            g += (J @ r[..., None])[..., 0]
-            H += J @ J.swapaxes(-1, -2)
-        cost += self.leash * np.einsum("sp,sp->s", x, x)
-        return cost, g + self.leash * x, H + self.leash * np.eye(P)
+            rows.append((target.error(G), target.relative(G, dG) * by[..., None]))
+        cost, g, H = _sums(rows)
+        cost = cost + self.leash * np.einsum("sp,sp->s", x, x)
+        return cost, g + self.leash * x, H + self.leash * np.eye(x.shape[1])
 
 
 class _NearBatch:
@@ -69,15 +66,20 @@ class _NearBatch:
 
     def normal(self, x: FloatArray, which: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Cost, JᵀR and JᵀJ of some."""
-        S, P = x.shape
-        cost, g, H = np.zeros(S), np.zeros((S, P)), np.zeros((S, P, P))
+        rows = []
         for target in self.near:
             G, dG = self.inner.sensitivities(x, target.omega, target.hold, target.place)
-            r, J = target.error(G), target.relative(dG)
-            cost += np.einsum("sk,sk->s", r, r)
-            g += (J @ r[..., None])[..., 0]
-            H += J @ J.swapaxes(-1, -2)
-        return cost, g, H
+            rows.append((target.error(G), target.relative(dG)))
+        return _sums(rows)
+
+
+def _sums(
+    rows: Sequence[tuple[FloatArray, FloatArray]],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cost (S,), JᵀR (S, P) and JᵀJ (S, P, P) of residuals (S, K) and derivatives (S, P, K)."""
+    r = np.concatenate([residual for residual, _ in rows], axis=-1)
+    J = np.concatenate([slope for _, slope in rows], axis=-1)
+    return np.einsum("sk,sk->s", r, r), (J @ r[..., None])[..., 0], J @ J.swapaxes(-1, -2)
 
 
 @dataclass(frozen=True)
