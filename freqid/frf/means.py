@@ -26,7 +26,8 @@ _REPEATS = 0.9
 _MULTIPLES = 12
 # a period that repeats less than this part of what a multiple does is wrong, and so little, none
 _WORSE, _NOT_AT_ALL = 0.75, 0.05
-# degrees of freedom that a covariance should have; lines around one are taken for it until it does
+# degrees of freedom that the covariance of one output should have, and one more for each other
+# output; lines around one are taken for it until it does
 _FREEDOM = 14
 # amplitude of a line in standard errors of its noise from which it is excited for certain
 _CERTAIN = 4.0
@@ -44,7 +45,9 @@ def periodic(
 
     Means over the periods are taken before any ratio, so that noise on the input leaves no bias but
     that of its mean, and the full covariance of inputs and outputs goes with them: ``fit`` makes
-    the sample maximum likelihood of it, which has none.
+    the sample maximum likelihood of it, which has none. An input that is faster than the output is
+    taken as it was; lines onto which its power above the output's Nyquist frequency folds are left
+    out.
 
     Args:
         records: experiments of whole periods, each with an excitation of its own; as many as inputs
@@ -57,7 +60,8 @@ def periodic(
 
     Returns a PeriodicResponse (outputs, inputs, K) at the excited lines with variance, ``inputs``,
     ``outputs`` (channels, experiments, K) and their ``noise``. Raises ValueError for fewer than two
-    periods, a period that is not one, or fewer experiments than inputs.
+    periods, a period that is not one, fewer experiments than inputs, or power that folds onto
+    every line.
 
     Source: Pintelon and Schoukens, System Identification, 2012, sections 2.5, 2.7 and 9.11.
 
@@ -69,15 +73,14 @@ def periodic(
     """
     sets = as_records(records)
     first = sets[0]
-    if first.factor > 1:
-        raise InputError("records have an input faster than the output; decimate the input first")
+    M = first.factor
     if reference is None and all(r.reference is not None for r in sets):
         reference = True
     signals = references_of(sets, reference)
     n = _samples(sets, signals, period)
     for i, record in enumerate(sets):
-        driven = record.inputs if signals is None else signals[i]
-        _check_period(f"records[{i}]", driven - driven.mean(axis=0), n, first.dt)
+        driven, size = (record.inputs, n * M) if signals is None else (signals[i], n)
+        _check_period(f"records[{i}]", driven - driven.mean(axis=0), size, n * first.dt)
     skip = whole("skip", skip, least=0)
     counts = [r.n_samples // n - skip for r in sets]
     if min(counts) < 2:
@@ -97,6 +100,14 @@ def periodic(
     # the line at Nyquist has no phase
     inside &= 2 * np.arange(len(f)) < n
     excited = inside & _excited(sets, signals, Z, n, skip, P)
+    if M > 1:
+        folded = _folded(sets, n, skip, P)
+        if excited.any() and not (excited & ~folded).any():
+            raise InputError(
+                f"every excited line in band={band} has power of the input from above the output's "
+                f"Nyquist frequency of {first.nyquist:g} Hz folded onto it; excite below that"
+            )
+        excited &= ~folded
     if not excited.any():
         raise InputError(f"input has no energy in band={band}; widen it")
     mean, noise, freedom = _means(Z[..., excited], first.n_outputs)
@@ -108,10 +119,22 @@ def _samples(
 ) -> int:
     """Samples of a period, given or found; ValueError where there is none."""
     first = sets[0]
-    x = (first.inputs if signals is None else signals[0])[:, 0]
-    x = x - x.mean()
     if period is not None:
         return steps("period", period, first.dt, least=2)
+    if signals is not None:
+        return _repeat(signals[0][:, 0])
+    fine, M = _repeat(first.inputs[:, 0]), first.factor
+    if fine % M:
+        raise InputError(
+            f"the excitation repeats after {fine * first.input_dt:g} s, which is no whole number "
+            f"of the output's samples of {first.dt:g} s; make it one"
+        )
+    return fine // M
+
+
+def _repeat(x: FloatArray) -> int:
+    """Samples after which a signal repeats itself; ValueError where it does not."""
+    x = x - x.mean()
     N = len(x)
     size = scipy.fft.next_fast_len(2 * N)
     r = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, size)) ** 2, size)[: N // 2 + 1]
@@ -130,9 +153,9 @@ def _samples(
     return int(near[np.argmax(alike[near])])
 
 
-def _check_period(name: str, x: FloatArray, n: int, dt: float) -> None:
-    """ValueError where n samples do not repeat, or a multiple of them does so much better."""
-    own, period = _repeats(x, n), n * dt
+def _check_period(name: str, x: FloatArray, n: int, period: float) -> None:
+    """ValueError where n samples, a period in s, do not repeat, or a multiple does much better."""
+    own = _repeats(x, n)
     for m in range(2, min(len(x) // n // 2, _MULTIPLES) + 1):
         better = _repeats(x, m * n)
         if better > _REPEATS and own < _WORSE * better:
@@ -158,10 +181,28 @@ def _repeats(x: FloatArray, n: int) -> float:
 
 
 def _spectra(record: Record, n: int, skip: int, periods: int) -> ComplexArray:
-    """DFT of each period (P, outputs + inputs, lines), scaled to amplitudes."""
-    both = np.column_stack([record.outputs, record.inputs])
-    kept = both[skip * n : (skip + periods) * n].reshape(periods, n, -1)
+    """Amplitudes of each period (P, outputs + inputs, lines up to the output's Nyquist)."""
+    y = _amplitudes(record.outputs, n, skip, periods)
+    u = _amplitudes(record.inputs, n * record.factor, skip, periods)
+    return np.concatenate([y, u[..., : y.shape[-1]]], axis=1)
+
+
+def _amplitudes(x: FloatArray, n: int, skip: int, periods: int) -> ComplexArray:
+    """DFT of each period of n samples, (P, channels, lines), scaled to amplitudes."""
+    kept = x[skip * n : (skip + periods) * n].reshape(periods, n, -1)
     return np.moveaxis(scipy.fft.rfft(kept, axis=1), 1, -1) * 2 / n
+
+
+def _folded(sets: Sequence[Record], n: int, skip: int, P: int) -> FloatArray:
+    """Which lines of a slower output have excited lines of the input folded onto them, (lines,)."""
+    fine = n * sets[0].factor
+    U = np.stack([_amplitudes(r.inputs, fine, skip, P) for r in sets])
+    lines = np.arange(U.shape[-1])
+    at = lines % n
+    at = np.minimum(at, n - at)
+    folded = np.zeros(n // 2 + 1, bool)
+    folded[at[_driven(U) & (2 * lines > n)]] = True
+    return folded
 
 
 def _excited(
@@ -178,7 +219,12 @@ def _excited(
         power = sum((np.abs(scipy.fft.rfft(k, axis=0)) ** 2).sum(axis=1) for k in kept)
         level = np.sqrt(np.asarray(power))
         return level > _SILENT * level.max()
-    U = Z[:, :, sets[0].n_outputs :]
+    return _driven(Z[:, :, sets[0].n_outputs :])
+
+
+def _driven(U: ComplexArray) -> FloatArray:
+    """Which lines of the inputs (E, P, channels, lines) are more than noise, (lines,)."""
+    P = U.shape[1]
     level = np.abs(U.mean(axis=1)).max(axis=(0, 1))
     # few periods tell the noise of one line badly: those beside it have as much
     around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, _FREEDOM + 1, axis=-1)
@@ -196,12 +242,17 @@ def _means(Z: ComplexArray, p: int) -> tuple[ComplexArray, ComplexArray, int]:
     mean = Z.mean(axis=1)
     left = Z - mean[:, None]
     C = np.einsum("epak,epbk->ekab", left, left.conj()) / (P - 1) / P
-    width = min(-(-_FREEDOM // (P - 1)), K) | 1
+    width = min(-(-(_FREEDOM + p - 1) // (P - 1)), K) | 1
     if width > 1:
         width = min(width, K if K % 2 else K - 1)
-        C = scipy.ndimage.uniform_filter1d(C.real, width, axis=1, mode="reflect") + (
-            1j * scipy.ndimage.uniform_filter1d(C.imag, width, axis=1, mode="reflect")
+        C = scipy.ndimage.uniform_filter1d(C.real, width, axis=1) + (
+            1j * scipy.ndimage.uniform_filter1d(C.imag, width, axis=1)
         )
+        # at the ends as many lines as elsewhere: none is taken twice
+        C = C[:, np.clip(np.arange(K), width // 2, K - 1 - width // 2)]
+    # what does not scatter at all is still rounded
+    rounding = (np.finfo(float).eps * np.abs(mean).max(axis=-1)) ** 2  # (E, channels)
+    C = C + rounding[:, None, :, None] * np.eye(C.shape[-1])
     return mean, C, (P - 1) * max(width, 1)
 
 
@@ -224,7 +275,8 @@ def _packed(
     each = np.einsum("kac,ekcd,kad->eka", both, C, both.conj()).real  # (E, K, p)
     variance = np.einsum("eka,kem->kam", each, np.abs(back) ** 2)
     return PeriodicResponse(
-        f, np.moveaxis(G, 0, -1), dt=first.dt, hold=first.hold,
+        # the hold's own period, so that a faster input is held as it was
+        f, np.moveaxis(G, 0, -1), dt=first.input_dt, hold=first.hold,
         variance=np.moveaxis(variance, 0, -1),
         input_spectrum=(np.abs(U) ** 2).mean(axis=1),
         input_names=first.input_names, output_names=first.output_names,

@@ -194,3 +194,56 @@ def test_a_period_that_is_none_is_refused_by_name():
         record.u + record.u.std() * rng.standard_normal(len(record.u)), record.y, 1e-3
     )
     assert fq.periodic(noisy, period=1.0).response.shape[-1] > 10
+
+
+def test_error_bars_of_several_outputs_hold():
+    """The covariance of three outputs, from three periods, is a worse estimate than that of one."""
+
+    def matrices(a, b1, b2, b3):
+        return [[-a]], [[1.0]], [[b1], [b2], [b3]], np.zeros((3, 1))
+
+    true = {"a": 60.0, "b1": 100.0, "b2": 40.0, "b3": 70.0}
+    plant = fq.GreyBox(matrices, [fq.Parameter(n, v) for n, v in true.items()])
+    u = np.tile(PERIOD, 4)
+    clean, score = fq.simulate(plant, u, DT, hold="bl").y, []
+    for seed in range(250):
+        rng = np.random.default_rng(seed)
+        mixed = rng.standard_normal(clean.shape) @ [[1.0, 0.6, 0], [0, 1.0, 0.6], [0, 0, 1.0]]
+        y = clean + 0.1 * clean.std(axis=0) * mixed
+        est = fq.fit(plant, fq.periodic(fq.Record(u, y, DT, hold="bl"), 1.0, skip=1), n_starts=1)
+        score.append((est.values - list(true.values())) / est.parameters["std"])
+    assert np.sqrt(np.mean(np.square(score))) == pytest.approx(1, abs=0.06)
+
+
+def test_a_slow_output_keeps_its_fast_input():
+    """Commands at 1 kHz, a sensor at 250 Hz, in a loop: as exact as with all of the output."""
+    h, M = 1e-3, 4
+    r = np.tile(fq.multisine((1, 120), 1.0, h, 1, crest="random"), 5)
+    phi = np.exp(-60 * h)
+    x, u, y = 0.0, np.zeros(len(r)), np.zeros(len(r))
+    for k in range(len(r)):
+        y[k] = x
+        u[k] = r[k] - y[k]
+        x = phi * x + 100 / 60 * (1 - phi) * u[k]
+    slow = fq.Record(u, y[::M], M * h, input_dt=h)
+    frf = fq.periodic(slow, skip=2)
+    assert frf.frequency[-1] == pytest.approx(120)
+    assert frf.dt == pytest.approx(h)
+    assert fq.fit(LAG, frf).values == pytest.approx([100, 60], rel=1e-9)
+    assert fq.fit(LAG, fq.periodic(fq.Record(u, y, h), skip=2)).values == pytest.approx(
+        [100, 60], rel=1e-9
+    )
+
+
+def test_power_above_the_slow_nyquist_frequency_is_left_out_or_refused():
+    h, M = 1e-3, 4
+    both = fq.multisine((1, 100), 1.0, h) + fq.multisine((160, 200), 1.0, h)
+    record = fq.simulate(LAG, np.tile(both, 5), h).decimate(M, keep_input=True)
+    frf = fq.periodic(record, 1.0, skip=1)
+    assert frf.frequency == pytest.approx(np.r_[1:50, 91:101])
+    assert fq.fit(LAG, frf).values == pytest.approx([100, 60], rel=1e-9)
+    with pytest.raises(ValueError, match="Nyquist frequency of 125 Hz folded onto it"):
+        fq.periodic(record, 1.0, skip=1, band=(50, 90))
+    odd = fq.simulate(LAG, fq.multisine((1, 100), 0.902, h, 5), h).decimate(M, keep_input=True)
+    with pytest.raises(ValueError, match="no whole number of the output's samples"):
+        fq.periodic(odd)

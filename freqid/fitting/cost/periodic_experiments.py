@@ -23,8 +23,9 @@ from freqid.lti import (
     sampled_response,
 )
 
-# so small a part of the largest variance is no variance
+# so small a part of the largest variance is no variance, nor is what rounding of the means makes
 _FLOOR = 1e-14
+_ROUNDING = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +44,14 @@ class PeriodicExperiment:
 
     @property
     def inflation(self) -> float:
-        """How much more the estimate scatters than its weights say: they are estimates, too."""
-        freedom = self.data.freedom
-        return (freedom - 1) / (freedom - 2) if freedom > 2 else np.inf
+        """How much more the estimate scatters than its weights say: they are estimates, too.
+
+        E S⁻¹ΣS⁻¹ beside (E S⁻¹)² Σ of a complex Wishart matrix S on ν degrees of freedom and p
+        outputs (Maiwald and Kraus, IEE Proceedings F 147, 2000).
+        """
+        freedom, p = self.data.freedom, len(self.data.response)
+        left = freedom - p
+        return freedom * left / (left**2 - 1) if left > 1 else np.inf
 
     @property
     def energy(self) -> float:
@@ -82,7 +88,8 @@ class _Evaluation:
         total = C[..., :p, :p] + self.G @ self.C_U @ Gh - cross - cross.conj().swapaxes(-1, -2)
         total = (total + total.conj().swapaxes(-1, -2)) / 2
         size = np.einsum("ekaa->eka", total).real
-        floor = _FLOOR * max(float(size.max(initial=0)), 1e-300)
+        rounding = (_ROUNDING * float(np.abs(Y).max(initial=0))) ** 2
+        floor = max(_FLOOR * float(size.max(initial=0)), rounding, 1e-300)
         L = np.linalg.cholesky(total + floor * np.eye(p))
         self.inverse = np.linalg.inv(L)  # (E, K, p, p)
         self.error = np.einsum("kpm,ekm->ekp", self.G, self.U) - Y

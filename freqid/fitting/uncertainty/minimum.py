@@ -13,6 +13,7 @@ import scipy
 from freqid.checks import FloatArray
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective, Point
+from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.search.descent import Solution
 from freqid.fitting.uncertainty.covariance import Determined, determined
@@ -128,10 +129,11 @@ class Minimum:
         if score is None and not self.exact:
             score = score_covariance(self.objective, self.x, self.alone)
         if score is None:
-            wider = [getattr(e, "inflation", 1.0) for e in self.experiments]
-            return self.determined.scatter(
-                self.inflation * float(np.mean(wider)) * self.noise_variance * H
-            )
+            each = [
+                e.inflation if isinstance(e, PeriodicExperiment) else 1 for e in self.experiments
+            ]
+            wider = self.inflation * float(np.mean(each))
+            return self.determined.scatter(wider * self.noise_variance * H)
         if self.prior is not None:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
         return self.determined.scatter(self.inflation * H @ score @ H)
