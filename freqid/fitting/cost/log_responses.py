@@ -17,7 +17,8 @@ from freqid.lti import Hold, Realisation, sampled_response
 class LogResponse:
     """log(G/Ĝ) at the lines of an experiment, (outputs, inputs, lines) as real rows.
 
-    ``weight`` (outputs, inputs, lines) multiplies the error: it says how well Ĝ is known.
+    ``weight`` (outputs, inputs, lines) multiplies the error: it says how well Ĝ is known. Where it
+    is zero the responses may be, too.
     """
 
     def __init__(
@@ -30,6 +31,8 @@ class LogResponse:
     ) -> None:
         self.omega, self.measured, self.hold = omega, response, hold
         self.weight = np.broadcast_to(weight, response.shape)
+        silent = self.weight == 0
+        self.silent = silent if silent.any() else None
         self.n_rows, self.place = 2 * response.size, place
 
     @property
@@ -43,12 +46,18 @@ class LogResponse:
 
     def error(self, G: ComplexArray) -> FloatArray:
         """log(G/Ĝ) as real rows, (…, rows)."""
-        ratio = G / self.measured
+        if self.silent is not None:
+            G = np.where(self.silent, 1, G)
+            ratio = G / np.where(self.silent, 1, self.measured)
+        else:
+            ratio = G / self.measured
         error = (np.log(np.abs(ratio)) + 1j * np.angle(ratio)) * self.weight
         return error.reshape(*G.shape[:-3], -1).view(float)
 
     def relative(self, G: ComplexArray, dG: ComplexArray) -> FloatArray:
         """Derivatives of the same, (…, P, rows)."""
+        if self.silent is not None:
+            G = np.where(self.silent, 1, G)
         change = dG / G[..., None, :, :, :] * self.weight
         return change.reshape(*dG.shape[:-3], -1).view(float)
 

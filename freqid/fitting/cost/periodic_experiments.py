@@ -43,6 +43,11 @@ class PeriodicExperiment:
         return 2 * self.data.outputs.size
 
     @property
+    def n_means(self) -> int:
+        """Lines, those of each experiment counted apart."""
+        return self.data.outputs[0].size
+
+    @property
     def inflation(self) -> float:
         """How much more the estimate scatters than its weights say: they are estimates, too.
 

@@ -33,8 +33,9 @@ class Solution:
 
 # relative gain in cost that ends a search within bounds
 _BOUNDED = 1e-9
-# and that ends its reflective steps, where exact ones take over
-_NEAR = 1e-4
+# relative gain that ends its reflective steps, or so many of them for each unknown: they go round
+# valleys well, but gain ever less next to a bound, where exact ones take over
+_NEAR, _REFLECTED = 1e-4, 10
 # a step that would gain this part of the cost shows that a search has not come to its end
 _EDGE = 1e-6
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
@@ -44,7 +45,7 @@ _WALL = 1e100
 def minimise(
     objective: Objective, start: FloatArray, tolerance: float = 1e-14, limit: int | None = None
 ) -> Solution:
-    """Least squares from one start: Levenberg-Marquardt, or trust-region reflective with bounds.
+    """Least squares from one start: Levenberg-Marquardt, within bounds where there are any.
 
     ``limit`` is the most evaluations. Raises ValueError when the model cannot be computed at the
     start.
@@ -69,7 +70,9 @@ def minimise(
     lower, upper = objective.structure.lower, objective.structure.upper
     bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
 
-    def searched(begin: FloatArray, gain: float) -> scipy.optimize.OptimizeResult:
+    most = limit or 100 * size
+
+    def searched(begin: FloatArray, gain: float, most: int) -> scipy.optimize.OptimizeResult:
         return scipy.optimize.least_squares(
             residual,
             np.clip(begin, lower, upper),
@@ -80,25 +83,34 @@ def minimise(
             ftol=max(gain, 1e-15),
             xtol=max(1e-2 * gain, 1e-12),
             gtol=1e-15,
-            max_nfev=limit or 100 * size,
+            max_nfev=most,
         )
 
     if bounded:
-        near = searched(start, max(tolerance, _NEAR))
-        ended = within_bounds(objective, near.x)
+        near = searched(start, max(tolerance, _NEAR), min(most, _REFLECTED * size))
+        ended = within_bounds(objective, near.x, most, tolerance)
         if ended is not None:
-            return Solution(*ended, True, "Bounded Gauss-Newton steps became negligible.")
-        # next to a bound the reflective steps gain ever less, for ever
+            x, end, how = ended
+            said = {
+                "minimum": "Bounded Gauss-Newton steps became negligible.",
+                "edge": _fallen(objective),
+                "limit": "the most evaluations were made",
+            }
+            return Solution(x, end, how == "minimum", said[how])
+        # where no such step gains anything, next to what cannot be computed, reflective ones may
         start, tolerance = near.x, max(tolerance, _BOUNDED)
-    result = searched(start, tolerance)
+    result = searched(start, tolerance, most)
     point = objective.point(result.x)
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
     wanted = point.triangle[:-1, -1]
     if objective.failure is not None and wanted @ wanted > _EDGE * point.cost + objective.rounding:
-        message = f"the cost falls on where the model cannot be computed ({objective.failure})"
-        return Solution(result.x, point, False, message)
+        return Solution(result.x, point, False, _fallen(objective))
     return Solution(result.x, point, result.status > 0, result.message)
+
+
+def _fallen(objective: Objective) -> str:
+    return f"the cost falls on where the model cannot be computed ({objective.failure})"
 
 
 # a Gauss-Newton step of this relative size needs no second look: the next one is its square

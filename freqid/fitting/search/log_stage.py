@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.fitting.cost.experiments import SpectralExperiment
@@ -57,6 +58,8 @@ class LogStructure:
 Smooth = Callable[[FloatArray], tuple[ComplexArray, FloatArray]]
 # relative standard errors up to which lines count alike, and from which they tell nothing
 _SURE, _KNOWN = 0.05, 1.0
+# neighbours among which the noise of a line is told
+_AROUND = 17
 
 
 def log_targets(
@@ -79,7 +82,8 @@ def log_targets(
             response = _empirical(e)
             if response is None or damping:
                 return []
-            targets.append(LogResponse(*response, e.hold, place=e.place))
+            at, G, error = response
+            targets.append(LogResponse(at, G, e.hold, _weight(error), e.place))
             continue
         smooth = black_boxes(e.place)
         omega = told(e.lines.omega[e.lines.counted & (e.lines.omega > 0)], smooth, count)
@@ -87,9 +91,13 @@ def log_targets(
             return []
         at = omega * (1 - 1j * damping) if damping else omega
         G, error = smooth(at)
-        weight = 1 / np.maximum(error / _SURE, 1)
-        targets.append(LogResponse(at, G, e.hold, weight, e.place))
+        targets.append(LogResponse(at, G, e.hold, _weight(error), e.place))
     return targets
+
+
+def _weight(error: FloatArray) -> FloatArray:
+    """What errors of logarithms count where the response has such relative standard errors."""
+    return np.where(error < _KNOWN, 1 / np.maximum(error / _SURE, 1), 0)
 
 
 def told(omega: FloatArray, smooth: Smooth, count: int) -> FloatArray:
@@ -102,11 +110,15 @@ def told(omega: FloatArray, smooth: Smooth, count: int) -> FloatArray:
     ratios = np.searchsorted(omega, np.geomspace(omega[0], omega[-1], 2 * count))
     few = omega[np.unique(np.append(even, np.minimum(ratios, len(omega) - 1)).astype(int))]
     G, error = smooth(few)
-    known = (error < _KNOWN).all(axis=(0, 1))
+    # channels that do not hear one another have nothing to tell
+    told_of = error < _KNOWN
+    known = told_of.any(axis=(0, 1))
     if known.sum() < 2:
         return few[known]
-    few, G = few[known], G[..., known]
-    bend = np.minimum(np.abs(np.diff(np.log(G), axis=-1)), 1).mean(axis=(0, 1))
+    few, told_of = few[known], told_of[..., known]
+    G = np.where(told_of, G[..., known], 1)
+    both = told_of[..., 1:] & told_of[..., :-1]
+    bend = (both * np.minimum(np.abs(np.diff(np.log(G), axis=-1)), 1)).mean(axis=(0, 1))
     way = np.concatenate([[0], np.cumsum(bend + bend.mean() + 1e-9)])
     at = np.searchsorted(way, np.linspace(0, way[-1], count))
     return few[np.unique(np.minimum(at, len(few) - 1))]
@@ -117,8 +129,10 @@ def _evenly(count: int) -> IntArray:
     return np.unique(np.linspace(0, count - 1, _LINES).astype(int))
 
 
-def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
-    """Frequencies and Ĝ (outputs, inputs, lines) at lines where one input frequency rules."""
+def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray, FloatArray] | None:
+    """Frequencies, Ĝ (outputs, inputs, lines) and its relative standard errors at lines where one
+    input frequency rules.
+    """
     lines = e.lines
     m, channels, _ = lines.U.shape
     if e.lift > 1 and isinstance(e.hold, PeriodicHold):
@@ -140,9 +154,29 @@ def _empirical(e: SpectralExperiment) -> tuple[FloatArray, ComplexArray] | None:
     power = np.abs(U) ** 2
     weight = (np.abs(lines.scale) > 0).all(axis=(0, 1))
     usable = (power > 1e-3 * power.max()) & (power > 0.98 * total) & weight & (lines.omega > 0)
-    usable &= (np.abs(G) > 0).all(axis=(0, 1))
     kept = np.flatnonzero(usable)
     if len(kept) < 8:
         return None
-    kept = kept[_evenly(len(kept))]
-    return lines.omega[kept], G[:, :, kept]
+    G = G[:, :, kept]
+    error = _scatter(G)
+    known = (error < _KNOWN).any(axis=(0, 1))
+    kept, G, error = kept[known], G[:, :, known], error[:, :, known]
+    if len(kept) < 8:
+        return None
+    few = _evenly(len(kept))
+    return lines.omega[kept[few]], G[:, :, few], error[:, :, few]
+
+
+def _scatter(G: ComplexArray) -> FloatArray:
+    """Relative standard errors of responses (…, K): what their lines do not have in common.
+
+    Second differences leave the noise of a smooth response, the median leaves out its resonances.
+    """
+    ends = [(0, 0)] * (G.ndim - 1) + [(1, 1)]
+    bend = np.pad(np.abs(np.diff(G, n=2, axis=-1)) / np.sqrt(6), ends, mode="edge")
+    around = (1,) * (G.ndim - 1) + (_AROUND,)
+    size = np.abs(G)
+    # some lines of noise alone are large; their neighbours are not
+    size = np.minimum(size, scipy.ndimage.median_filter(size, around))
+    local = scipy.ndimage.median_filter(bend, around) / np.sqrt(np.log(2))
+    return np.where(size > 0, local / np.maximum(size, 1e-300), np.inf)

@@ -1,0 +1,95 @@
+"""Searches within bounds, beside scipy's own on the same residuals."""
+
+import numpy as np
+import pytest
+import scipy
+
+import freqid as fq
+
+DT = 4e-3
+
+
+def bounded(**limits):
+    """The paper's axis with bounds as users write them: nothing below zero."""
+    plant = fq.two_mass()
+    free = [p.name for p in plant.parameters if not p.fixed]
+    return plant.with_bounds(**dict.fromkeys(free, (0.0, np.inf)) | limits)
+
+
+def wrong_hold(noise=0.05, seed=0):
+    """The paper's experiment at a slow rate, its hold forgotten: dampings want to be negative."""
+    fine = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 10, 0.5e-3), 0.5e-3)
+    slow = fine.decimate(8).with_noise(noise * fine.y.std(), seed=seed)
+    return fq.Record(slow.u, slow.y, slow.dt)
+
+
+def others(model, record, at):
+    """The least cost that scipy's trust-region reflective finds from five starts beside ``at``."""
+    objective = fq.fit(model, record, band=(10, 80), start=at, n_starts=1).minimum.objective
+    structure, found = objective.structure, []
+    x0 = np.ones(len(structure.names))
+    for seed in range(5):
+        begin = x0 * 1.3 ** np.random.default_rng(seed).uniform(-1, 1, len(x0))
+        found.append(
+            scipy.optimize.least_squares(
+                lambda x: objective.point(x).residual,
+                begin,
+                jac=lambda x: objective.point(x).jacobian,
+                bounds=(structure.lower, structure.upper),
+                x_scale="jac",
+                xtol=1e-15,
+                ftol=1e-15,
+                gtol=1e-15,
+            )
+        )
+    return min(2 * f.cost for f in found)
+
+
+def test_what_lies_on_a_bound_is_the_least_there():
+    record = wrong_hold()
+    free = fq.fit(fq.two_mass(), record, band=(10, 80))
+    assert (free.values < 0).any()
+    est = fq.fit(bounded(), record, band=(10, 80))
+    on = est.values == 0
+    assert on.any()
+    assert est.cost > free.cost
+    # on a bound the cost rises inwards, elsewhere it is flat
+    point = est.minimum.point
+    gradient = point.jacobian.T @ point.residual / np.linalg.norm(point.jacobian, axis=0)
+    assert (gradient[on] > 0).all()
+    assert np.abs(gradient[~on]).max() < 1e-5 * np.sqrt(point.cost)
+    assert est.cost <= others(bounded(), record, dict(est.parameters["value"])) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_that_do_not_bind_change_nothing(seed):
+    rng = np.random.default_rng(seed)
+    record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 4, 1e-3), 1e-3)
+    record = record.with_noise(0.02 * record.y.std(), seed=seed)
+    true = fq.two_mass().values
+    free = [p.name for p in fq.two_mass().parameters if not p.fixed]
+    start = {n: true[n] * 2 ** rng.uniform(-1, 1) for n in free}
+    wide = bounded(**{n: (0.0, 5 * true[n]) for n in free})
+    one, other = (fq.fit(m, record, band=(10, 80), start=start) for m in (fq.two_mass(), wide))
+    assert other.cost == pytest.approx(one.cost, rel=1e-9)
+    assert other.n_evaluations < 3 * one.n_evaluations + 30
+
+
+def test_a_bound_on_which_nothing_can_be_computed_is_approached():
+    """A mass that wants to be zero, where the matrices end: the fit says so, in time."""
+
+    def matrices(m, c, k):
+        if m <= 0:
+            raise ValueError("no mass")
+        return [[0, 1], [-k / m, -c / m]], [[0], [1 / m]], [[1, 0]], [[0]]
+
+    def plant(m):
+        parameters = [fq.Parameter(n, v, lower=0) for n, v in (("m", m), ("c", 2.0), ("k", 50.0))]
+        return fq.GreyBox(matrices, parameters)
+
+    lag = fq.first_order(b=0.5, a=25.0)
+    record = fq.simulate(lag, fq.white_noise(800, seed=1), 0.01).with_noise(1e-4, seed=2)
+    est = fq.fit(plant(0.05), record, n_starts=1)
+    assert est["m"] < 1e-3
+    assert est["k"] / est["c"] == pytest.approx(25, rel=0.02)
+    assert est.n_evaluations < 400

@@ -1,0 +1,68 @@
+"""Searches of several channels: noise that ends them, and channels that do not hear one another."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+from freqid.fitting.reading import Reading
+from freqid.fitting.search.noise_floor import noise_floor
+
+DT = 2e-3
+NAMES = {"w1": 60.0, "w2": 150.0, "z1": 0.1, "z2": 0.05, "g1": 1.0, "g2": 2.0}
+
+
+def matrices(w1, w2, z1, z2, g1, g2, cross):
+    """Two modes, each seen by its own pair; ``cross`` couples them."""
+    one = [[0, 1], [-(w1**2), -2 * z1 * w1]]
+    other = [[0, 1], [-(w2**2), -2 * z2 * w2]]
+    A = np.block([[np.array(one), np.zeros((2, 2))], [np.zeros((2, 2)), np.array(other)]])
+    B = np.array([[0, 0], [g1 * w1**2, 0], [cross * w2, 0], [0, g2 * w2**2]])
+    return A, B, [[1, 0, 0, 0], [0, 0, 1, 0]], np.zeros((2, 2))
+
+
+def plant(cross=0.0, **start):
+    values = NAMES | start
+    free = [fq.Parameter(n, v, lower=0) for n, v in values.items()]
+    return fq.GreyBox(matrices, [*free, fq.Parameter("cross", cross, fixed=True)])
+
+
+def noisy_response(seed, part=0.02, cross=0.0):
+    rng = np.random.default_rng(seed)
+    omega = 2 * np.pi * np.linspace(1, 60, 120)
+    frf = plant(cross).frequency_response(omega)
+    size = part * np.abs(frf.response).max(axis=(1, 2))[:, None, None]
+    noise = rng.standard_normal((2, *frf.response.shape)) * size / np.sqrt(2)
+    return fq.FrequencyResponse(
+        frf.frequency, frf.response + noise[0] + 1j * noise[1], hold=frf.hold
+    ), float((size**2).sum() * 2 * len(omega))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_noise_of_a_response_is_told(seed):
+    frf, power = noisy_response(seed, cross=0.5)
+    floor = noise_floor([Reading.of(frf).lines()])
+    assert floor == pytest.approx(power, rel=0.25)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_noise_of_a_record_with_two_inputs_is_told(seed):
+    u = fq.white_noise(8000, seed=seed).reshape(-1, 2)
+    record = fq.simulate(plant(0.5), u, DT)
+    std = 0.1 * record.y.std(axis=0)
+    floor = noise_floor([Reading.of(record.with_noise(std, seed=seed)).lines()])
+    # the cost is the sum of squared samples
+    assert floor == pytest.approx(record.n_samples * (std**2).sum(), rel=0.2)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_not_heard_misleads_no_start(seed):
+    """Entries that hold nothing but noise, whose logarithm is none of the model's."""
+    rng = np.random.default_rng(seed)
+    frf, power = noisy_response(seed)
+    start = {n: v * 1.5 ** rng.uniform(-1, 1) for n, v in NAMES.items()}
+    est = fq.fit(plant(), frf, start=start)
+    std = est.parameters["std"]
+    true = np.array([NAMES[n] for n in std.index])
+    assert (np.abs(est.values - true) < 5 * std).all()
+    assert est.cost == pytest.approx(power, rel=0.2)
+    assert est.n_evaluations < 60
