@@ -20,7 +20,7 @@ from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
-from freqid.fitting.uncertainty.noise_spectrum import leverage, projected
+from freqid.fitting.uncertainty.gradient_noise import leverage, projected
 from freqid.lti import Plane
 
 

@@ -32,8 +32,8 @@ from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread, together
+from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.fitting.uncertainty.noise_spectrum import projected
 from freqid.lti import in_one_blas_thread
 from freqid.models import DiscreteModel, Model
 

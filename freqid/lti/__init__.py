@@ -16,7 +16,7 @@ from freqid.lti.holds import (
     known_hold,
 )
 from freqid.lti.polynomials import PolynomialBasis
-from freqid.lti.projection import eliminate, triangle, triangle_of
+from freqid.lti.projection import directions, eliminate, triangle, triangle_of
 from freqid.lti.quadrature import NODES, TOLERANCE, panel_nodes, resolved, unresolved
 from freqid.lti.realisation import Realisation, Timing, sampled_response
 from freqid.lti.responses import (

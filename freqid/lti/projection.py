@@ -31,6 +31,22 @@ def triangle(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
+def directions(
+    rows: FloatArray, share: float, least: float = 0.0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """U (q, r), s (r,) and Vt (r, R) of few long rows (q, R) = U s Vt, of the singular values above
+    ``share`` of the largest and above ``least``.
+
+    Those of the small triangle of a QR decomposition, which long rows reach many times sooner.
+    """
+    if not rows.size:
+        return np.zeros((len(rows), 0)), np.zeros(0), np.zeros((0, rows.shape[1]))
+    U, s, _ = np.linalg.svd(triangle(rows.T).T, full_matrices=False)
+    told = s > max(share * s[0], least)
+    U, s = U[:, told], s[told]
+    return U, s, (U.T @ rows) / s[:, None]
+
+
 # rows for which, from so many columns on, products row by row are faster
 _FEW_ROWS, _SHORT = 6, 2000
 

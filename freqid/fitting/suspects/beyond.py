@@ -22,6 +22,7 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, score
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import excess, shared
+from freqid.lti import directions
 from freqid.models import GreyBox, Model, OutputError
 
 # experiments times parameters whose separate fits are compared at the most
@@ -85,23 +86,22 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     if len(scene.seen) < 2 or P == 0 or len(scene.seen) * P > _MOST:
         return []
     gain, rank = 0.0, 0
-    steps, told_by = [], []
+    steps, told_by, ways = [], [], []
     unit = np.maximum(np.linalg.norm(scene.jacobian[free], axis=1), 1e-300)
     first = 0
     for s in scene.seen:
         J = s.jacobian[free]
         size = np.linalg.norm(J, axis=1)
         size[size == 0] = 1
-        U, sv, Vt = np.linalg.svd(J / size[:, None], full_matrices=False)
-        told = sv > 1e-7 * max(sv.max(initial=0), 1e-300)
-        Vt = Vt[told]
+        U, sv, Vt = directions(J / size[:, None], 1e-7)
+        ways.append(Vt)
         along = Vt @ s.left
         variance = scene.variance[first : first + len(s.left)]
         first += len(s.left)
         L = np.linalg.cholesky((Vt * variance) @ Vt.T)
         told_by.append(np.linalg.solve(L, np.column_stack([along, (Vt @ J.T) / unit])))
         gain, rank = gain + float(along @ along), rank + len(Vt)
-        steps.append(-((U[:, told] / sv[told]) @ along) / size)
+        steps.append(-((U / sv) @ along) / size)
     degrees, freedom = rank - P, scene.freedom - rank + P
     if degrees < 1 or freedom < 1:
         return []
@@ -116,8 +116,9 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     with np.errstate(all="ignore"):
         shift = np.abs(np.array(steps)) / np.sqrt(variance)
     largest = float(np.nanmax(np.where(np.isfinite(shift), shift, np.nan), initial=0.0))
-    f = chi / degrees / scene.together(scene.left)
-    p = float(scipy.stats.f.sf(f, degrees, freedom))
+    wider = scene.together(scene.left) * scene.tied(scene.left, ways)
+    f = chi / degrees / wider
+    p = float(scipy.stats.f.sf(f, degrees, min(freedom, scene.noise_freedom)))
     x = scene.x[free]
     size = float(np.max(np.abs(np.array(steps)) / np.maximum(np.abs(x), 1e-300)))
     change = float(np.max(np.abs(steps[most]) / np.maximum(np.abs(x), 1e-300)))

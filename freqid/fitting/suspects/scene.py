@@ -10,17 +10,25 @@ from functools import cached_property
 import numpy as np
 
 from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError
-from freqid.data import Record, StampedRecord
+from freqid.data import PeriodicResponse, Record, StampedRecord
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
-from freqid.fitting.uncertainty.evenness import alike, channel_power, is_white, together
+from freqid.fitting.uncertainty.evenness import (
+    alike,
+    channel_power,
+    is_white,
+    may_be_tied,
+    tied,
+    together,
+)
+from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.uncertainty.noise_spectrum import local_power, projected
-from freqid.lti import Plane, sum_runs
+from freqid.fitting.uncertainty.noise_spectrum import local_power
+from freqid.lti import Plane, directions, sum_runs
 from freqid.models import Model
 
 # singular values of the Jacobian below this part of the largest are directions left open
@@ -140,8 +148,7 @@ class Scene:
         clear = self.clear(columns)
         size = np.linalg.norm(clear, axis=1)
         kept = clear[size > 0] / size[size > 0, None]
-        _, s, Vt = np.linalg.svd(kept, full_matrices=False)
-        return dataclasses.replace(self, more=Vt[s > _LOOSE * max(s.max(initial=0), 1e-300)])
+        return dataclasses.replace(self, more=directions(kept, _LOOSE)[2])
 
     @cached_property
     def left(self) -> FloatArray:
@@ -166,9 +173,8 @@ class Scene:
         J = self.jacobian
         size = np.linalg.norm(J, axis=1)
         size[size == 0] = 1
-        U, s, Vt = np.linalg.svd(J / size[:, None], full_matrices=False)
-        told = s > _LOOSE * max(s.max(initial=0), 1e-300)
-        return U[:, told] / s[told] / size[:, None], s[told], Vt[told]
+        U, s, Vt = directions(J / size[:, None], _LOOSE)
+        return U / s / size[:, None], s, Vt
 
     @property
     def absorbed(self) -> FloatArray:
@@ -197,6 +203,15 @@ class Scene:
         return rows - len(self.absorbed)
 
     @cached_property
+    def noise_freedom(self) -> float:
+        """Real values that tell the noise: of covariances that are estimates, as many as theirs,
+        since what speaks loudest may stand on few lines.
+        """
+        data = [s.reading.data for s in self.seen]
+        told = [2.0 * d.freedom if isinstance(d, PeriodicResponse) else np.inf for d in data]
+        return min(float(self.freedom), sum(told))
+
+    @cached_property
     def even(self) -> bool:
         """Whether the power that is left is the same at all lines of all channels."""
         return self.is_even(self.left)
@@ -206,16 +221,14 @@ class Scene:
         """Variance of each row's noise, from the lines around it."""
         return self.variance_of(self.left)
 
-    def _parted(self, rows: FloatArray) -> list[FloatArray]:
-        """Rows (R,) of each experiment in turn."""
+    def parted(self, rows: FloatArray) -> list[FloatArray]:
+        """Rows (…, R) of each experiment in turn."""
         ends = np.cumsum([len(s.left) for s in self.seen])
-        return np.split(rows, ends)[:-1]
+        return [np.ascontiguousarray(r) for r in np.split(rows, ends, axis=-1)[:-1]]
 
     def is_even(self, rows: FloatArray) -> bool:
         """Whether the power of rows (R,) is the same at all lines of all channels."""
-        parts = [
-            (part, s.experiment) for s, part in zip(self.seen, self._parted(rows), strict=True)
-        ]
+        parts = [(part, s.experiment) for s, part in zip(self.seen, self.parted(rows), strict=True)]
         if not all(is_white(part, e) for part, e in parts):
             return False
         powers, counts = zip(*(channel_power(part, e) for part, e in parts), strict=True)
@@ -223,8 +236,25 @@ class Scene:
 
     def together(self, rows: FloatArray) -> float:
         """How much lines that share their noise widen what rows (R,) sum to."""
-        parts = zip(self._parted(rows), (s.experiment for s in self.seen), strict=True)
+        parts = zip(self.parted(rows), (s.experiment for s in self.seen), strict=True)
         return together(list(parts))
+
+    def tied(self, rows: FloatArray, ways: Sequence[FloatArray]) -> float:
+        """How much entries of responses that share their lines' noise widen what ``ways`` (q, rows
+        of an experiment) tell where rows (R,) are what is left; at least 1.
+        """
+        if not any(may_be_tied(s.experiment) for s in self.seen):
+            return 1.0
+        variance, shared, plain = self.variance_of(rows), 0.0, 0.0
+        share = len(rows) / max(self.freedom, 1)
+        for s, left, known, V in zip(
+            self.seen, self.parted(rows), self.parted(variance), ways, strict=True
+        ):
+            alone = float(np.sum(V**2 * known))
+            plain += alone
+            is_tied = may_be_tied(s.experiment)
+            shared += tied(left, V, s.experiment) * share if is_tied else alone
+        return max(shared / max(plain, 1e-300), 1.0)
 
     def variance_of(self, rows: FloatArray) -> FloatArray:
         """Variance of each row's noise (R,) where these are what it leaves."""
@@ -232,7 +262,7 @@ class Scene:
         if self.is_even(rows):
             return np.full(len(rows), every)
         share = len(rows) / max(self.freedom, 1)
-        parts = zip(self.seen, self._parted(rows), strict=True)
+        parts = zip(self.seen, self.parted(rows), strict=True)
         local = [_power_at(part, s.experiment) * share for s, part in parts]
         return np.concatenate([*local, np.full(len(self.known), every)])
 

@@ -15,6 +15,7 @@ import scipy
 
 from freqid.checks import FloatArray
 from freqid.fitting.suspects.scene import Scene
+from freqid.lti import directions
 
 # a suspect of which the parameters leave no more than this part cannot be told
 _ABSORBED = 1e-5
@@ -76,10 +77,8 @@ def score(
     power = float(np.linalg.norm(clear, axis=1).max())
     if power < _ABSORBED:
         return None
-    U, s, Vt = np.linalg.svd(clear, full_matrices=False)
-    told = s > max(_SAME * s[0], _ABSORBED)
-    U, s, Vt = U[:, told], s[told], Vt[told]
-    q, freedom = len(s), scene.freedom - int(told.sum())
+    U, s, Vt = directions(clear, _SAME, _ABSORBED)
+    q, freedom = len(s), scene.freedom - len(s)
     if freedom < 1:
         return None
     along = Vt @ scene.left
@@ -91,8 +90,8 @@ def score(
     else:
         spread = (Vt * scene.variance_of(rest)) @ Vt.T
         chi = float(along @ np.linalg.solve(spread, along))
-    wider = scene.together(rest)
-    chi, freedom = chi / wider, max(int(freedom / wider), 1)
+    wider = scene.together(rest) * scene.tied(rest, scene.parted(Vt))
+    chi, freedom = chi / wider, max(int(min(freedom / wider, scene.noise_freedom)), 1)
     delta = -(U / s) @ along
     moved = np.abs(scene.moved(delta @ (raw / size[:, None])))
     shift = moved / np.where(std > 0, std, np.inf)

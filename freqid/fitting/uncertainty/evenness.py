@@ -60,6 +60,22 @@ def evenly_spread(error: ComplexArray) -> bool:
     return bool((p >= _LEVEL / len(power)).all())
 
 
+def may_be_tied(e: SpectralExperiment) -> bool:
+    """Whether lines have several entries that were measured together."""
+    return e.response and e.n_channels != (1, 1)
+
+
+def tied(rows: FloatArray, ways: FloatArray, e: SpectralExperiment) -> float:
+    """Σ variances of what ``ways`` (q, rows) tell of rows (rows,), where the entries of a response
+    share their line's noise.
+
+    Rows of small weight are those whose variance was taken for too large, and the other way round:
+    that is in it, too.
+    """
+    each = (ways.view(complex).conj() * rows.view(complex)).reshape(len(ways), -1, e.n_lines)
+    return float(np.sum(np.abs(each.sum(axis=1)) ** 2)) / 2
+
+
 def together(parts: Sequence[tuple[FloatArray, SpectralExperiment]]) -> float:
     """How much the sum of noise over lines is larger than if each had its own: the correlations
     within the ``reach`` of a line, over rows (rows,) of each experiment.

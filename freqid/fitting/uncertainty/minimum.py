@@ -17,7 +17,7 @@ from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.search.descent import Solution
 from freqid.fitting.uncertainty.covariance import Determined, determined
-from freqid.fitting.uncertainty.noise_spectrum import score_covariance
+from freqid.fitting.uncertainty.gradient_noise import score_covariance
 
 # a cost of this part of the data's energy is nothing but rounding
 _ROUNDING = 1e-18

@@ -1,0 +1,206 @@
+"""What the noise that a fit leaves makes of its gradient: the covariance of the estimate."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from freqid.checks import FloatArray
+from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
+from freqid.fitting.cost.stamped_experiments import StampedExperiment
+from freqid.fitting.cost.time_experiments import TimeExperiment
+from freqid.fitting.uncertainty.noise_spectrum import local_mean, local_power, smoothed_power
+from freqid.lti import Realisation, eliminate, in_one_blas_thread
+
+# lines of an experiment that are enough for a covariance
+_LINES = 4000
+# means for each unknown from which they tell their own noise
+_MEANS = 20
+# leverage that is believed at the most
+_MOST = 0.9
+
+
+@in_one_blas_thread
+def score_covariance(
+    objective: Objective, x: FloatArray, alone: FloatArray | None = None
+) -> FloatArray | None:
+    """Σ σ²(ω) JᵀJ over the lines (P, P): what coloured noise does to the gradient.
+
+    With H = JᵀJ the covariance of the estimate is H⁻¹ M H⁻¹ whatever the noise's colour (Ljung,
+    System Identification, 1999, section 9.4); σ² is the local mean of the squared residual. None
+    where the experiments have no lines, or nothing but rounding is left. ``alone`` (P,) is where
+    the data alone are least: what they leave there is noise, what a prior makes them leave is not.
+    """
+    lines = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+    stamped = [e for e in objective.experiments if isinstance(e, StampedExperiment)]
+    if all(isinstance(e, PeriodicExperiment) for e in objective.experiments):
+        return _of_periods(objective, x)
+    if all(isinstance(e, TimeExperiment) for e in objective.experiments):
+        return _of_samples(objective, x, alone)
+    if len(lines) + len(stamped) < len(objective.experiments):
+        return None
+    try:
+        realisation = objective.structure.realise(x)
+        noise_at = realisation if alone is None else objective.structure.realise(alone)
+    except Exception:  # the user's function may raise anything
+        return None
+    total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
+    with np.errstate(all="ignore"):
+        for e in lines:
+            step = 1 if e.reach else max(e.n_lines // _LINES, 1)
+            few = e.thinned(1 / step, evenly=True) if step > 1 else e
+            evaluation = few.at(realisation)
+            r, Q, delta = projected(evaluation)
+            J = evaluation.jacobian(delta)
+            J = J - (J @ Q.T) @ Q
+            left = r if noise_at is realisation else projected(few.at(noise_at))[0]
+            if e.response:
+                total += _of_response(J, left, few) / step
+            else:
+                left = left / np.sqrt(1 - leverage(J, Q))
+                total += (J * local_power(left, few)) @ J.T / step
+            rows += e.n_rows
+            unknown += 0 if delta is None else len(delta)
+        for log in stamped:
+            part, n_free = _of_stamps(log, realisation, noise_at)
+            total += part
+            rows += log.n_rows
+            unknown += n_free
+    if not np.isfinite(total).all():
+        return None
+    # lines of a response have had their share of the freedom taken off one by one
+    if lines and not stamped and all(e.response for e in lines):
+        return total
+    return total * rows / max(rows - unknown - len(x), 1)
+
+
+def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -> FloatArray | None:
+    """The same of experiments in time, whose lines are those of the samples' own DFT."""
+    try:
+        realisation = objective.structure.realise(x)
+        noise_at = realisation if alone is None else objective.structure.realise(alone)
+    except Exception:  # the user's function may raise anything
+        return None
+    total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
+    for e in objective.experiments:
+        assert isinstance(e, TimeExperiment)
+        if e.lines is not None:
+            return None
+        evaluation = e.at(realisation)
+        left, Q, delta = projected(evaluation)
+        J = evaluation.jacobian(delta)
+        J = J - (J @ Q.T) @ Q
+        if noise_at is not realisation:
+            left = projected(e.at(noise_at))[0]
+        p = len(e.y)
+        R, JF = (scipy.fft.rfft(a.reshape(*a.shape[:-1], p, -1), norm="ortho") for a in (left, J))
+        N = e.y.shape[1]
+        twice = np.full(R.shape[-1], 2.0)
+        twice[0] = 1.0
+        if N % 2 == 0:
+            twice[-1] = 1.0
+        # J'Σ J over all samples is that over the lines, each but the ends standing for two
+        seen = (JF * (smoothed_power(R) * twice)).reshape(len(x), -1)
+        total += (seen @ JF.reshape(len(x), -1).conj().T).real
+        rows += e.n_rows
+        unknown += 0 if delta is None else len(delta)
+    if not np.isfinite(total).all():
+        return None
+    return total * rows / max(rows - unknown - len(x), 1)
+
+
+def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
+    """The same of means over periods, each line's noise its own, that of its outputs together.
+
+    Their covariances are estimates, and take in that of neighbours: what they leave of the errors
+    says how far off they are. None where lines are too few to tell.
+    """
+    periodic = [e for e in objective.experiments if isinstance(e, PeriodicExperiment)]
+    if sum(e.n_means for e in periodic) < _MEANS * len(x):
+        return None
+    try:
+        realisation = objective.structure.realise(x)
+    except Exception:  # the user's function may raise anything
+        return None
+    parts = [e.at(realisation) for e in periodic]
+    J = np.concatenate([part.jacobian(None) for part in parts], axis=1)
+    rest = 1 - leverage(J, np.zeros((0, J.shape[1])))[::2]
+    total, at = np.zeros((len(x), len(x))), 0
+    for e, part in zip(periodic, parts, strict=True):
+        p, n = len(e.data.response), part.residual.size // 2
+        error = part.residual.view(complex) / rest[at : at + n]
+        seen = J[:, 2 * at : 2 * (at + n)].copy().view(complex).conj() * error
+        score = seen.reshape(len(x), -1, p).sum(axis=-1)
+        total += (score @ score.conj().T).real / 2
+        at += n
+    return total if np.isfinite(total).all() else None
+
+
+def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
+    """Part of each complex error that parameters and initial state take on themselves, twice each,
+    (rows,): the few lines that tell a parameter leave less than their noise (MacKinnon and White,
+    J. Econometrics 29, 1985).
+    """
+    gram = J @ J.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
+    own = np.einsum("ak,ab,bk->k", J, half, J) + np.sum(Q**2, axis=0)
+    return np.repeat(np.minimum(own.reshape(-1, 2).mean(axis=1), _MOST), 2)
+
+
+def _of_stamps(
+    e: StampedExperiment, at: Realisation, noise_at: Realisation
+) -> tuple[FloatArray, int]:
+    """The same of samples at times of their own, each output's noise taken for white, and how many
+    unknowns its initial state has.
+    """
+    evaluation = e.at(at)
+    left, Q, delta = projected(evaluation)
+    J = evaluation.jacobian(delta)
+    J = J - (J @ Q.T) @ Q
+    if noise_at is not at:
+        left = projected(e.at(noise_at))[0]
+    power = np.mean(left.reshape(e.y.shape) ** 2, axis=0)
+    return (J * np.tile(power, len(e.y))) @ J.T, 0 if delta is None else len(delta)
+
+
+def _of_response(J: FloatArray, residual: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """What the noise of a response makes of the gradient, (P, P).
+
+    Its size is each line's own, divided by what the fit leaves of it (MacKinnon and White's HC3, J.
+    Econometrics 29, 1985): a resonance that few lines tell has noise like none of its neighbours.
+    Within the ``reach`` of a line noise goes together as it does on average.
+    """
+    error = residual.view(complex)
+    at = J[:, ::2] + 1j * J[:, 1::2]
+    gram = J @ J.T
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
+    lever = np.einsum("ak,ab,bk->k", at.conj(), half, at).real / 2
+    left = error / np.maximum(1 - lever, 0.1)
+    total: FloatArray = (np.abs(left) ** 2 * at.conj() @ at.T).real / 2
+    if not e.reach:
+        return total
+    each = left.reshape(-1, e.n_lines)
+    local = np.sqrt(np.maximum(local_mean(np.abs(each) ** 2), 1e-300))
+    unit, here = each / local, at.reshape(len(at), *each.shape) * local
+    total = (here.conj().reshape(len(at), -1) @ here.reshape(len(at), -1).T).real / 2
+    for d in range(1, min(e.reach, e.n_lines - 1) + 1):
+        # lines far apart in the window share little of it: Bartlett's taper
+        share = np.mean(unit[:, :-d] * unit[:, d:].conj())
+        pairs = (here[..., :-d].conj().reshape(len(at), -1) * share) @ here[..., d:].reshape(
+            len(at), -1
+        ).T
+        total += (pairs + pairs.conj().T).real / 2
+    return total
+
+
+def projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """The residual with the transient taken off, the rows that span that, and its unknowns."""
+    r, T = evaluation.residual, evaluation.transient
+    if T is None:
+        return r, np.zeros((0, len(r))), None
+    Q, delta = eliminate(T, r)
+    return r - (Q @ r) @ Q, Q, delta
