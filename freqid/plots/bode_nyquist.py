@@ -18,12 +18,13 @@ from freqid.plots.curves import (
     UNITS,
     BodeCurve,
     Drawable,
+    Shown,
     bode_curve,
     common_hold,
     frequency_label,
     shown,
 )
-from freqid.plots.style import Panels, Style, drawing, line, stacked
+from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,9 +56,11 @@ def bode(
         hold: through which models in continuous time are seen; by default that of the measured
             responses, as the legend then says.
 
-    Several channels are drawn as several curves. Phases are unwrapped and moved by whole turns
-    next to the first curve. Returns the two axes. Raises ValueError for an unknown unit, or labels
-    of another number.
+    Phases are unwrapped and moved by whole turns next to the first curve. Returns the two axes. Of
+    several channels a new figure has amplitude and phase of each pair, a row of both for an output
+    and a column for an input, and axes (2·outputs, inputs) are returned; on two axes that were
+    given they are several curves. Raises ValueError for an unknown unit, labels of another number,
+    or responses of other channels.
 
     >>> import freqid as fq
     >>> axes = fq.bode(fq.two_mass(), labels=["plant"])
@@ -75,24 +78,78 @@ def bode(
     # turns cannot be counted along noise: where a model is drawn, each point of what is measured
     # is put next to it
     along = curves[smooth.index(True)].response if any(smooth) else curves[0].response
+    through = _through(between) if models else None
+    named = any(one.label for one in curves)
+
+    def draw(pair: tuple[int, int], amplitude: Axes, phase: Axes) -> None:
+        for one, known in zip(curves, smooth, strict=True):
+            seen = one if not any(pair) else one._replace(label=None)
+            curve = bode_curve(seen, along, pair, scattered=any(smooth) and not known)
+            _draw(curve, amplitude, phase, unit, decibel)
+        amplitude.set(xscale="log", yscale="linear" if decibel else "log")
+        phase.set(xscale="log")
+
+    outputs, inputs = _channels(curves)
+    if ax is None and outputs * inputs > 1:
+        with channel_grid(outputs, inputs) as grid:
+            for i, j in np.ndindex(outputs, inputs):
+                draw((i, j), grid[2 * i, j], grid[2 * i + 1, j])
+                _ticks(grid[2 * i, j], grid[2 * i + 1, j])
+            _name_channels(grid, curves[0].response, unit, decibel)
+            _within_reach(grid, decibel)
+            if named:
+                figure = grid[0, 0].figure
+                figure.legend(title=through, loc="outside upper center", ncols=len(curves))
+        return grid
     with stacked(ax, 2) as ax:
         amplitude, phase = ax
-        for one, known in zip(curves, smooth, strict=True):
-            for pair in np.ndindex(one.response.response.shape[:2]):
-                named = one if not any(pair) else one._replace(label=None)
-                curve = bode_curve(named, along, pair, scattered=any(smooth) and not known)
-                _draw(curve, amplitude, phase, unit, decibel)
-        if decibel:
-            amplitude.set(xscale="log", ylabel="amplitude / dB")
-        else:
-            amplitude.set(xscale="log", yscale="log", ylabel="amplitude")
-        phase.set(xscale="log", ylabel="phase / degrees", xlabel=frequency_label(unit))
+        for i, j in np.ndindex(outputs, inputs):
+            draw((i, j), amplitude, phase)
         _ticks(amplitude, phase)
-        if any(one.label for one in curves):
-            amplitude.legend(title=_through(between) if models else None)
-        elif between is not None and models:
-            amplitude.set_title(_through(between) or "", fontsize="medium")
+        amplitude.set_ylabel("amplitude / dB" if decibel else "amplitude")
+        phase.set(ylabel="phase / degrees", xlabel=frequency_label(unit))
+        if named:
+            amplitude.legend(title=through)
+        elif through is not None:
+            amplitude.set_title(through, fontsize="medium")
     return ax
+
+
+def _channels(curves: Sequence[Shown]) -> tuple[int, int]:
+    """Outputs and inputs of all that is drawn; ValueError where they differ."""
+    shapes = [one.response.response.shape[:2] for one in curves]
+    for number, shape in enumerate(shapes):
+        if shape != shapes[0]:
+            raise InputError(
+                f"response {number} has {shape[0]} outputs and {shape[1]} inputs, the first "
+                f"{shapes[0][0]} and {shapes[0][1]}; draw them one by one"
+            )
+    return shapes[0]
+
+
+def _within_reach(ax: Grid, decibel: bool) -> None:
+    """Amplitudes down to a small part of the largest: channels that do not hear one another are
+    zero but for rounding.
+    """
+    amplitudes: list[Axes] = ax[::2].ravel().tolist()
+    most = max(axis.get_ylim()[1] for axis in amplitudes)
+    least = most - 140 if decibel else most * 1e-7
+    for axis in amplitudes:
+        low, high = axis.get_ylim()
+        axis.set_ylim(max(low, least), max(high, 10 * least if not decibel else least + 20))
+
+
+def _name_channels(ax: Grid, frf: FrequencyResponse, unit: str, decibel: bool) -> None:
+    """Inputs above the columns, outputs beside the rows, units at the edges alone."""
+    p, m = frf.response.shape[:2]
+    inputs = frf.input_names or [f"u{j}" for j in range(m)]
+    outputs = frf.output_names or [f"y{i}" for i in range(p)]
+    for j in range(m):
+        ax[0, j].set_title(f"from {inputs[j]}", fontsize="medium")
+        ax[-1, j].set_xlabel(frequency_label(unit))
+    for i in range(p):
+        ax[2 * i, 0].set_ylabel(f"to {outputs[i]}" + (" / dB" if decibel else ""))
+        ax[2 * i + 1, 0].set_ylabel("phase / °")
 
 
 def _ticks(amplitude: Axes, phase: Axes) -> None:
@@ -125,7 +182,9 @@ def _through(hold: Hold | None) -> str | None:
 def _draw(curve: BodeCurve, amplitude: Axes, phase: Axes, unit: str, decibel: bool) -> None:
     x = curve.frequency * UNITS[unit]
     level = _in_decibel if decibel else np.asarray
-    amplitude.plot(x, level(curve.magnitude), label=curve.label, **curve.style)
+    # a logarithm has no zero
+    magnitude = np.where(curve.magnitude > 0, curve.magnitude, np.nan)
+    amplitude.plot(x, level(magnitude), label=curve.label, **curve.style)
     phase.plot(x, curve.phase, **curve.style)
     if curve.limits is not None and curve.turn is not None:
         low, high = map(level, curve.limits)

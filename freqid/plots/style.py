@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # several axes of one figure
 Panels: TypeAlias = "Sequence[Axes] | npt.NDArray[np.object_]"
+Grid: TypeAlias = "npt.NDArray[np.object_]"
 Dash: TypeAlias = str | tuple[int, tuple[int, ...]]
 
 
@@ -112,6 +113,23 @@ def stacked(
                 rows, 1, sharex=sharex, figsize=size, height_ratios=heights, squeeze=False
             )[1][:, 0]
         yield ax
+
+
+@contextmanager
+def channel_grid(outputs: int, inputs: int) -> Iterator[Grid]:
+    """The settings, and axes (2·outputs, inputs): an amplitude above a phase for each pair."""
+    import matplotlib.pyplot as plt
+
+    with context():
+        size = (1.5 + 2.7 * inputs, 0.8 + 2.9 * outputs)
+        yield plt.subplots(
+            2 * outputs,
+            inputs,
+            sharex=True,
+            figsize=size,
+            height_ratios=[3, 2] * outputs,
+            squeeze=False,
+        )[1]
 
 
 def line(index: int) -> Style:

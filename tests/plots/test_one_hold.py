@@ -51,3 +51,47 @@ def test_an_estimate_is_drawn_where_it_was_fitted(plant, slow):
     x, _ = curves(est.bode(unit="Hz")[0])[0]
     assert 4 < x[0] < 10
     assert 80 < x[-1] < 200
+
+
+def two_by_two():
+    """Two lags that do not hear one another."""
+
+    def matrices(a, b):
+        return np.diag([-a, -b]), np.eye(2), np.eye(2), np.zeros((2, 2))
+
+    parameters = [fq.Parameter("a", 20.0), fq.Parameter("b", 60.0)]
+    names = {"inputs": ["left", "right"], "outputs": ["north", "south"]}
+    return fq.GreyBox(matrices, parameters, **names)
+
+
+@pytest.mark.parametrize("decibel", [False, True])
+def test_several_channels_have_axes_of_their_own(decibel):
+    plant = two_by_two()
+    frf = plant.frequency_response(np.geomspace(1, 300, 40), fq.ZeroOrderHold(1e-3))
+    axes = fq.bode(frf, plant, labels=["measured", "model"], decibel=decibel, unit="Hz")
+    assert axes.shape == (4, 2)
+    assert [a.get_title() for a in axes[0]] == ["from left", "from right"]
+    assert axes[2, 0].get_ylabel().startswith("to south")
+    assert [len(a.lines) for a in axes.flat] == [2] * 8
+    at = axes[2, 1].lines[1].get_xdata()
+    level = np.abs(1 / (2j * np.pi * at + 60))
+    drawn = axes[2, 1].lines[1].get_ydata()
+    # through a hold of a millisecond, which is all but none at these frequencies
+    assert (10 ** (drawn / 20) if decibel else drawn) == pytest.approx(level, rel=0.1)
+    # what is zero does not stretch the axis of what is not
+    low, _ = axes[0, 1].get_ylim()
+    assert (low > -250) if decibel else (low > 1e-12)
+    assert len(axes[0, 0].figure.legends) == 1
+
+
+def test_responses_of_other_channels_are_refused():
+    with pytest.raises(ValueError, match="draw them one by one"):
+        fq.bode(two_by_two(), fq.first_order())
+
+
+def test_two_axes_that_are_given_take_all_channels():
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots(2)
+    assert fq.bode(two_by_two(), ax=axes) is axes
+    assert [len(a.lines) for a in axes] == [4, 4]
