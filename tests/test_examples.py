@@ -14,6 +14,8 @@ EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
 def test_example(path, tmp_path, request):
     if path.stem == "ruler_robot":
         request.getfixturevalue("measured")
+    if path.stem == "description":
+        pytest.importorskip("pinocchio")
     # the other factor has a test of its own
     more = ["10"] if path.stem == "ruler_robot" else []
     result = subprocess.run(

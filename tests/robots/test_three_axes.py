@@ -46,8 +46,8 @@ def test_exact_without_noise(runs, how):
 
 
 def test_stiffnesses_from_logs_in_noise():
-    """Two clocks, friction, 2 % noise: each stiffness in its interval, and within 3 %."""
-    est = fq.fit(robot.robot(), robot.read(seed=1), band=robot.BAND, start=start(), n_starts=1)
+    """Two clocks, friction, loops, 2 % noise: each stiffness in its interval, and within 3 %."""
+    est = fq.fit(robot.robot(), robot.responses(robot.read(seed=1), seed=1), start=start())
     table = est.parameters
     for name in ("k1", "k2", "k3"):
         assert table.lower[name] <= robot.TRUE[name] <= table.upper[name]
