@@ -77,7 +77,14 @@ def references_of(sets: Sequence[Record], reference: Reference | None) -> list[F
     arrays = [numbers("reference", x) for x in given]
     if any(x.size == 0 for x in arrays):
         raise InputError("reference holds no samples")
+    if not all(np.isfinite(x).all() for x in arrays):
+        raise InputError("reference must be finite; it has NaN or infinite samples")
     signals = [x.reshape(max(x.shape[:1], default=1), -1) for x in arrays]
+    # one that is known as often as a faster input is seen when the output is
+    signals = [
+        x[:: r.factor] if r.factor > 1 and len(x) == len(r.inputs) else x
+        for x, r in zip(signals, sets, strict=True)
+    ]
     for x, r in zip(signals, sets, strict=True):
         if len(x) != r.n_samples or x.shape[1] != r.n_inputs:
             raise InputError(

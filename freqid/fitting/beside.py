@@ -21,6 +21,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.log_stage import Smooth, log_targets, told
 from freqid.fitting.search.stopping import Bound
+from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.models import GreyBox
 
 # lines on which many starts walk together: where responses bend, and evenly
@@ -182,9 +183,8 @@ def bound_of(beside: Beside | BesidePlaces, structure: GreyStructure, share: flo
     rows = sum(
         int(share * b.objective.n_rows) - b.unknowns - b.solution.point.n_initial for b in boxes
     )
-    # lines that share their windows tell less than as many of their own
-    tied = 1 + max(getattr(e, "reach", 0) for b in boxes for e in b.objective.experiments)
-    rows //= tied
+    # lines that share their noise tell less than as many of their own
+    rows = int(rows / shared([(b.objective, b.solution.x) for b in boxes]))
     unknowns = sum(b.unknowns for b in boxes)
     return Bound(sum(b.cost for b in boxes), unknowns - len(structure.names), rows)
 

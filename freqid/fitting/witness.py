@@ -18,11 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import InputError
 from freqid.data import Record, StampedRecord
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
-from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -31,9 +30,9 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
-from freqid.fitting.uncertainty.evenness import evenly_spread, together
-from freqid.fitting.uncertainty.gradient_noise import projected
+from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.uncertainty.shared_noise import noise_freedom, shared
 from freqid.lti import in_one_blas_thread
 from freqid.models import DiscreteModel, Model
 
@@ -111,9 +110,10 @@ class Testimony:
             return Witness("absent", "the data are too few for a black box beside it", cost)
         if top < 1:
             return self._alike(order, cost, grey.cost / cost - 1)
-        wider = shared(boxes)
+        wider = shared([(b.objective, b.solution.x) for b in boxes])
         f = excess(structure, readings, boxes, grey) * bottom / top / wider
-        p = float(scipy.stats.f.sf(f, top, bottom / wider))
+        told = int(min(bottom / wider, noise_freedom([r.data for r in readings])))
+        p = float(scipy.stats.f.sf(f, top, max(told, 1)))
         numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
         gap = grey.cost / cost - 1
         verdict, sentence = self._verdict(order, numbers, p, gap, self._open())
@@ -162,26 +162,6 @@ class Testimony:
             return self.minimum.solution
         begin = structure.start if late else self.minimum.x
         return polish(Objective(structure, [r.lines() for r in readings]), begin)
-
-
-def _left(boxes: Sequence[Reference]) -> list[tuple[FloatArray, SpectralExperiment]]:
-    """What black boxes leave, (rows,) of each experiment."""
-    left = []
-    for box in boxes:
-        realisation = box.objective.structure.realise(box.solution.x)
-        for e in box.objective.experiments:
-            assert isinstance(e, SpectralExperiment)
-            left.append((projected(e.at(realisation))[0], e))
-    return left
-
-
-def shared(boxes: Sequence[Reference]) -> float:
-    """How much larger a cost falls by chance where lines of responses share their noise."""
-    return (
-        together(_left(boxes))
-        if any(getattr(e, "reach", 0) for box in boxes for e in box.objective.experiments)
-        else 1.0
-    )
 
 
 def _groups(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:

@@ -20,6 +20,8 @@ from freqid.data import (
 
 # part of the strongest line's amplitude below which a line is not excited
 _SILENT = 1e-3
+# and below which it is rounding
+_ROUNDED = 1e-12
 # a lag at which a signal repeats itself so well is a period
 _REPEATS = 0.9
 # multiples of a period that is given, of which one may be the true one
@@ -197,11 +199,14 @@ def _folded(sets: Sequence[Record], n: int, skip: int, P: int) -> FloatArray:
     """Which lines of a slower output have excited lines of the input folded onto them, (lines,)."""
     fine = n * sets[0].factor
     U = np.stack([_amplitudes(r.inputs, fine, skip, P) for r in sets])
+    level, noise = _levels(U)
     lines = np.arange(U.shape[-1])
     at = lines % n
     at = np.minimum(at, n - at)
+    # a small line matters where it falls on a small one
+    counts = (level > _SILENT * level[at]) & (level > _CERTAIN * noise)
     folded = np.zeros(n // 2 + 1, bool)
-    folded[at[_driven(U) & (2 * lines > n)]] = True
+    folded[at[counts & (level > _ROUNDED * level.max()) & (2 * lines > n)]] = True
     return folded
 
 
@@ -219,18 +224,23 @@ def _excited(
         power = sum((np.abs(scipy.fft.rfft(k, axis=0)) ** 2).sum(axis=1) for k in kept)
         level = np.sqrt(np.asarray(power))
         return level > _SILENT * level.max()
-    return _driven(Z[:, :, sets[0].n_outputs :])
+    level, noise = _levels(Z[:, :, sets[0].n_outputs :])
+    most = level.max()
+    if sets[0].factor > 1:
+        fine = [_amplitudes(r.inputs, n * r.factor, skip, P) for r in sets]
+        most = _levels(np.stack(fine))[0].max()
+    # a line that noise alone could have made is none
+    return (level > _SILENT * most) & (level > _CERTAIN * noise)
 
 
-def _driven(U: ComplexArray) -> FloatArray:
-    """Which lines of the inputs (E, P, channels, lines) are more than noise, (lines,)."""
+def _levels(U: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Amplitude and noise of the mean of inputs (E, P, channels, lines), (lines,) each."""
     P = U.shape[1]
     level = np.abs(U.mean(axis=1)).max(axis=(0, 1))
     # few periods tell the noise of one line badly: those beside it have as much
     around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, _FREEDOM + 1, axis=-1)
     noise = np.sqrt(np.maximum(around.max(axis=(0, 1)), 0))
-    # a line that noise alone could have made is none
-    return (level > _SILENT * level.max()) & (level > _CERTAIN * noise)
+    return level, noise
 
 
 def _means(Z: ComplexArray, p: int) -> tuple[ComplexArray, ComplexArray, int]:

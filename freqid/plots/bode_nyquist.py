@@ -22,6 +22,7 @@ from freqid.plots.curves import (
     bode_curve,
     common_hold,
     frequency_label,
+    heard,
     shown,
 )
 from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, line, stacked
@@ -85,24 +86,26 @@ def bode(
         for one, known in zip(curves, smooth, strict=True):
             seen = one if not any(pair) else one._replace(label=None)
             curve = bode_curve(seen, along, pair, scattered=any(smooth) and not known)
-            _draw(curve, amplitude, phase, unit, decibel)
-        amplitude.set(xscale="log", yscale="linear" if decibel else "log")
+            _draw(heard(curve, one.response, pair), amplitude, phase, unit, decibel)
+        drawn = any(np.isfinite(curve.get_ydata()).any() for curve in amplitude.lines)
+        # a logarithm has no zero
+        amplitude.set(xscale="log", yscale="log" if drawn and not decibel else "linear")
         phase.set(xscale="log")
 
     outputs, inputs = _channels(curves)
-    if ax is None and outputs * inputs > 1:
-        with channel_grid(outputs, inputs) as grid:
+    new = ax is None and outputs * inputs > 1
+    if new or (isinstance(ax, np.ndarray) and ax.shape == (2 * outputs, inputs)):
+        with channel_grid(outputs, inputs, ax) as grid:
             for i, j in np.ndindex(outputs, inputs):
                 draw((i, j), grid[2 * i, j], grid[2 * i + 1, j])
                 _ticks(grid[2 * i, j], grid[2 * i + 1, j])
             _name_channels(grid, curves[0].response, unit, decibel)
-            _within_reach(grid, decibel)
             if named:
                 figure = grid[0, 0].figure
                 figure.legend(title=through, loc="outside upper center", ncols=len(curves))
         return grid
     with stacked(ax, 2) as ax:
-        amplitude, phase = ax
+        amplitude, phase = ax[0], ax[1]
         for i, j in np.ndindex(outputs, inputs):
             draw((i, j), amplitude, phase)
         _ticks(amplitude, phase)
@@ -125,18 +128,6 @@ def _channels(curves: Sequence[Shown]) -> tuple[int, int]:
                 f"{shapes[0][0]} and {shapes[0][1]}; draw them one by one"
             )
     return shapes[0]
-
-
-def _within_reach(ax: Grid, decibel: bool) -> None:
-    """Amplitudes down to a small part of the largest: channels that do not hear one another are
-    zero but for rounding.
-    """
-    amplitudes: list[Axes] = ax[::2].ravel().tolist()
-    most = max(axis.get_ylim()[1] for axis in amplitudes)
-    least = most - 140 if decibel else most * 1e-7
-    for axis in amplitudes:
-        low, high = axis.get_ylim()
-        axis.set_ylim(max(low, least), max(high, 10 * least if not decibel else least + 20))
 
 
 def _name_channels(ax: Grid, frf: FrequencyResponse, unit: str, decibel: bool) -> None:
@@ -182,9 +173,7 @@ def _through(hold: Hold | None) -> str | None:
 def _draw(curve: BodeCurve, amplitude: Axes, phase: Axes, unit: str, decibel: bool) -> None:
     x = curve.frequency * UNITS[unit]
     level = _in_decibel if decibel else np.asarray
-    # a logarithm has no zero
-    magnitude = np.where(curve.magnitude > 0, curve.magnitude, np.nan)
-    amplitude.plot(x, level(magnitude), label=curve.label, **curve.style)
+    amplitude.plot(x, level(curve.magnitude), label=curve.label, **curve.style)
     phase.plot(x, curve.phase, **curve.style)
     if curve.limits is not None and curve.turn is not None:
         low, high = map(level, curve.limits)

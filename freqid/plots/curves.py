@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # of a frequency axis, in each Hz
 UNITS = {"rad/s": 2 * np.pi, "Hz": 1.0}
+# so small a part of what stands beside it is nothing
+_ROUNDING = 1e-12
 # points around each mode's circle
 _ARCS = 160
 # squared radius of a 95 % ellipse of two normal variables
@@ -176,8 +178,21 @@ def bode_curve(
     # the complex response is off by a disc; seen from the origin that is this much
     half = Z95 * np.sqrt(frf.variance[pair] / 2)
     limits = np.maximum(magnitude - half, magnitude * 1e-3), magnitude + half
-    turn = np.rad2deg(np.arcsin(np.minimum(half / magnitude, 1)))
+    turn = np.rad2deg(np.arcsin(np.minimum(half / np.maximum(magnitude, 1e-300), 1)))
     return BodeCurve(frf.frequency, magnitude, phase, style, label, limits, turn)
+
+
+def heard(curve: BodeCurve, frf: FrequencyResponse, pair: tuple[int, int]) -> BodeCurve:
+    """The curve of a channel pair where it is more than rounding beside those of the same output,
+    or of the same input; nothing elsewhere.
+    """
+    size = np.abs(frf.response)
+    beside = max(size[pair[0]].max(initial=0), size[:, pair[1]].max(initial=0))
+    told = curve.magnitude > _ROUNDING * beside
+    if told.all():
+        return curve
+    magnitude, phase = (np.where(told, a, np.nan) for a in (curve.magnitude, curve.phase))
+    return replace(curve, magnitude=magnitude, phase=phase, limits=None, turn=None)
 
 
 def _next_to(

@@ -116,11 +116,19 @@ def stacked(
 
 
 @contextmanager
-def channel_grid(outputs: int, inputs: int) -> Iterator[Grid]:
-    """The settings, and axes (2·outputs, inputs): an amplitude above a phase for each pair."""
+def channel_grid(outputs: int, inputs: int, ax: Panels | None = None) -> Iterator[Grid]:
+    """The settings, and axes (2·outputs, inputs), new ones where not given: an amplitude above a
+    phase for each pair.
+    """
     import matplotlib.pyplot as plt
 
+    if ax is not None:
+        for each in np.ravel(np.asarray(ax, dtype=object)):
+            an_axes(each)
     with context():
+        if ax is not None:
+            yield np.asarray(ax, dtype=object)
+            return
         size = (1.5 + 2.7 * inputs, 0.8 + 2.9 * outputs)
         yield plt.subplots(
             2 * outputs,

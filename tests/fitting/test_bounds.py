@@ -93,3 +93,16 @@ def test_a_bound_on_which_nothing_can_be_computed_is_approached():
     assert est["m"] < 1e-3
     assert est["k"] / est["c"] == pytest.approx(25, rel=0.02)
     assert est.n_evaluations < 400
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_an_estimate_on_its_bound_is_within_it(seed):
+    """Bounds that no power of two divides, met by values that come back from units of their own."""
+    rng = np.random.default_rng(seed)
+    record = fq.simulate(fq.first_order(b=40.0, a=25.0), fq.white_noise(300, seed=seed), 0.01)
+    top = {"b": 40.0 * rng.uniform(0.3, 0.9), "a": 25.0 * rng.uniform(0.3, 0.9)}
+    model = fq.first_order(b=40.0, a=25.0).with_values(**{n: v * 0.9 for n, v in top.items()})
+    model = model.with_bounds(**{n: (0.0, v) for n, v in top.items()})
+    est = fq.fit(model, record, start={n: v * rng.uniform(0.1, 1) for n, v in top.items()})
+    assert (est.values <= list(top.values())).all()
+    assert np.isclose(est.values, list(top.values()), rtol=1e-6).any()

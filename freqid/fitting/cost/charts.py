@@ -8,6 +8,8 @@ any order and for any number of channels, where coefficients of polynomials are 
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import scipy
 
@@ -133,8 +135,11 @@ def balanced(model: StateSpace) -> StateSpace:
         size_B, size_C = float(np.linalg.norm(B)), float(np.linalg.norm(C))
         ratio = np.sqrt(size_C / size_B) if size_B and size_C else 1.0
         return StateSpace(A, B * ratio, C / ratio, D)
-    reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T, method="bilinear")
-    observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C, method="bilinear")
+    with warnings.catch_warnings():
+        # poles next to both ends of the real axis perturb the Gramians, of which any will do
+        warnings.simplefilter("ignore", RuntimeWarning)
+        reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T, method="bilinear")
+        observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C, method="bilinear")
     try:
         L, K = np.linalg.cholesky(reach), np.linalg.cholesky(observe)
     except np.linalg.LinAlgError:

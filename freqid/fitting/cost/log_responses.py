@@ -13,12 +13,15 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.lti import Hold, Realisation, sampled_response
 
+# part of the measured response below which that of a model is none
+_DEAF = 1e-8
+
 
 class LogResponse:
     """log(G/Ĝ) at the lines of an experiment, (outputs, inputs, lines) as real rows.
 
     ``weight`` (outputs, inputs, lines) multiplies the error: it says how well Ĝ is known. Where it
-    is zero the responses may be, too.
+    is zero, or the model's response is but for rounding, there is no error.
     """
 
     def __init__(
@@ -29,10 +32,12 @@ class LogResponse:
         weight: FloatArray | float = 1.0,
         place: int = 0,
     ) -> None:
-        self.omega, self.measured, self.hold = omega, response, hold
+        self.omega, self.hold = omega, hold
         self.weight = np.broadcast_to(weight, response.shape)
         silent = self.weight == 0
-        self.silent = silent if silent.any() else None
+        # below this a model says nothing there: it is zero, or that but for rounding
+        self.deaf = np.where(silent, np.inf, _DEAF * np.abs(response))
+        self.measured = np.where(silent, 1, response)
         self.n_rows, self.place = 2 * response.size, place
 
     @property
@@ -46,19 +51,14 @@ class LogResponse:
 
     def error(self, G: ComplexArray) -> FloatArray:
         """log(G/Ĝ) as real rows, (…, rows)."""
-        if self.silent is not None:
-            G = np.where(self.silent, 1, G)
-            ratio = G / np.where(self.silent, 1, self.measured)
-        else:
-            ratio = G / self.measured
+        ratio = np.where(np.abs(G) > self.deaf, G / self.measured, 1)
         error = (np.log(np.abs(ratio)) + 1j * np.angle(ratio)) * self.weight
         return error.reshape(*G.shape[:-3], -1).view(float)
 
     def relative(self, G: ComplexArray, dG: ComplexArray) -> FloatArray:
         """Derivatives of the same, (…, P, rows)."""
-        if self.silent is not None:
-            G = np.where(self.silent, 1, G)
-        change = dG / G[..., None, :, :, :] * self.weight
+        heard = np.abs(G) > self.deaf
+        change = np.where(heard, self.weight / np.where(heard, G, 1), 0)[..., None, :, :, :] * dG
         return change.reshape(*dG.shape[:-3], -1).view(float)
 
 

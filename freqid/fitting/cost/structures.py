@@ -68,8 +68,13 @@ class GreyStructure:
         self.units = [each.unit for each in everything]
         self.values = np.array([*values, *(n.start for n in self.unknown)])
         self.scale = np.array([*scale, *(n.size for n in self.unknown)])
-        self.lower = np.array([each.lower for each in everything]) / self.scale
-        self.upper = np.array([each.upper for each in everything]) / self.scale
+        lower, upper = (
+            np.array([getattr(e, end) for e in everything]) for end in ("lower", "upper")
+        )
+        # inwards by a last digit where a bound would come back from its units beyond itself
+        low, high = lower / self.scale, upper / self.scale
+        self.lower = np.where(low * self.scale < lower, np.nextafter(low, np.inf), low)
+        self.upper = np.where(high * self.scale > upper, np.nextafter(high, -np.inf), high)
         self._fixed = model.values
 
     def _timings(self, values: Mapping[str, float]) -> tuple[Timing, ...] | None:

@@ -21,7 +21,8 @@ from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, score
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.witness import excess, shared
+from freqid.fitting.uncertainty.shared_noise import shared
+from freqid.fitting.witness import excess
 from freqid.lti import directions
 from freqid.models import GreyBox, Model, OutputError
 
@@ -152,7 +153,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     structure = inquiry.minimum.structure
     assert isinstance(structure, GreyStructure)
     more = excess(structure, readings, [box], inquiry.minimum.solution, True)
-    wider = shared([box])
+    wider = shared([(box.objective, box.solution.x)])
     f, freedom = more * freedom / degrees / wider, int(freedom / wider)
     gain = scene.cost * more / (1 + more)
     # where the noise is coloured its shape is as uncertain as the place of the mode

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError
-from freqid.data import PeriodicResponse, Record, StampedRecord
+from freqid.data import Record, StampedRecord
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective
@@ -28,6 +28,7 @@ from freqid.fitting.uncertainty.evenness import (
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import local_power
+from freqid.fitting.uncertainty.shared_noise import noise_freedom
 from freqid.lti import Plane, directions, sum_runs
 from freqid.models import Model
 
@@ -204,12 +205,8 @@ class Scene:
 
     @cached_property
     def noise_freedom(self) -> float:
-        """Real values that tell the noise: of covariances that are estimates, as many as theirs,
-        since what speaks loudest may stand on few lines.
-        """
-        data = [s.reading.data for s in self.seen]
-        told = [2.0 * d.freedom if isinstance(d, PeriodicResponse) else np.inf for d in data]
-        return min(float(self.freedom), sum(told))
+        """Real values that tell the noise."""
+        return min(float(self.freedom), noise_freedom([s.reading.data for s in self.seen]))
 
     @cached_property
     def even(self) -> bool:

@@ -17,7 +17,7 @@ from freqid.lti import Realisation, eliminate, in_one_blas_thread
 # lines of an experiment that are enough for a covariance
 _LINES = 4000
 # means for each unknown from which they tell their own noise
-_MEANS = 20
+_MEANS = 5
 # leverage that is believed at the most
 _MOST = 0.9
 

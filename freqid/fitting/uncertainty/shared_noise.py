@@ -1,0 +1,65 @@
+"""How much noise that lines of responses share widens what black boxes explain of it by chance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.data import PeriodicResponse
+from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.uncertainty.evenness import may_be_tied, tied, together
+from freqid.fitting.uncertainty.gradient_noise import projected
+from freqid.lti import directions
+
+# directions of unknowns below this part of the largest are none
+_LOOSE = 1e-7
+
+
+def noise_freedom(data: Sequence[object]) -> float:
+    """Real values that tell the noise of periodic data: of covariances that are estimates, as many
+    as theirs, since what speaks loudest may stand on few lines; infinite for other data.
+    """
+    return sum(2.0 * d.freedom if isinstance(d, PeriodicResponse) else np.inf for d in data)
+
+
+def shared(boxes: Sequence[tuple[Objective, FloatArray]]) -> float:
+    """How much larger a cost falls by chance than if each real value had noise of its own, from
+    the minima of black boxes, each an objective and its unknowns; at least 1.
+
+    Lines of local models share their windows, entries of a response those of their neighbours that
+    were measured with them.
+    """
+    parts: list[tuple[FloatArray, SpectralExperiment]] = []
+    joined = alone = 0.0
+    for objective, x in boxes:
+        experiments = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+        entries = any(may_be_tied(e) for e in experiments)
+        if not (entries or any(e.reach for e in experiments)):
+            continue
+        realisation = objective.structure.realise(x)
+        left, slopes = [], []
+        for e in experiments:
+            evaluation = e.at(realisation)
+            rows, Q, delta = projected(evaluation)
+            left.append(rows)
+            if entries:
+                J = evaluation.jacobian(delta)
+                slopes.append(J - (J @ Q.T) @ Q)
+        parts += zip(left, experiments, strict=True)
+        if not entries:
+            continue
+        ways = directions(np.concatenate(slopes, axis=1), _LOOSE)[2]
+        ends = np.cumsum([len(rows) for rows in left])[:-1]
+        count = sum(len(rows) for rows in left)
+        freedom = max(count - len(ways), 1)
+        even = sum(float(rows @ rows) for rows in left) / freedom
+        for rows, e, own in zip(left, experiments, np.split(ways, ends, axis=1), strict=True):
+            plain = even * float(np.sum(own**2))
+            alone += plain
+            own = np.ascontiguousarray(own)
+            joined += tied(rows, own, e) * count / freedom if may_be_tied(e) else plain
+    wider = together(parts) if parts else 1.0
+    return wider * max(joined / alone if alone > 0 else 1.0, 1.0)
