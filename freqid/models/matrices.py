@@ -84,7 +84,10 @@ class MatrixFunction:
             matrices = self._matrices(resolved)
         except Exception as error:  # the user's function may raise anything
             where = ", ".join(f"{k}={v:g}" for k, v in {**resolved, **self.conditions}.items())
-            raise InputError(f"the model cannot be computed at {where}: {error}") from error
+            # a KeyError says no more than a name
+            plain = isinstance(error, ValueError | ArithmeticError)
+            told = str(error) if plain else f"{type(error).__name__}: {error}"
+            raise InputError(f"the model cannot be computed at {where}: {told}") from error
         return _shaped(matrices, resolved)
 
     def at_many(self, columns: Mapping[str, FloatArray]) -> StateSpace:

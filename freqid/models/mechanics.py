@@ -75,6 +75,8 @@ def mechanical(
     return GreyBox(matrices, parameters, conditions=conditions, name=name, **options)
 
 
+# so small a part of the largest mass is none
+_MASSLESS = 1e-15
 # matrices of a moment ago that are kept
 _KEPT = 7
 
@@ -173,12 +175,22 @@ class _Mechanical:
 
     def _check_mass(self, M: Array, values: Mapping[str, Any]) -> None:
         """ValueError for a mass matrix that no machine has."""
+        if not np.isfinite(M).all():
+            raise InputError(f"the mass matrix M is not finite at {_where(values)}")
         if not np.allclose(M, M.T, rtol=1e-9, atol=1e-12 * float(np.abs(M).max(initial=0))):
             raise InputError("the mass matrix M is not symmetric; check its off-diagonal elements")
+        masses = M.real.diagonal()
         try:
             np.linalg.cholesky(M.real)
+            # a mass that rounding alone keeps from zero
+            sound = bool(masses.min() > _MASSLESS * masses.max())
         except np.linalg.LinAlgError:
-            where = ", ".join(f"{k}={np.real(v):g}" for k, v in values.items())
-            raise InputError(f"the mass matrix M is not positive definite at {where}") from None
+            sound = False
+        if not sound:
+            raise InputError(f"the mass matrix M is not positive definite at {_where(values)}")
         # the same array comes again as long as what it is a function of stays
         self._sound = M
+
+
+def _where(values: Mapping[str, complex]) -> str:
+    return ", ".join(f"{k}={np.real(v):g}" for k, v in values.items())

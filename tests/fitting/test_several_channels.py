@@ -26,10 +26,10 @@ def plant(cross=0.0, **start):
     return fq.GreyBox(matrices, [*free, fq.Parameter("cross", cross, fixed=True)])
 
 
-def noisy_response(seed, part=0.02, cross=0.0):
+def noisy_response(seed, part=0.02, cross=0.0, values=NAMES):
     rng = np.random.default_rng(seed)
     omega = 2 * np.pi * np.linspace(1, 60, 120)
-    frf = plant(cross).frequency_response(omega)
+    frf = plant(cross, **values).frequency_response(omega)
     size = part * np.abs(frf.response).max(axis=(1, 2))[:, None, None]
     noise = rng.standard_normal((2, *frf.response.shape)) * size / np.sqrt(2)
     return fq.FrequencyResponse(
@@ -66,3 +66,14 @@ def test_what_is_not_heard_misleads_no_start(seed):
     assert (np.abs(est.values - true) < 5 * std).all()
     assert est.cost == pytest.approx(power, rel=0.2)
     assert est.n_evaluations < 150
+
+
+def test_zero_entries_lose_no_start():
+    """Two light modes that do not hear one another, from starts within a factor 2."""
+    light = NAMES | {"w1": 20.0, "z1": 0.01, "w2": 50.0, "z2": 0.02, "g2": 1.0}
+    rng = np.random.default_rng(0)
+    for _ in range(8):
+        frf, power = noisy_response(int(rng.integers(1000)), 1e-3, values=light)
+        start = {n: v * 2 ** rng.uniform(-1, 1) for n, v in light.items()}
+        est = fq.fit(plant(**start).with_bounds(z1=(-np.inf, np.inf)), frf)
+        assert est.cost < 1.5 * power

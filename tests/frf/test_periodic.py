@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import scipy
 
 import freqid as fq
 
@@ -237,13 +238,78 @@ def test_a_slow_output_keeps_its_fast_input():
 
 def test_power_above_the_slow_nyquist_frequency_is_left_out_or_refused():
     h, M = 1e-3, 4
-    both = fq.multisine((1, 100), 1.0, h) + fq.multisine((160, 200), 1.0, h)
+    both = sum(fq.multisine(b, 1.0, h, crest="schroeder") for b in ((1, 100), (160, 200)))
     record = fq.simulate(LAG, np.tile(both, 5), h).decimate(M, keep_input=True)
     frf = fq.periodic(record, 1.0, skip=1)
     assert frf.frequency == pytest.approx(np.r_[1:50, 91:101])
     assert fq.fit(LAG, frf).values == pytest.approx([100, 60], rel=1e-9)
     with pytest.raises(ValueError, match="Nyquist frequency of 125 Hz folded onto it"):
         fq.periodic(record, 1.0, skip=1, band=(50, 90))
-    odd = fq.simulate(LAG, fq.multisine((1, 100), 0.902, h, 5), h).decimate(M, keep_input=True)
+    odd = fq.simulate(LAG, fq.multisine((1, 100), 0.902, h, 5, crest="schroeder"), h).decimate(
+        M, keep_input=True
+    )
     with pytest.raises(ValueError, match="no whole number of the output's samples"):
         fq.periodic(odd)
+
+
+def test_a_small_line_that_falls_on_a_small_one_is_left_out():
+    """A line of 0.9e-3 of the strongest onto one of 1.5e-3."""
+    h, n, M = 2e-3, 100, 2
+    k = np.arange(n * M)
+    lines = ((3, 1.0), (7, 1.5e-3), (93, 0.9e-3))
+    u = sum(A * np.cos(2 * np.pi * line * k / (n * M)) for line, A in lines)
+    record = fq.simulate(LAG, np.tile(u, 9), h).decimate(M, keep_input=True)
+    frf = fq.periodic(record, n * M * h, skip=3)
+    assert frf.frequency == pytest.approx([3 / (n * M * h)])
+
+
+def test_power_above_the_nyquist_frequency_alone_is_no_excitation():
+    h = 1e-3
+    record = fq.simulate(LAG, fq.multisine((130, 240), 1.0, h, 6, "schroeder"), h).decimate(
+        4, keep_input=True
+    )
+    with pytest.raises(ValueError, match="no energy in band"):
+        fq.periodic(record, 1.0, skip=1)
+
+
+def test_a_reference_is_checked_and_may_be_as_fast_as_the_input():
+    h, M = 1e-3, 4
+    u = fq.multisine((1, 100), 1.0, h, 6, "schroeder")
+    record = fq.simulate(LAG, u, h).decimate(M, keep_input=True)
+    one, other = (fq.periodic(record, 1.0, r, skip=1) for r in (u, u[::M]))
+    assert np.array_equal(one.response, other.response)
+    with pytest.raises(ValueError, match="reference must be finite"):
+        fq.periodic(record, 1.0, np.full(len(u), np.nan))
+
+
+@pytest.mark.parametrize(("lines", "periods", "pole"), [(3, 8, 0.0), (60, 3, 0.8)])
+def test_error_bars_of_few_lines_and_of_coloured_noise(lines, periods, pole):
+    u = np.tile(fq.multisine((5, 4 + lines), 1, DT, 1, crest="schroeder"), periods + 1)
+    clean, score = fq.simulate(LAG, u, DT, hold="bl").y, []
+    for seed in range(150):
+        e = np.random.default_rng([seed, lines]).standard_normal(len(u))
+        noise = scipy.signal.lfilter([1], [1, -pole], e)
+        record = fq.Record(u, clean + 0.1 * clean.std() * noise, DT, hold="bl")
+        est = fq.fit(LAG, fq.periodic(record, 1.0, skip=1), n_starts=1)
+        score.append((est.values - [100, 60]) / est.parameters["std"])
+    assert np.sqrt(np.mean(np.square(score))) == pytest.approx(1, abs=0.15)
+
+
+def test_the_witness_of_outputs_that_share_their_noise():
+    """Each line's errors are those of all its entries: chance, and no better minimum."""
+    model, p = two_by_two(), []
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        records = []
+        for e in range(2):
+            each = [fq.multisine((1, 60), 1, DT, 1, "random", seed=4 * e + i) for i in range(2)]
+            u = np.tile(np.column_stack(each), (5, 1))
+            y = fq.simulate(model, u, DT, hold="bl").y
+            noise = rng.standard_normal((len(y), 1)) * [1.0, 0.9] + 0.1 * rng.standard_normal(
+                y.shape
+            )
+            records.append(fq.Record(u, y + 0.05 * y.std(axis=0) * noise, DT, hold="bl"))
+        est = fq.fit(model, fq.periodic(records, 1.0, skip=1), n_starts=1)
+        p.append(est.witness.p_value)
+    assert np.mean(np.array(p) < 0.05) < 0.2
+    assert min(p) > 1e-4

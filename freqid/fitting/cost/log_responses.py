@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
+from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.lti import Hold, Realisation, sampled_response
 
 # part of the measured response below which that of a model is none
@@ -21,7 +21,7 @@ class LogResponse:
     """log(G/Ĝ) at the lines of an experiment, (outputs, inputs, lines) as real rows.
 
     ``weight`` (outputs, inputs, lines) multiplies the error: it says how well Ĝ is known. Where it
-    is zero, or the model's response is but for rounding, there is no error.
+    is zero there is no error.
     """
 
     def __init__(
@@ -49,16 +49,25 @@ class LogResponse:
         """Evaluate at one trial point."""
         return _LogEvaluation(self, realisation.for_place(self.place))
 
+    def ratio(self, G: ComplexArray, lines: IntArray | slice = slice(None)) -> ComplexArray:
+        """G/Ĝ at those ``lines``; of a response that is zero the least, and the same everywhere, so
+        that it is far off and leads nowhere.
+        """
+        heard = np.abs(G) > self.deaf[..., lines]
+        ratio: ComplexArray = np.where(heard, G / self.measured[..., lines], _DEAF)
+        return ratio
+
     def error(self, G: ComplexArray) -> FloatArray:
         """log(G/Ĝ) as real rows, (…, rows)."""
-        ratio = np.where(np.abs(G) > self.deaf, G / self.measured, 1)
+        ratio = self.ratio(G)
         error = (np.log(np.abs(ratio)) + 1j * np.angle(ratio)) * self.weight
         return error.reshape(*G.shape[:-3], -1).view(float)
 
     def relative(self, G: ComplexArray, dG: ComplexArray) -> FloatArray:
         """Derivatives of the same, (…, P, rows)."""
         heard = np.abs(G) > self.deaf
-        change = np.where(heard, self.weight / np.where(heard, G, 1), 0)[..., None, :, :, :] * dG
+        G, weight = np.where(heard, G, 1), np.where(heard, self.weight, 0)
+        change = dG / G[..., None, :, :, :] * weight[..., None, :, :, :]
         return change.reshape(*dG.shape[:-3], -1).view(float)
 
 

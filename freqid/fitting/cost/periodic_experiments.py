@@ -48,6 +48,14 @@ class PeriodicExperiment:
         return self.data.outputs[0].size
 
     @property
+    def level(self) -> float:
+        """Variance of each real value of the residual where the model is right: a half, and more
+        because its covariance is an estimate.
+        """
+        freedom, p = self.data.freedom, len(self.data.response)
+        return 0.5 * freedom / (freedom - p) if freedom > p else np.inf
+
+    @property
     def inflation(self) -> float:
         """How much more the estimate scatters than its weights say: they are estimates, too.
 

@@ -31,8 +31,7 @@ def promising(
             for target in targets:
                 few = np.linspace(0, len(target.omega) - 1, _GLANCE_LINES).astype(int)
                 G = structure.responses(points, target.omega[few], target.hold, target.place)
-                heard = np.abs(G) > target.deaf[..., few]
-                ratio = np.where(heard, G / target.measured[..., few], 1)
+                ratio = target.ratio(G, few)
                 error = np.log(np.abs(ratio)) ** 2 + np.angle(ratio) ** 2
                 error = error * target.weight[..., few] ** 2
                 cost += error.sum(axis=(1, 2, 3))

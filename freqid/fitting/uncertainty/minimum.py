@@ -89,6 +89,16 @@ class Minimum:
         return self.cost / self.freedom if self.prior is None else self.prior.variance
 
     @property
+    def _level(self) -> float:
+        """The same, of periodic data with what their periods tell: lines may be few."""
+        known = [e for e in self.experiments if isinstance(e, PeriodicExperiment)]
+        if self.prior is not None or len(known) < len(self.experiments):
+            return self.noise_variance
+        weight = sum(2 * e.data.freedom for e in known)
+        told = sum(2 * e.data.freedom * e.level for e in known)
+        return (self.cost + told) / (self.freedom + weight)
+
+    @property
     def exact(self) -> bool:
         """Whether nothing but rounding is left of the data."""
         return self.cost <= _ROUNDING * self.objective.energy
@@ -133,7 +143,7 @@ class Minimum:
                 e.inflation if isinstance(e, PeriodicExperiment) else 1 for e in self.experiments
             ]
             wider = self.inflation * float(np.mean(each))
-            return self.determined.scatter(wider * self.noise_variance * H)
+            return self.determined.scatter(wider * self._level * H)
         if self.prior is not None:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
         return self.determined.scatter(self.inflation * H @ score @ H)
