@@ -85,8 +85,8 @@ class MatrixFunction:
         except Exception as error:  # the user's function may raise anything
             where = ", ".join(f"{k}={v:g}" for k, v in {**resolved, **self.conditions}.items())
             # a KeyError says no more than a name
-            plain = isinstance(error, ValueError | ArithmeticError)
-            told = str(error) if plain else f"{type(error).__name__}: {error}"
+            bare = isinstance(error, LookupError | TypeError | AttributeError)
+            told = f"{type(error).__name__}: {error}" if bare else str(error)
             raise InputError(f"the model cannot be computed at {where}: {told}") from error
         return _shaped(matrices, resolved)
 
