@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+# what a build may lack, whose example then is left out
+MISSING = ("no measured data", "No module named 'pinocchio'")
 
 
 def on_pre_build(config):
@@ -18,7 +20,7 @@ def on_pre_build(config):
             [sys.executable, str(path), str(folder)], capture_output=True, text=True,
             env={**os.environ, "MPLBACKEND": "agg"}, check=False,
         )  # fmt: skip
-        if done.returncode and "no measured data" in done.stderr:
+        if done.returncode and any(missing in done.stderr for missing in MISSING):
             continue
         if done.returncode:
             raise RuntimeError(f"{path} failed: {done.stderr}")
