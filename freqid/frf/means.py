@@ -17,6 +17,7 @@ from freqid.data import (
     chosen,
     references_of,
 )
+from freqid.frf.noise_of_means import FREEDOM, means
 
 # part of the strongest line's amplitude below which a line is not excited
 _SILENT = 1e-3
@@ -28,9 +29,6 @@ _REPEATS = 0.9
 _MULTIPLES = 12
 # a period that repeats less than this part of what a multiple does is wrong, and so little, none
 _WORSE, _NOT_AT_ALL = 0.75, 0.05
-# degrees of freedom that the covariance of one output should have, and one more for each other
-# output; lines around one are taken for it until it does
-_FREEDOM = 14
 # amplitude of a line in standard errors of its noise from which it is excited for certain
 _CERTAIN = 4.0
 
@@ -112,7 +110,7 @@ def periodic(
         excited &= ~folded
     if not excited.any():
         raise InputError(f"input has no energy in band={band}; widen it")
-    mean, noise, freedom = _means(Z[..., excited], first.n_outputs)
+    mean, noise, freedom = means(Z[..., excited], first.n_outputs)
     return _packed(first, f[excited], mean, noise, freedom)
 
 
@@ -238,32 +236,9 @@ def _levels(U: ComplexArray) -> tuple[FloatArray, FloatArray]:
     P = U.shape[1]
     level = np.abs(U.mean(axis=1)).max(axis=(0, 1))
     # few periods tell the noise of one line badly: those beside it have as much
-    around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, _FREEDOM + 1, axis=-1)
+    around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, FREEDOM + 1, axis=-1)
     noise = np.sqrt(np.maximum(around.max(axis=(0, 1)), 0))
     return level, noise
-
-
-def _means(Z: ComplexArray, p: int) -> tuple[ComplexArray, ComplexArray, int]:
-    """Means (E, channels, K), their covariance (E, K, channels, channels) and its freedom.
-
-    With few periods lines beside one lend it their noise, which is as smooth as theirs.
-    """
-    P, K = Z.shape[1], Z.shape[-1]
-    mean = Z.mean(axis=1)
-    left = Z - mean[:, None]
-    C = np.einsum("epak,epbk->ekab", left, left.conj()) / (P - 1) / P
-    width = min(-(-(_FREEDOM + p - 1) // (P - 1)), K) | 1
-    if width > 1:
-        width = min(width, K if K % 2 else K - 1)
-        C = scipy.ndimage.uniform_filter1d(C.real, width, axis=1) + (
-            1j * scipy.ndimage.uniform_filter1d(C.imag, width, axis=1)
-        )
-        # at the ends as many lines as elsewhere: none is taken twice
-        C = C[:, np.clip(np.arange(K), width // 2, K - 1 - width // 2)]
-    # what does not scatter at all is still rounded
-    rounding = (np.finfo(float).eps * np.abs(mean).max(axis=-1)) ** 2  # (E, channels)
-    C = C + rounding[:, None, :, None] * np.eye(C.shape[-1])
-    return mean, C, (P - 1) * max(width, 1)
 
 
 def _packed(

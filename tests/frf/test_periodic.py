@@ -313,3 +313,23 @@ def test_the_witness_of_outputs_that_share_their_noise():
         p.append(est.witness.p_value)
     assert np.mean(np.array(p) < 0.05) < 0.2
     assert min(p) > 1e-4
+
+
+def test_the_noise_of_few_periods_in_a_loop_is_told_next_to_a_resonance():
+    """Noise that a loop takes to the input is as peaked as the plant, what it leaves is not."""
+    plant = fq.GreyBox(
+        lambda w, z: ([[0, 1], [-w * w, -2 * z * w]], [[0], [w * w]], [[1, 0]], [[0]]),
+        [fq.Parameter("w", 157.0), fq.Parameter("z", 0.05)],
+    )
+    r = np.tile(fq.multisine((1, 60), 2.0, DT, crest="schroeder"), 4)
+    clean, far = fq.simulate(plant, r, DT).y, []
+    for seed in range(40):
+        e = 0.05 * clean.std() * np.random.default_rng(seed).standard_normal(len(r))
+        u = r - e
+        g = fq.periodic(fq.Record(u, fq.simulate(plant, u, DT).y + e, DT), 2.0, r, skip=1)
+        near = g.select((18, 32))
+        true = plant.frequency_response(near.omega, fq.ZeroOrderHold(DT)).response
+        far.append(np.abs(near.response - true)[0, 0] ** 2 / near.variance[0, 0])
+    each = np.mean(far, axis=0)
+    assert 0.6 < each.mean() < 1.1
+    assert each.min() > 0.2
