@@ -27,7 +27,7 @@ from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.uncertainty.minimum import Spread
 from freqid.lti import ZeroOrderHold
-from freqid.models import DiscreteModel, GreyBox
+from freqid.models import DiscreteModel, GreyBox, observed_order
 
 # states of controller and delays that a loop may have beyond the plant's own
 _BEYOND = (0, 1, 2, 4)
@@ -184,5 +184,5 @@ def _black_box(readings: Sequence[Reading], order: int, count: int) -> tuple[Cha
 def _plant_order(model: object) -> int:
     """States of what is fitted."""
     if isinstance(model, GreyBox):
-        return len(model.state_space().A)
+        return observed_order(model)
     return int(getattr(model, "order", getattr(model, "poles", 1)))

@@ -19,9 +19,10 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Evidence, findings, out_of_sight
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
-from freqid.fitting.reading import Reading, enough_rows, read_for
+from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
+from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
 from freqid.lti import ZeroOrderHold

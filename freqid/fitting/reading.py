@@ -38,11 +38,6 @@ from freqid.fitting.noise_models import (
 from freqid.frf import spectra
 from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold
 
-# sums of squares below this have lost their digits
-_LEAST = 1e-280
-# inputs whose spectra have so small a singular value, squared, are the same
-_DEPENDENT = 1e-14
-
 InitialState = Literal["estimate", "zero", "steady"]
 Domain = Literal["frequency", "time"]
 
@@ -118,8 +113,14 @@ class Reading:
         """
         if self.logarithmic or isinstance(self.data, StampedRecord):
             return True
-        periodic = isinstance(self.data, PeriodicResponse)
-        return self.in_time or (periodic and not isinstance(self.noise, GivenWeights))
+        return self.in_time or self.both_ends
+
+    @property
+    def both_ends(self) -> bool:
+        """Whether the errors are those of means over periods, with noise on inputs and outputs."""
+        if self.logarithmic or not isinstance(self.data, PeriodicResponse):
+            return False
+        return not isinstance(self.noise, GivenWeights)
 
     def at_lines(self) -> Reading:
         """The same data at their lines, the initial state free where it was at rest."""
@@ -130,10 +131,23 @@ class Reading:
             noise = RelativeNoise(self.noise)
             data = self.data.plain() if isinstance(self.data, PeriodicResponse) else self.data
             return dataclasses.replace(self, data=data, noise=noise, logarithmic=False)
-        if self.own_cost and isinstance(self.data, PeriodicResponse):
+        if self.both_ends:
+            assert isinstance(self.data, PeriodicResponse)
             return dataclasses.replace(self, data=self.data.plain(), noise=ResponseNoise())
         state: InitialState = "steady" if self.initial_state == "steady" else "estimate"
         return dataclasses.replace(self, domain="frequency", initial_state=state)
+
+    def beside(self) -> Reading:
+        """The same data where a black box is heard beside a fit: at their means, or their lines.
+
+        Means tell their covariances too badly where these have hardly more degrees of freedom than
+        outputs.
+        """
+        if self.both_ends:
+            assert isinstance(self.data, PeriodicResponse)
+            if self.data.freedom > len(self.data.response) + 1:
+                return self
+        return self.at_lines()
 
     def with_(self, **changes: object) -> Reading:
         """The same with other settings."""
@@ -161,7 +175,8 @@ class Reading:
             frf = frf.select(self.band)
         turned = 2 * np.arctan(frf.omega * dt / 2) / dt
         hold = ZeroOrderHold(dt)
-        seen = dataclasses.replace(frf, frequency=turned / (2 * np.pi), dt=dt, hold=hold)
+        changed = {"frequency": turned / (2 * np.pi), "dt": dt, "hold": hold}
+        seen = type(frf)(**{**frf.__dict__, **changed})
         return dataclasses.replace(self, data=seen, hold=hold, band=None)
 
     def experiment(self, plane: Plane | None = None) -> Experiment:
@@ -173,9 +188,10 @@ class Reading:
             return self._samples(plane)
         if self.logarithmic:
             return self._logarithm()
-        if self.own_cost and isinstance(self.data, PeriodicResponse):
+        if self.both_ends:
+            assert isinstance(self.data, PeriodicResponse)
             data = self.data if self.band is None else self.data.select(self.band)
-            return PeriodicExperiment(data, self.hold, plane is not None, self.place)
+            return PeriodicExperiment(data, self.hold, plane, self.place)
         return self.lines(plane)
 
     def lines(self, plane: Plane | None = None) -> SpectralExperiment:
@@ -250,38 +266,3 @@ def read_for(
                 f"and {shape[1]}"
             )
     return [r.experiment(plane) for r in readings]
-
-
-def enough_rows(experiments: Sequence[Experiment], n_parameters: int) -> None:
-    """ValueError when the data are fewer than the parameters, or no numbers to work with."""
-    energy = float(sum(e.energy for e in experiments))
-    if not np.isfinite(energy) or energy < _LEAST:
-        size = "zero, or too small" if energy < _LEAST else "too large"
-        raise InputError(
-            f"outputs are {size} in what is fitted, so that their squares leave the range of "
-            "numbers: check the channel and the band, or give the output in other units"
-        )
-    n_rows = sum(e.n_rows for e in experiments)
-    if n_rows < n_parameters:
-        raise InputError(
-            f"data hold {n_rows} real values for {n_parameters} free parameters; widen the band, "
-            "lengthen the record or fix parameters"
-        )
-
-
-def told_apart(experiments: Sequence[Experiment]) -> None:
-    """ValueError for inputs whose effects no model can tell apart."""
-    lines = [e for e in experiments if isinstance(e, SpectralExperiment)]
-    if not lines or lines[0].lift > 1:
-        return
-    U = np.concatenate([e.lines.U.reshape(len(e.lines.U), -1) for e in lines], axis=1)
-    size = np.linalg.norm(U, axis=1, keepdims=True)
-    unit = U / np.where(size > 0, size, 1)
-    _, s, V = np.linalg.svd(unit @ unit.conj().T)
-    if s[-1] > _DEPENDENT * s[0]:
-        return
-    held = np.flatnonzero(np.abs(V[-1]) > 1e-3) + 1
-    raise InputError(
-        f"inputs {', '.join(map(str, held))} depend on one another: their effects cannot be told "
-        "apart; leave one out, or excite them differently"
-    )

@@ -34,7 +34,7 @@ from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.shared_noise import noise_freedom, shared
 from freqid.lti import in_one_blas_thread
-from freqid.models import DiscreteModel, Model
+from freqid.models import DiscreteModel, Model, observed_order
 
 # level below which the black box explains the data so much better that it is no chance
 _LEVEL = 0.01
@@ -73,7 +73,7 @@ class Testimony:
             if structure.model.delay_sources:
                 structure, readings = self._in_step(structure)
             else:
-                readings = [r.at_lines() for r in self.readings]
+                readings = [r.beside() for r in self.readings]
             return self._heard(structure, readings)
         except (InputError, np.linalg.LinAlgError) as error:
             return Witness("absent", str(error))
@@ -88,7 +88,7 @@ class Testimony:
 
     def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
         grey = self._grey(structure, readings)
-        order = len(structure.model.state_space().A)
+        order = observed_order(structure.model)
         if grey.cost <= 1e-18 * self.minimum.objective.energy:
             sentence = "the estimate leaves nothing but the rounding of the data"
             return Witness("complete", sentence, 0.0, 0.0, 1.0)
@@ -158,10 +158,13 @@ class Testimony:
     def _grey(self, structure: GreyStructure, readings: Sequence[Reading]) -> Solution:
         """The estimate's minimum on the lines, without what was known before."""
         late = structure is not self.minimum.structure
-        if self.minimum.prior is None and not late and not any(r.own_cost for r in self.readings):
+        other = any(
+            own.own_cost and own is not r for own, r in zip(self.readings, readings, strict=True)
+        )
+        if self.minimum.prior is None and not late and not other:
             return self.minimum.solution
         begin = structure.start if late else self.minimum.x
-        return polish(Objective(structure, [r.lines() for r in readings]), begin)
+        return polish(Objective(structure, [r.experiment() for r in readings]), begin)
 
 
 def _groups(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:
@@ -177,6 +180,8 @@ def _beside(
     """The black box of the experiments that meet one plant, begun from the data or from it."""
     model, own = structure.at(grey.x, group[0]), [readings[i] for i in group]
     found = Reference.of(model, own)
+    if any(r.both_ends for r in own):
+        found = found.on(own)
     return min(found, found.beside(model, own), key=lambda r: r.cost)
 
 

@@ -15,6 +15,7 @@ from freqid.lti.holds import (
     as_hold,
     known_hold,
 )
+from freqid.lti.observability import observed, reduced
 from freqid.lti.polynomials import PolynomialBasis
 from freqid.lti.projection import directions, eliminate, triangle, triangle_of
 from freqid.lti.quadrature import NODES, TOLERANCE, panel_nodes, resolved, unresolved

@@ -19,8 +19,9 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Evidence, findings, out_of_sight
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.noise_models import GivenWeights
-from freqid.fitting.reading import Reading, enough_rows, read_for, told_apart
+from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.sufficiency import enough_rows, told_apart
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.lti import Hold, Plane, StateSpace
 from freqid.models import DiscreteModel, Model, OutputError, coefficients_of

@@ -22,8 +22,8 @@ from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
-from freqid.lti import Hold, PeriodicHold, Plane, StateSpace
-from freqid.models import GreyBox, late_sampled
+from freqid.lti import Hold, PeriodicHold, Plane, StateSpace, observed, reduced
+from freqid.models import GreyBox, late_sampled, observed_order
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
@@ -91,7 +91,7 @@ class Reference:
         # what is left of a delay within a sample lets the input through, too
         direct = bilinear or bool(model.state_space().D.any() or model.delay_sources)
         direct = direct or readings[0].hold.reaches_next
-        order = len(model.state_space().A) if order is None else order
+        order = observed_order(model) if order is None else order
         try:
             chart = Chart(first_model(lines, order, direct), direct, plane, dt)
             return cls._descended(Objective(chart, lines), bilinear)
@@ -161,14 +161,16 @@ class Reference:
     def _around(self, model: GreyBox, readings: Sequence[Reading]) -> StateSpace:
         """The sampled model of a plant, in the plane of the chart."""
         in_z = _bilinear(model, self.chart.dt) if self.bilinear else _held(model, readings[0].hold)
-        return to_plane(in_z, self.chart.plane)
+        # what is not seen of the plant is not seen of its samples
+        W, X = observed(model.state_space(), len(self.chart.centre.A))
+        return to_plane(reduced(in_z, W, X), self.chart.plane)
 
     def _from(self, chart: Chart, readings: Sequence[Reading]) -> Reference:
-        """The minimum next to the centre of a chart, on all lines."""
-        seen = [r.at_lines() for r in readings]
+        """The minimum next to the centre of a chart, on all lines or means."""
+        seen = [r.beside() for r in readings]
         if self.bilinear:
             seen = [r.on_circle(chart.dt) for r in seen]
-        experiments = [r.lines(Plane()).in_plane(chart.plane) for r in seen]
+        experiments = [r.experiment(chart.plane) for r in seen]
         return self._descended(Objective(chart, experiments), self.bilinear)
 
     def beside(self, model: GreyBox, readings: Sequence[Reading]) -> Reference:

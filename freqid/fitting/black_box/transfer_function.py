@@ -22,8 +22,9 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
-from freqid.fitting.reading import Reading, enough_rows, read_for, told_apart
+from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.sufficiency import enough_rows, told_apart
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
 from freqid.models import (

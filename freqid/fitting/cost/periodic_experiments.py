@@ -7,6 +7,7 @@ Jacobian L⁻¹ (de − ½ dC C⁻¹ e), C = L Lᴴ, has the gradient of V exact
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from freqid.fitting.cost.experiments import Evaluation
 from freqid.lti import (
     BandLimited,
     Hold,
+    Plane,
     Realisation,
     on_circle,
     response_and_derivatives,
@@ -30,11 +32,11 @@ _ROUNDING = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class PeriodicExperiment:
-    """Means over periods against a model; ``discrete`` matrices are taken as they are."""
+    """Means over periods against a model; with a ``plane`` it is a sampled one, seen there."""
 
     data: PeriodicResponse
     hold: Hold
-    discrete: bool = False
+    plane: Plane | None = None
     place: int = 0
 
     @property
@@ -73,12 +75,17 @@ class PeriodicExperiment:
         rows = _Evaluation(self, np.zeros((p, m, K), complex), None).residual
         return float(rows @ rows)
 
+    def in_plane(self, plane: Plane) -> PeriodicExperiment:
+        """The same means against a sampled model seen in another plane."""
+        return dataclasses.replace(self, plane=plane)
+
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""
         omega, realisation = self.data.omega, realisation.for_place(self.place)
-        if self.discrete:
+        if self.plane is not None:
+            w = self.plane.points(on_circle(omega * self.data.dt))
             plant = realisation.basis.through(BandLimited())
-            G, dG = response_and_derivatives(plant, on_circle(omega * self.data.dt))
+            G, dG = response_and_derivatives(plant, w, factor=self.plane.input_factor(w))
         else:
             G, dG = sampled_response(realisation, omega, self.hold)
         return _Evaluation(self, G, dG)

@@ -19,7 +19,7 @@ from freqid.lti import (
     points as points_of,
     response_and_derivatives,
 )
-from freqid.models import GreyBox, Parameter
+from freqid.models import GreyBox, Parameter, observed_order
 
 # unknowns of all black boxes together that are worth their time: some seconds
 MOST_UNKNOWNS = 300
@@ -73,7 +73,7 @@ class PlacedStructure(GreyStructure):
     @property
     def black_boxes(self) -> int:
         """Unknowns of a black box of the plant's order beside each group of experiments."""
-        order = len(self.model.state_space().A)
+        order = observed_order(self.model)
         return len(self.groups) * order * (self.model.n_inputs + self.model.n_outputs)
 
     @property

@@ -24,7 +24,7 @@ from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.fitting.witness import excess
 from freqid.lti import directions
-from freqid.models import GreyBox, Model, OutputError
+from freqid.models import GreyBox, Model, OutputError, observed_order
 
 # experiments times parameters whose separate fits are compared at the most
 _MOST = 4000
@@ -60,7 +60,9 @@ def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
     data = [r.data for r in inquiry.readings]
     if not all(isinstance(d, Record) and d.factor == 1 for d in data):
         return None
-    order = min(len(inquiry.model.state_space().A) + 2, _BOX)
+    model = inquiry.model
+    states = observed_order(model) if isinstance(model, GreyBox) else len(model.state_space().A)
+    order = min(states + 2, _BOX)
     try:
         spec = OutputError(order, True, stable=True)
         box = fit_output_error(spec, [r.at_lines() for r in inquiry.readings])
@@ -136,7 +138,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     if any(r.own_cost for r in inquiry.readings) or inquiry.minimum.prior is not None:
         return []
     readings = [r.at_lines() for r in inquiry.readings]
-    order = len(inquiry.model.state_space().A) + 2
+    order = observed_order(inquiry.model) + 2
     try:
         box = Reference.of(inquiry.model, readings, order=order)
     except (InputError, np.linalg.LinAlgError):

@@ -1,0 +1,133 @@
+"""The witness: p-values of true models are those of chance, whatever states the outputs hide."""
+
+import numpy as np
+import pytest
+import scipy.stats
+
+import freqid as fq
+from freqid.models import observed_order
+
+DT = 2e-3
+TRUE = {"J1": 0.3, "J2": 1.0, "k": 900.0, "d": 1.0, "f": 6.0}
+
+
+def axis(measured="velocity", **start):
+    """Two masses and a spring: of three states a velocity shows, the fourth is a position."""
+    return fq.mechanical(
+        lambda J1, J2: np.diag([J1, J2]),
+        lambda k: k * np.array([[1.0, -1], [-1, 1]]),
+        lambda d, f: d * np.array([[1.0, -1], [-1, 1]]) + np.diag([f, 0]),
+        B=[[1.0], [0]],
+        C=[[1.0, 0]],
+        measured=measured,
+        parameters=[fq.Parameter(n, start.get(n, v), lower=0) for n, v in TRUE.items()],
+    )
+
+
+def two_axes(**start):
+    """The same twice, turning one arm."""
+
+    def mass(J1, J2):
+        c = 0.3 * J2
+        M = np.diag([J1, 0.7 * J1, J2, J2])
+        M[2, 3] = M[3, 2] = c
+        return M
+
+    def between(x, y):
+        return np.block([[np.diag([x, y]), -np.diag([x, y])], [-np.diag([x, y]), np.diag([x, y])]])
+
+    return fq.mechanical(
+        mass,
+        lambda k: between(k, 0.5 * k),
+        lambda d, f: between(d, d) + np.diag([f, f, 0, 0]),
+        B=np.eye(4)[:, :2],
+        C=np.eye(4)[:2],
+        measured="velocity",
+        parameters=[fq.Parameter(n, start.get(n, v), lower=0) for n, v in TRUE.items()],
+    )
+
+
+@pytest.mark.parametrize(
+    ("model", "order"),
+    [
+        (axis(), 3),
+        (axis("position"), 4),
+        (axis("acceleration"), 3),
+        (two_axes(), 6),
+        (fq.two_mass(), 3),
+        (fq.drivetrain(5), 9),
+    ],
+)
+def test_states_that_no_output_shows_are_none_of_a_black_box(model, order):
+    assert observed_order(model) == order
+
+
+def test_what_cancels_at_one_point_alone_is_a_state():
+    # at d = 0.5 a zero lies on the pole at −2
+    model = fq.GreyBox(
+        lambda d: (np.diag([-2.0, -5.0]), [[1.0], [1.0]], [[d - 0.5, 1.0]], [[0.0]]),
+        [fq.Parameter("d", 0.5)],
+    )
+    assert observed_order(model) == 2
+
+
+def test_stiff_states_are_seen():
+    # a current of 1e7 rad/s in front of a mass that takes minutes
+    A = [[-1e7, 0.0], [1e-6, -1e-3]]
+    model = fq.GreyBox(lambda g: (A, [[g], [0.0]], [[0.0, 1.0]], [[0.0]]), [fq.Parameter("g", 1.0)])
+    assert observed_order(model) == 2
+
+
+def record(seed, model, channels):
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal((1500, channels))
+    y = fq.simulate(model, u, DT).y
+    return fq.Record(u, y + 0.05 * y.std(axis=0) * rng.standard_normal(y.shape), DT)
+
+
+def periods(seed, model, channels, in_loop=False):
+    """Six settled periods of runs with orthogonal multisines, with noise on outputs and inputs."""
+    rng = np.random.default_rng(seed)
+    r = fq.multisine(
+        (1, 60), 2.0, DT, n_inputs=channels, orthogonal=True, grid="odd", crest="random", seed=seed
+    )
+    runs, references = [], list(np.tile(r.reshape(channels, -1, channels), (1, 8, 1)))
+    for one in references:
+        y = fq.simulate(model, one, DT).y
+        e = 0.05 * y.std(axis=0) * rng.standard_normal(y.shape)
+        # noise of a sensor that a velocity loop takes back to the torque
+        u = one - 20.0 * e if in_loop else one
+        runs.append(fq.Record(u, fq.simulate(model, u, DT).y + e, DT))
+    return fq.periodic(runs, 2.0, references, skip=2)
+
+
+def uniform(p_values):
+    """p of the hypothesis that p-values are those of chance."""
+    return scipy.stats.kstest(p_values, "uniform").pvalue
+
+
+@pytest.mark.parametrize(
+    ("measured", "make"),
+    [(record, axis), (periods, axis), (periods, two_axes)],
+    ids=["record", "periods", "periods of two axes"],
+)
+def test_p_values_of_a_true_model_are_those_of_chance(measured, make):
+    channels = make().n_inputs
+    p = []
+    for seed in range(24):
+        data = measured(seed, make(), channels)
+        est = fq.fit(make(k=1000.0, d=1.2), data, n_starts=1)
+        p.append(est.witness.p_value)
+    assert uniform(p) > 1e-3, np.sort(p).round(4)
+    # what is missing is still seen
+    short = measured(99, make(), channels)
+    est = fq.fit(make(f=0.0).fix("f"), short, n_starts=1)
+    assert est.witness.p_value < 1e-6
+
+
+def test_p_values_of_two_axes_in_a_loop_are_those_of_chance():
+    p = []
+    for seed in range(24):
+        est = fq.fit(two_axes(k=1000.0, d=1.2), periods(seed, two_axes(), 2, True), n_starts=1)
+        p.append(est.witness.p_value)
+    assert uniform(p) > 1e-3, np.sort(p).round(4)
