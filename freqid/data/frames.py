@@ -14,6 +14,7 @@ from freqid.data.remembered import (
     as_printed,
     is_kept,
     kept_aliased,
+    kept_apart,
     kept_channels,
     kept_columns,
     kept_conditions,
@@ -81,6 +82,7 @@ def record_of(
         notes=tuple(notes),
         aliased=kept_aliased(frame),
         conditions=kept_conditions(frame),
+        clocks_apart=kept_apart(frame),
     )
 
 

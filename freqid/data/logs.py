@@ -8,13 +8,13 @@ hold is drawn out by straight lines. The common grid is exact; resampling is not
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, choice, samples
+from freqid.checks import FloatArray, InputError, choice, finite, samples
 from freqid.data.clocks import Clock, simple_ratio
 from freqid.data.record import Record
 from freqid.data.regular_time import EMPTY
@@ -26,6 +26,8 @@ from freqid.lti import Hold, as_hold
 _FINEST, _LARGEST = 40, 2e7
 # part of a step that an offset may be off by rounding, and periods without an input that are said
 _EXACT, _WIDE = 1e-6, 3
+# periods in s from which on stamps may be in another unit than s
+_SLOW = 1.0
 # of a coarse grid's step, however badly the stamps tell it
 _NEAR = 0.1
 
@@ -40,15 +42,32 @@ def record_from_logs(
     input_names: Sequence[str] | None = None,
     output_names: Sequence[str] | None = None,
     units: Mapping[str, str] | None = None,
+    reference: ArrayLike | None = None,
+    conditions: Mapping[str, float] | None = None,
+    offset: float | Literal["estimate"] = 0.0,
 ) -> Record:
     """The work of ``Record.from_logs``."""
     inputs, outputs = samples("u", u), samples("y", y)
+    commanded = None if reference is None else samples("reference", reference)
     u_seconds, y_seconds, told = common_seconds(u_time, y_time)
+    apart = isinstance(offset, str)
+    if apart:
+        choice("offset", offset, ("estimate",))
+    else:
+        y_seconds = y_seconds - finite("offset", offset)
     clocks = Clock.of("u_time", u_seconds), Clock.of("y_time", y_seconds)
     for name, x, clock in (("u", inputs, clocks[0]), ("y", outputs, clocks[1])):
         if len(x) != len(clock.stamps):
             raise InputError(f"{name} has {len(x)} samples and {len(clock.stamps)} time stamps")
-    named = {"input_names": input_names, "output_names": output_names, "units": units}
+    if commanded is not None and len(commanded) not in (len(outputs), len(inputs)):
+        raise InputError(
+            f"reference has {len(commanded)} samples; expected as many as y, {len(outputs)}, or "
+            f"as u, {len(inputs)}"
+        )
+    named = {
+        "input_names": input_names, "output_names": output_names, "units": units,
+        "conditions": conditions,
+    }  # fmt: skip
     u_clock, y_clock = clocks
     u_at, y_at = u_clock.times, y_clock.times
     both = max(u_at[0], y_at[0]), min(u_at[-1], y_at[-1])
@@ -69,6 +88,11 @@ def record_from_logs(
         f"the output comes every {ratio:.9g} (± {ratio * error:.2g}) input samples, the first "
         f"{y_clock.start - u_clock.start:.6g} s after the first input"
     )
+    if told is None and min(c.period for c in clocks) >= _SLOW:
+        notes.append(
+            f"the stamps are taken for seconds: a sample every {u_clock.period:g} s; divide by "
+            "1000 if they are milliseconds"
+        )
     if any(2 * n < len(t) for n, t in zip(shared, (u_at, y_at), strict=True)):
         notes.append(
             f"the clocks share {shared[0]} of {len(u_at)} input samples and {shared[1]} of "
@@ -82,10 +106,14 @@ def record_from_logs(
         )
     fraction = simple_ratio(y_clock, u_clock)
     if fraction is not None and all(c.calm and not c.missing for c in clocks):
-        grid = _Grid.of(u_clock, y_clock, fraction.denominator, fraction.numerator, kind)
+        grid = _Grid.of(u_clock, y_clock, fraction.denominator, fraction.numerator, kind, apart)
         if grid is not None:
-            return grid.record(inputs, outputs, notes, named)
-    regular = _resampled(u_clock, inputs, y_clock, outputs, kind, notes, named, resample)
+            return grid.record(inputs, outputs, commanded, notes, named)
+    if not resample:
+        _refused_on_stamps(commanded, apart)
+    regular = _resampled(
+        u_clock, inputs, y_clock, outputs, commanded, kind, notes, named, resample, apart
+    )
     if resample:
         return regular
     # an input that is held lasts a period, one that is drawn ends with its last stamp
@@ -105,17 +133,34 @@ def record_from_logs(
     )  # fmt: skip
 
 
+def _refused_on_stamps(reference: FloatArray | None, apart: bool) -> None:
+    """ValueError for what needs lines of a spectrum, where the stamps fit no common grid."""
+    cure = "the stamps fit no common grid; resample=True puts the samples on one"
+    if reference is not None:
+        raise InputError(f"reference: a fit through it needs spectra, and {cure}")
+    if apart:
+        raise InputError(f"offset='estimate': a delay needs spectra, and {cure}")
+
+
 class _Grid:
     """A common grid: the input every ``repeat`` of its steps, the output every ``factor``."""
 
-    def __init__(self, step: float, repeat: int, factor: int, first: int, kind: str) -> None:
+    def __init__(
+        self, step: float, repeat: int, factor: int, first: int, kind: str, apart: float | None
+    ) -> None:
         self.step, self.repeat, self.factor = step, repeat, factor
         # grid number of the first output, counted from the first input
         self.first, self.kind = first, kind
+        # by how much the output's stamps come after its ticks, where their offset is unknown
+        self.apart = apart
 
     @classmethod
-    def of(cls, u: Clock, y: Clock, repeat: int, factor: int, kind: str) -> _Grid | None:
-        """The coarsest grid that both clocks and their offset lie on; None where there is none."""
+    def of(
+        cls, u: Clock, y: Clock, repeat: int, factor: int, kind: str, apart: bool
+    ) -> _Grid | None:
+        """The coarsest grid that both clocks lie on, and their offset where it is known; None where
+        there is none.
+        """
         h = u.period
         for finer in range(1, _FINEST + 1):
             step = h / (repeat * finer)
@@ -124,12 +169,18 @@ class _Grid:
             at = (y.start - u.start) / step
             # as well as the stamps tell where a clock begins
             error = np.hypot(u.start_error, y.start_error) / step
-            if abs(at - round(at)) < max(_EXACT, min(4 * error, _NEAR)):
-                return cls(step, repeat * finer, factor * finer, round(at), kind)
+            if apart or abs(at - round(at)) < max(_EXACT, min(4 * error, _NEAR)):
+                beside = step * (at - round(at)) if apart else None
+                return cls(step, repeat * finer, factor * finer, round(at), kind, beside)
         return None
 
     def record(
-        self, u: FloatArray, y: FloatArray, notes: Sequence[str], named: Mapping[str, Any]
+        self,
+        u: FloatArray,
+        y: FloatArray,
+        reference: FloatArray | None,
+        notes: Sequence[str],
+        named: Mapping[str, Any],
     ) -> Record:
         """The samples on the grid, from the first output that an input came before."""
         skip = max(-(self.first // self.factor), 0) if self.first < 0 else 0
@@ -146,10 +197,15 @@ class _Grid:
             said.append("the input was interpolated as a band-limited, periodic one")
         elif self.repeat > 1:
             said.append(f"each input sample fills {self.repeat} steps of the common grid")
+        kept = slice(start, start + length * self.factor)
+        if reference is not None and len(reference) == len(y):
+            reference = reference[skip : skip + length]
+        elif reference is not None:
+            reference = self._drawn(reference)[kept][:: self.factor]
         return Record(
-            fast[start : start + length * self.factor], y[skip : skip + length],
+            fast[kept], y[skip : skip + length], reference=reference,
             dt=self.step * self.factor, hold=self.kind, input_dt=self.step, notes=tuple(said),
-            **named,
+            clocks_apart=self.apart, **named,
         )  # fmt: skip
 
     def _drawn(self, u: FloatArray) -> FloatArray:
@@ -168,10 +224,12 @@ def _resampled(
     u: FloatArray,
     y_clock: Clock,
     y: FloatArray,
+    reference: FloatArray | None,
     kind: str,
     notes: Sequence[str],
     named: Mapping[str, Any],
     asked: bool,
+    apart: bool,
 ) -> Record:
     """Both on a grid of the output's own period: a held input is repeated, never drawn through."""
     u_at, y_at = u_clock.times, y_clock.times
@@ -189,15 +247,21 @@ def _resampled(
         )
     t_slow = start + y_clock.period * np.arange(count)
     t_fast = start + step * np.arange(count * every)
-    inputs, outputs = u.reshape(len(u), -1), y.reshape(len(y), -1)
-    if kind == "zoh":
-        at = np.clip(np.searchsorted(u_at, t_fast, side="right") - 1, 0, len(u) - 1)
-        fast = inputs[at]
-    else:
-        fast = np.column_stack([np.interp(t_fast, u_at, c) for c in inputs.T])
-    slow = np.column_stack([np.interp(t_slow, y_at, c) for c in outputs.T])
+
+    def at(t: FloatArray, stamps: FloatArray, x: FloatArray, held: bool) -> FloatArray:
+        if held:
+            return x[np.clip(np.searchsorted(stamps, t, side="right") - 1, 0, len(x) - 1)]
+        columns = [np.interp(t, stamps, c) for c in x.reshape(len(x), -1).T]
+        return np.column_stack(columns).reshape(-1, *x.shape[1:])
+
+    fast, slow = at(t_fast, u_at, u, kind == "zoh"), at(t_slow, y_at, y, False)
+    if reference is not None and len(reference) == len(y):
+        reference = at(t_slow, y_at, reference, False)
+    elif reference is not None:
+        reference = at(t_slow, u_at, reference, kind == "zoh")
     said = (*notes, "resampled: the input was repeated, the output drawn by straight lines")
     return Record(
-        fast.reshape(-1, *u.shape[1:]), slow.reshape(-1, *y.shape[1:]),
-        dt=step * every, hold=kind, input_dt=step, notes=said if asked else tuple(notes), **named,
+        fast, slow, reference=reference,
+        dt=step * every, hold=kind, input_dt=step, notes=said if asked else tuple(notes),
+        clocks_apart=0.0 if apart else None, **named,
     )  # fmt: skip

@@ -53,6 +53,8 @@ class Record(Signals):
         notes: what was done to the samples before, in sentences.
         aliased: part of the input's power that decimation has folded into lower frequencies.
         conditions: what was set for this experiment, numbers by name.
+        clocks_apart: by how much the output's stamps come after its samples here, in s, where the
+            offset of its clock is unknown; None where it is known.
 
     Raises ValueError for NaN samples, lengths that do not agree, or a sample time that is not
     positive. The arrays are copied and read-only.
@@ -74,6 +76,7 @@ class Record(Signals):
     notes: Sequence[str]
     aliased: float
     conditions: Mapping[str, float]
+    clocks_apart: float | None
 
     # written by hand: fields hold what was checked, which is less than what may be given
     def __init__(
@@ -90,6 +93,7 @@ class Record(Signals):
         notes: Sequence[str] = (),
         aliased: float = 0.0,
         conditions: Mapping[str, float] | None = None,
+        clocks_apart: float | None = None,
     ) -> None:
         dt = positive("dt", dt, "s")
         step = dt if input_dt is None else positive("input_dt", input_dt, "s")
@@ -113,11 +117,13 @@ class Record(Signals):
             u=fast, y=slow, dt=dt, hold=between, input_dt=step, input_names=u_names,
             output_names=y_names, units=dict(units or {}), reference=commanded, notes=notes,
             aliased=finite("aliased", aliased), conditions=as_conditions(conditions),
+            clocks_apart=None if clocks_apart is None else finite("clocks_apart", clocks_apart),
         )  # fmt: skip
 
     def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"notes": (), "aliased": 0.0, "conditions": {}} | sealed(state))
+        lacking = {"notes": (), "aliased": 0.0, "conditions": {}, "clocks_apart": None}
+        self.__dict__.update(lacking | sealed(state))
 
     def decimate(self, factor: int, keep_input: bool = False, antialias: bool = False) -> Record:
         """Every ``factor``-th sample, with the hold remembered as it was.

@@ -61,6 +61,11 @@ def references_of(sets: Sequence[Record], reference: Reference | None) -> list[F
     """One reference signal a record; ValueError where it is missing or of another length."""
     if reference is None or reference is False:
         return None
+    if isinstance(reference, str):
+        raise InputError(
+            f"reference={reference!r}: a name says nothing here; give samples, or True for the "
+            "records' own, which read(..., reference='column') keeps"
+        )
     if reference is True:
         given: list[ArrayLike] = [r.reference for r in sets if r.reference is not None]
         if len(given) < len(sets):

@@ -25,13 +25,15 @@ _ALIASED, _INPUTS = "aliased share", "input count"
 _STEP, _NOTE = "sample time", re.compile(r"note \d+: ")
 # beside a column "reference" that is what the loop was told
 _LOOP = "closed loop"
+# clocks whose offset is unknown
+_APART = "clocks apart"
 _ROUNDING = 1e-9
 
 
 def is_kept(column: object) -> bool:
     """Whether a column is about the record and no signal."""
     name = str(column)
-    other = name in (_ALIASED, _INPUTS, _STEP, _LOOP) or name.startswith(_CONDITION)
+    other = name in (_ALIASED, _INPUTS, _STEP, _LOOP, _APART) or name.startswith(_CONDITION)
     other = other or _NOTE.match(name) is not None
     return other or name.split(" ")[0] in _holds()
 
@@ -85,6 +87,8 @@ def kept_in_files(record: Record) -> dict[str, float | bool]:
         kept[_ALIASED] = record.aliased
     if record.reference is not None:
         kept[_LOOP] = 1.0
+    if record.clocks_apart is not None:
+        kept[_APART] = record.clocks_apart
     if as_printed(record.input_dt) != record.input_dt:
         kept[_STEP] = record.input_dt
     # the words are the name of the column: a table has no other place for them in every format
@@ -135,6 +139,11 @@ def kept_conditions(frame: pd.DataFrame) -> dict[str, float]:
 def kept_aliased(frame: pd.DataFrame) -> float:
     """The part of the power that had been folded when the table was written."""
     return _one(frame, _ALIASED) if _ALIASED in frame.columns else 0.0
+
+
+def kept_apart(frame: pd.DataFrame) -> float | None:
+    """What the stamps said of clocks whose offset was unknown when the table was written."""
+    return _one(frame, _APART) if _APART in frame.columns else None
 
 
 def kept_channels(

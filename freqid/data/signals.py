@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,7 +101,12 @@ class Signals:
         y: ArrayLike,
         hold: Hold | str = "zoh",
         resample: bool = False,
-        **named: Any,
+        input_names: Sequence[str] | None = None,
+        output_names: Sequence[str] | None = None,
+        units: Mapping[str, str] | None = None,
+        reference: ArrayLike | None = None,
+        conditions: Mapping[str, float] | None = None,
+        offset: float | Literal["estimate"] = 0.0,
     ) -> Record:
         """A record of an input and an output that two clocks stamped, times in s or dates.
 
@@ -108,8 +114,10 @@ class Signals:
         Where the rates of such clocks have a simple ratio both lie on a common grid, exactly.
         Elsewhere, in jitter, drift or drop-outs, the samples are kept at their own times, which a
         ``fit`` takes as they are; ``resample=True`` puts them on a grid instead. ``notes`` tell of
-        the clocks; ``named`` are input_names, output_names and units. Raises ValueError for stamps
-        that go back, clocks that do not overlap, or numbers of samples that disagree.
+        the clocks. A ``reference`` has a sample for each of y, or of u. ``offset`` (s) is by how
+        much the output's stamps come late; ``"estimate"`` leaves it to a ``fit``, as the parameter
+        ``clock_offset``. Raises ValueError for stamps that go back, clocks that do not overlap, or
+        numbers of samples that disagree.
 
         >>> import freqid as fq
         >>> t = np.arange(6) * 0.1
@@ -118,4 +126,7 @@ class Signals:
         """
         from freqid.data.logs import record_from_logs
 
-        return record_from_logs(u_time, u, y_time, y, hold, resample, **named)
+        return record_from_logs(
+            u_time, u, y_time, y, hold, resample, input_names, output_names, units, reference,
+            conditions, offset,
+        )  # fmt: skip

@@ -164,8 +164,14 @@ def _candidates(
     unknown = [s in structure.physical_names for s in model.delay_sources]
     if not any(unknown):
         return [own]
-    longest = max(_DELAYS, 3 * max(own))
-    shared = [q for q in range(longest + 1) if (q,) * len(own) != own]
+    longest = max(_DELAYS, 3 * max(map(abs, own)))
+    # an input may be early where a bound says so
+    early = [
+        structure.lower[structure.physical_names.index(str(s))]
+        for s, free in zip(model.delay_sources, unknown, strict=True) if free
+    ]  # fmt: skip
+    least = -longest if np.isfinite(early).all() and max(early) < 0 else 0
+    shared = [q for q in range(least, longest + 1) if (q,) * len(own) != own]
     return [own] + [
         tuple(q if free else kept for free, kept in zip(unknown, own, strict=True)) for q in shared
     ]

@@ -12,6 +12,7 @@ from freqid.checks import InputError, choice, flag, listed, named_values, whole
 from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
+from freqid.fitting.clock_offset import clock_notes, with_clock_offset
 from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
@@ -131,6 +132,7 @@ def fit(
         hold = None
         passed = [told]
     given_sets = as_data_sets(data)
+    model, clocks = with_clock_offset(model, given_sets)
     sets = tuple(in_order_of(model, d) for d in given_sets)
     estimated = isinstance(hold, str) and hold == "estimate"
     skip_zero = isinstance(model, GreyBox) and model.integrates
@@ -182,7 +184,7 @@ def fit(
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
     return dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
-        notes=[*passed, *notes, *est.notes],
+        notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes, *est.notes],
     )  # fmt: skip
 
 

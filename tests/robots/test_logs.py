@@ -1,5 +1,7 @@
 """Two clocks: rational ratios exactly, and stamps beyond repair as they are."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -131,3 +133,83 @@ def test_what_is_no_log():
         fq.Record.from_logs(t, x[:9], t, x)
     with pytest.raises(ValueError, match="hold='zog'"):
         fq.Record.from_logs(t, x, t, x, hold="zog")
+
+
+@pytest.mark.parametrize("rates", [(1000, 1000), (1000, 250), (1000, 300), (50, 250)])
+@pytest.mark.parametrize("late", [3.7e-3, -6e-3])
+def test_an_unknown_offset_of_the_clocks_is_found(plant, rates, late):
+    h, T = 1 / rates[0], 1 / rates[1]
+    u = fq.chirp(5, 60, 6, h) if rates[0] > 500 else fq.white_noise(300, seed=2)
+    u_time, y_time = h * np.arange(len(u)), 0.05 + T * np.arange(int(5.85 / T))
+    y = simulated(plant, u_time, u, y_time)
+    record = fq.Record.from_logs(u_time, u, y_time + late, y, offset="estimate")
+    est = fq.fit(plant, record, start=start_of(plant))
+    assert est["clock_offset"] + record.clocks_apart == pytest.approx(late, abs=1e-9)
+    assert max(abs(est[p.name] / p.value - 1) for p in plant.free_parameters) < 1e-8
+    assert f"come {late:.6g} s late" in est.notes[0]
+    assert not any("clock_offset" in w for w in est.warnings)
+    # what the clocks are known to be apart is nothing to estimate
+    known = fq.Record.from_logs(u_time, u, y_time + late, y, offset=late)
+    assert np.array_equal(known.y, fq.Record.from_logs(u_time, u, y_time, y).y)
+    assert "clock_offset" not in fq.fit(plant, known, start=start_of(plant)).names
+
+
+def test_the_error_bar_of_an_offset_in_noise(plant):
+    u = fq.chirp(5, 60, 4, 1e-3)
+    u_time, y_time = 1e-3 * np.arange(len(u)), 0.05 + 1e-3 * np.arange(3900)
+    y, score = simulated(plant, u_time, u, y_time), []
+    for seed in range(20):
+        noise = 0.05 * y.std() * np.random.default_rng(seed).standard_normal(len(y))
+        record = fq.Record.from_logs(u_time, u, y_time - 0.0042, y + noise, offset="estimate")
+        est = fq.fit(plant, record, start=start_of(plant))
+        far = est["clock_offset"] + record.clocks_apart + 0.0042
+        score.append(far / est.parameters["std"]["clock_offset"])
+    assert np.sqrt(np.mean(np.square(score))) == pytest.approx(1, abs=0.45)
+
+
+def test_what_an_offset_of_the_clocks_cannot_go_with(plant, tmp_path):
+    t = 1e-2 * np.arange(300)
+    u, y = fq.white_noise(300, seed=1), fq.white_noise(300, seed=2)
+    apart = fq.Record.from_logs(t, u, t, y, offset="estimate")
+    fq.write(apart, tmp_path / "a.csv")
+    assert fq.read(tmp_path / "a.csv").clocks_apart == 0.0
+    assert apart.decimate(2, keep_input=True).slice(0, 1).clocks_apart == 0.0
+    for model, data, text in (
+        (fq.OutputError(2), apart, "GreyBox"),
+        (plant, [apart, fq.Record(u, y, 0.01)], "known offset"),
+        (dataclasses.replace(fq.first_order(), input_delay=0.1), apart, "known input_delay"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            fq.fit(model, data)
+    jittered = t + 4e-3 * np.random.default_rng(0).random(300)
+    with pytest.raises(ValueError, match="resample=True"):
+        fq.Record.from_logs(t, u, jittered, y, offset="estimate")
+    with pytest.raises(ValueError, match="offset"):
+        fq.Record.from_logs(t, u, t, y, offset="guess")
+    with pytest.raises(ValueError, match="offset"):
+        fq.Record.from_logs(t, u, t, y, offset=np.nan)
+
+
+def test_references_and_conditions_of_logs():
+    u_time, y_time = 1e-3 * np.arange(4000), 4e-3 * np.arange(998) + 8e-3
+    u, y = fq.white_noise(4000, seed=1), fq.white_noise(998, seed=2)
+    r = fq.white_noise(4000, seed=3)
+    one = fq.Record.from_logs(u_time, u, y_time, y, reference=r, conditions={"q": 0.3})
+    other = fq.Record.from_logs(u_time, u, y_time, y, reference=r[8::4])
+    assert one.conditions == {"q": 0.3}
+    assert np.array_equal(one.reference, other.reference)
+    assert np.array_equal(one.reference, r[8::4][: len(one.y)])
+    even = fq.Record.from_logs(u_time, u, y_time, y, reference=r, resample=True)
+    assert np.array_equal(even.reference, one.reference[: len(even.y)])
+    with pytest.raises(ValueError, match="reference has 7 samples"):
+        fq.Record.from_logs(u_time, u, y_time, y, reference=r[:7])
+    jittered = y_time + 2e-3 * np.random.default_rng(0).random(998)
+    with pytest.raises(ValueError, match=r"reference: .*resample=True"):
+        fq.Record.from_logs(u_time, u, jittered, y, reference=r)
+
+
+def test_stamps_that_may_be_milliseconds_are_doubted():
+    t = np.arange(300)
+    x = fq.white_noise(300, seed=1)
+    assert any("milliseconds" in n for n in fq.Record.from_logs(t, x, t, x).notes)
+    assert not any("milliseconds" in n for n in fq.Record.from_logs(t / 1e3, x, t / 1e3, x).notes)
