@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import copy
 import inspect
-from collections.abc import Callable, Mapping, Sequence, Sized
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from freqid.checks import Array, FloatArray, InputError
+from freqid.checks import FloatArray, InputError
 from freqid.lti import Linearisation, StateSpace
+from freqid.models.shaped import as_dense, shaped
 from freqid.models.ties import Ties
 
 Matrices = Callable[..., Sequence[object]]
@@ -21,6 +22,17 @@ Jacobian = Callable[..., Mapping[str, Sequence[object]]]
 _COMPLEX_STEP = 1e-100
 # a user's derivative is off from differences by no more than this part
 _AGREES = 1e-3
+
+
+@runtime_checkable
+class KnowsNeighbours(Protocol):
+    """Matrices whose function takes many points near one at less than their sum."""
+
+    def near(
+        self, values: Mapping[str, object], several: Sequence[Mapping[str, object]]
+    ) -> StateSpace:
+        """Matrices at ``several`` points, (S, …), each near ``values``."""
+        ...
 
 
 def without(function: Matrices, names: Sequence[str]) -> Matrices:
@@ -88,7 +100,7 @@ class MatrixFunction:
             bare = isinstance(error, LookupError | TypeError | AttributeError)
             told = f"{type(error).__name__}: {error}" if bare else str(error)
             raise InputError(f"the model cannot be computed at {where}: {told}") from error
-        return _shaped(matrices, resolved)
+        return shaped(matrices, resolved)
 
     def at_many(self, columns: Mapping[str, FloatArray]) -> StateSpace:
         """Matrices (S, …) at many points, each column (S,)."""
@@ -96,7 +108,7 @@ class MatrixFunction:
         if self.vectorized:
             return StateSpace(*(np.asarray(M, dtype=float) for M in self._matrices(full)))
         rows = [dict(zip(full, row, strict=True)) for row in np.array(list(full.values())).T]
-        each = [_dense(self._matrices({k: float(v) for k, v in r.items()}), float) for r in rows]
+        each = [as_dense(self._matrices({k: float(v) for k, v in r.items()}), float) for r in rows]
         return StateSpace(*(np.stack(M) for M in zip(*each, strict=True)))
 
     def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
@@ -112,7 +124,7 @@ class MatrixFunction:
                 StateSpace(*(M[0] for M in at)), StateSpace(*(M[0] for M in derivative))
             )
         resolved = self.ties.resolve(values)
-        at = _shaped(self._matrices(resolved), resolved)
+        at = shaped(self._matrices(resolved), resolved)
         if self.jacobian is not None:
             self._check_jacobian(names)
             return Linearisation(at, self._by_jacobian(at, values, names))
@@ -204,17 +216,25 @@ class MatrixFunction:
         by_complex_step: bool,
     ) -> StateSpace:
         columns = []
+        if by_complex_step and names and isinstance(self.matrices, KnowsNeighbours):
+            near = [
+                {**self.ties.resolve({**values, n: values[n] + _COMPLEX_STEP * 1j}),
+                 **self.conditions}
+                for n in names
+            ]  # fmt: skip
+            moved = self.matrices.near({**self.ties.resolve(values), **self.conditions}, near)
+            return StateSpace(*(np.imag(M) / _COMPLEX_STEP for M in moved))
         for name in names:
             v = values[name]
             if by_complex_step:
                 stepped = self.ties.resolve({**values, name: v + _COMPLEX_STEP * 1j})
-                moved = _dense(self._matrices(stepped), complex)
-                columns.append([M.imag / _COMPLEX_STEP for M in moved])
+                stepped_to = as_dense(self._matrices(stepped), complex)
+                columns.append([M.imag / _COMPLEX_STEP for M in stepped_to])
             else:
                 # the step that balances rounding against the third derivative
                 step = np.finfo(float).eps ** (1 / 3) * max(abs(v), 1e-8)
                 up, down = (
-                    _dense(self._matrices(self.ties.resolve({**values, name: v + s})), float)
+                    as_dense(self._matrices(self.ties.resolve({**values, name: v + s})), float)
                     for s in (step, -step)
                 )
                 columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])
@@ -251,37 +271,3 @@ class MatrixFunction:
             )
             for a, b in zip(exact, rough, strict=True)
         )
-
-
-def _dense(matrices: Sequence[object], dtype: type) -> list[Array]:
-    A, B, C, D = matrices
-    # copies: a function may fill the same arrays at every call
-    A, B, C = (np.array(M, dtype=dtype) for M in (A, B, C))
-    if D is None or np.asarray(D).ndim == 0:
-        D = np.full((C.shape[0], B.shape[1]), 0 if D is None else D, dtype)
-    return [A, B, C, np.array(D, dtype=dtype)]
-
-
-def _shaped(matrices: Sequence[object], values: Mapping[str, float]) -> StateSpace:
-    """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
-    if not isinstance(matrices, (Sequence, np.ndarray)) or len(matrices) != 4:
-        found = f"{len(matrices)} items" if isinstance(matrices, Sized) else f"{matrices!r:.60}"
-        raise InputError(f"matrices returned {found}; expected A, B, C, D")
-    try:
-        shapes = [np.asarray(M, dtype=complex).shape for M in matrices if M is not None]
-    except (TypeError, ValueError):
-        raise InputError("matrices returned rows of unlike length, or no numbers") from None
-    shapes = [np.asarray(M).shape for M in matrices]
-    text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
-    expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"
-    if any(len(shape) != 2 for shape in shapes[:3]):
-        raise InputError(f"{text}; {expected}")
-    out = StateSpace(*_dense(matrices, float))
-    n, m, p = out.A.shape[0], out.B.shape[1], out.C.shape[0]
-    wanted = ((n, n), (n, m), (p, n), (p, m))
-    if any(M.shape != shape for M, shape in zip(out, wanted, strict=True)):
-        raise InputError(f"{text}; {expected}")
-    if not all(np.isfinite(M).all() for M in out):
-        at = ", ".join(f"{k}={v:g}" for k, v in values.items())
-        raise InputError(f"matrices are not finite at {at}; change the values or the function")
-    return out

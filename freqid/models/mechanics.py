@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import Array, InputError, an, choice, listed, named_values
+from freqid.lti import StateSpace
 from freqid.models.grey_box import GreyBox
 from freqid.models.parameter import Parameter
 
@@ -97,6 +98,12 @@ class _Named:
             asked = own.KEYWORD_ONLY, own.POSITIONAL_OR_KEYWORD
             self.names = tuple(p.name for p in taken if p.kind in asked and p.default is p.empty)
 
+    def near(self, values: Mapping[str, object], changed: set[str], before: Array) -> Array:
+        """The matrix where only some values have changed since it was ``before``."""
+        if not callable(self.given) or not (self.takes_all or changed.intersection(self.names)):
+            return before
+        return self(values)
+
     def __call__(self, values: Mapping[str, Any]) -> Array:
         if not callable(self.given):
             return np.atleast_2d(np.asarray(self.given, dtype=float))
@@ -135,7 +142,7 @@ class _Mechanical:
         self.parts, self.measured = (M, K, D, B, C), measured
         self._sound: Array | None = None
 
-    def __call__(self, **values: Any) -> tuple[Array, Array, Array, Array]:
+    def __call__(self, **values: Any) -> StateSpace:
         M, K, D, B, C = (None if part is None else part(values) for part in self.parts)
         assert M is not None
         assert K is not None
@@ -157,21 +164,48 @@ class _Mechanical:
             self._check_mass(M, values)
         if seen.shape[1] not in (n, 2 * n):
             raise InputError(f"C has shape {seen.shape}; expected (outputs, {n}) or (…, {2 * n})")
-        solved = np.linalg.solve(M, np.concatenate([K, damping, force], axis=1))
-        A = np.zeros((2 * n, 2 * n), solved.dtype)
-        A[:n, n:] = np.eye(n)
-        A[n:] = -solved[:, : 2 * n]
-        driven = np.zeros((2 * n, force.shape[1]), solved.dtype)
-        driven[n:] = solved[:, 2 * n :]
-        direct = np.zeros((len(seen), force.shape[1]), solved.dtype)
-        if seen.shape[1] == 2 * n:
-            return A, driven, seen, direct
+        return self._assembled(M, np.concatenate([K, damping, force], axis=1), seen)
+
+    def near(
+        self, values: Mapping[str, object], several: Sequence[Mapping[str, object]]
+    ) -> StateSpace:
+        """Matrices at ``several`` points near one, (S, …): most of what makes them stays."""
+        before = [None if part is None else part(values) for part in self.parts]
+        rows = []
+        for moved in several:
+            changed = {name for name, value in moved.items() if value != values[name]}
+            rows.append([
+                None if part is None or old is None else part.near(moved, changed, old)
+                for part, old in zip(self.parts, before, strict=True)
+            ])  # fmt: skip
+        M, K, D, B, C = (
+            None if column[0] is None else np.stack(column) for column in zip(*rows, strict=True)
+        )
+        assert M is not None
+        assert K is not None
+        eye = np.broadcast_to(np.eye(M.shape[-1]), M.shape)
+        right = [K, np.zeros_like(M) if D is None else D, eye if B is None else B]
+        return self._assembled(M, np.concatenate(right, axis=-1), eye if C is None else C)
+
+    def _assembled(self, M: Array, right: Array, seen: Array) -> StateSpace:
+        """State space of masses, [stiffness, damping, forces] and what is seen, (…, n, …)."""
+        n = M.shape[-1]
+        solved = np.linalg.solve(M, right)
+        lead, m, p = M.shape[:-2], right.shape[-1] - 2 * n, seen.shape[-2]
+        A = np.zeros((*lead, 2 * n, 2 * n), solved.dtype)
+        A[..., :n, n:] = np.eye(n)
+        A[..., n:, :] = -solved[..., : 2 * n]
+        driven = np.zeros((*lead, 2 * n, m), solved.dtype)
+        driven[..., n:, :] = solved[..., 2 * n :]
+        direct = np.zeros((*lead, p, m), solved.dtype)
+        if seen.shape[-1] == 2 * n:
+            return StateSpace(A, driven, seen, direct)
         if self.measured == "acceleration":
-            return A, driven, seen @ A[n:], seen @ driven[n:]
+            return StateSpace(A, driven, seen @ A[..., n:, :], seen @ driven[..., n:, :])
         place = slice(n, None) if self.measured == "velocity" else slice(n)
-        output = np.zeros((len(seen), 2 * n), seen.dtype)
-        output[:, place] = seen
-        return A, driven, output, direct
+        output = np.zeros((*lead, p, 2 * n), seen.dtype)
+        output[..., place] = seen
+        return StateSpace(A, driven, output, direct)
 
     def _check_mass(self, M: Array, values: Mapping[str, Any]) -> None:
         """ValueError for a mass matrix that no machine has."""

@@ -355,3 +355,31 @@ def test_two_experiments_tell_three_inputs_of_a_loop():
             error = frf.response - made[0][1](frf.frequency)
             errors[count].append(np.sqrt(np.mean(np.abs(error) ** 2)))
     assert np.mean(errors[2]) < 1.5 * np.mean(errors[3])
+
+
+@pytest.mark.parametrize("measured", ["position", "velocity", "acceleration"])
+def test_derivatives_of_mechanics_are_those_of_each_matrix_alone(measured):
+    """What one parameter leaves as it was is not computed again, whatever ties and conditions."""
+    model = fq.mechanical(
+        lambda J, c, q: [[J, c * np.cos(q)], [c * np.cos(q), 2 * J]],
+        lambda **values: values["k"] * np.array([[1.0, -1], [-1, 1]]),
+        lambda d: [[d, 0], [0, d]],
+        B=lambda g: [[g], [0.0]],
+        C=[[1.0, 0.5]],
+        measured=measured,
+        parameters=[
+            fq.Parameter(n, v)
+            for n, v in [("J", 1.0), ("c", 0.2), ("k", 9.0), ("d", 0.3), ("g", 2.0)]
+        ],
+        conditions={"q": 0.4},
+    ).tie(d="0.1*k - 0.6")
+    plain = fq.GreyBox(
+        lambda J, c, k, d, g, q: model.matrices(J=J, c=c, k=k, d=d, g=g, q=q),
+        model.parameters,
+        conditions=model.conditions,
+    ).tie(d="0.1*k - 0.6")
+    for one, other in zip(
+        model.linearisation().derivative, plain.linearisation().derivative, strict=True
+    ):
+        assert one.shape == other.shape
+        assert np.allclose(one, other, rtol=1e-13, atol=1e-15)
