@@ -3,9 +3,10 @@
     python benchmarks/oracle.py 10000            about an hour; resumed where it was interrupted
     python benchmarks/oracle.py 100 --out few.csv
 
-Orders 1 to 12, up to 3 inputs and outputs; stable, unstable, integrating, defective, light and
-stiff plants with time constants from 1e-6 to 1e3 s; zero- and first-order holds and band-limited
-inputs. Errors are relative to the largest entry of a matrix, or of a response at its line.
+Orders 1 to 12, up to 3 inputs and outputs; stable, unstable, integrating, defective, nearly
+defective, light and stiff plants with time constants from 1e-6 to 1e3 s; zero- and first-order
+holds and band-limited inputs. Errors are relative to the largest entry of a matrix, or of a
+response at its line.
 """
 
 import argparse
@@ -18,9 +19,17 @@ from search.store import resumed
 from table import show
 
 import freqid as fq
-from freqid.lti import Linearisation, StateSpace, basis_of, points, response_and_derivatives
+from freqid.lti import (
+    VISIBLE,
+    Linearisation,
+    StateSpace,
+    basis_of,
+    points,
+    response_and_derivatives,
+    rounding,
+)
 
-KINDS = ("stable", "unstable", "integrating", "defective", "light", "stiff")
+KINDS = ("stable", "unstable", "integrating", "defective", "close", "light", "stiff")
 HOLDS = ("zoh", "foh", "bl")
 WANTED = 1e-11
 # lines of a plant, and the step of a derivative, whose own error is its square
@@ -50,7 +59,11 @@ def random_plant(case):
         A[0] = 0
     elif kind == "defective":
         A = np.diag(np.full(n, -rng.uniform(0, 2))) + np.diag(np.ones(n - 1), 1)
-    if kind != "defective":
+    elif kind == "close":
+        # lags in a row whose rates agree to many digits
+        apart = 10 ** rng.uniform(-16, -1, n) * rng.standard_normal(n)
+        A = np.diag(-rng.uniform(0, 2) * (1 + apart)) + np.diag(np.ones(n - 1), 1)
+    if kind not in ("defective", "close"):
         # a change of states that is well conditioned
         T = np.linalg.qr(rng.standard_normal((n, n)))[0] * 10 ** rng.uniform(-0.5, 0.5, n)
         A = T @ A @ np.linalg.inv(T)
@@ -110,7 +123,8 @@ def one(case):
     size = float(np.abs(np.linalg.eigvals(A)).max()) or 1.0
     top = np.pi / dt if name != "bl" else 3 * size
     omega = top * 10 ** rng.uniform(-2, 0, _LINES)
-    row = {"kind": kind, "hold": name, "order": len(A), "matrices": np.nan}
+    told = rounding(StateSpace(*system), hold, omega)
+    row = {"kind": kind, "hold": name, "order": len(A), "matrices": np.nan, "told": told}
     with mpmath.workdps(50):
         matrices = [_matrix(M) for M in system]
         if name != "bl":
@@ -135,7 +149,7 @@ def one(case):
 
 def summary(table):
     """Rows for the printed table."""
-    rows = []
+    rows, lost = [], table[["matrices", "response", "derivative"]].max(axis=1) >= WANTED
     for what in ("matrices", "response", "derivative"):
         error = table[what].dropna()
         share, worst = 100 * (error < WANTED).mean(), table.loc[error.idxmax()]
@@ -143,6 +157,11 @@ def summary(table):
         rows.append(
             (f"{what}: below 1e-11 ({case})", f"{share:.2f} %, {error.max():.1g}", "99.9 %")
         )
+    warned = table["told"] >= VISIBLE
+    silent = int((lost & ~warned).sum())
+    rows.append(("above 1e-11 and not warned of", f"{silent} of {int(lost.sum())}", "0"))
+    idle = 100 * (warned & ~lost).sum() / len(table)
+    rows.append(("warned of, and below 1e-11", f"{idle:.2f} %", ""))
     return rows
 
 

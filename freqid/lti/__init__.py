@@ -4,6 +4,7 @@ It may import ``freqid.checks`` only.
 """
 
 from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many, eigenvalues_and_derivatives
+from freqid.lti.exponential import exponential
 from freqid.lti.holds import (
     BandLimited,
     FirstOrderHold,
@@ -29,6 +30,7 @@ from freqid.lti.responses import (
     transfer,
     transition,
 )
+from freqid.lti.rounding import VISIBLE, rounding, sentence, warn_of_rounding
 from freqid.lti.sampled import sum_runs
 from freqid.lti.state_space import Linearisation, StateSpace
 from freqid.lti.threads import in_one_blas_thread

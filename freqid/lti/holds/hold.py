@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import scipy
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
+from freqid.lti.exponential import exponential
 from freqid.lti.holds.pulse import Pulse
 
 
@@ -113,7 +113,7 @@ class PeriodicHold(Hold):
         """
         A, B = _checked(A, B)
         X = self.pulse.generator(A * self.period, B * self.period)
-        return self._blocks(scipy.linalg.expm(X), B.shape)
+        return self._blocks(exponential(X), B.shape)
 
     def sampled_derivatives(
         self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray
@@ -134,9 +134,9 @@ class PeriodicHold(Hold):
         big = np.zeros((len(dA), 2 * size, 2 * size), X.dtype)
         big[:, :size, :size] = big[:, size:, size:] = X
         big[:, :size, size:] = dX
-        exponential = scipy.linalg.expm(big)
-        value = self._blocks(exponential[0, :size, :size], B.shape)
-        return value, self._blocks(exponential[:, :size, size:], B.shape)
+        E = exponential(big)
+        value = self._blocks(E[0, :size, :size], B.shape)
+        return value, self._blocks(E[:, :size, size:], B.shape)
 
     def modal(self, eigenvalues: ComplexArray) -> ModalSampled:
         """φ, γ, γ⁺ and their divided differences at the eigenvalues of A, (…, n) in rad/s."""

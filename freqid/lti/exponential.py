@@ -1,0 +1,53 @@
+"""The exponential of a matrix, right where a triangular one has eigenvalues that nearly agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from freqid.checks import Array
+
+# neighbours on a diagonal that are nearer than this lose digits in a difference of exponentials
+_NEAR = 1.0
+
+
+def exponential(X: Array) -> Array:
+    """exp(X) of matrices (…, n, n).
+
+    scipy's own divides eˣ − eʸ by x − y for neighbours on the diagonal of a triangular matrix, of
+    which nothing is left where they nearly agree, as two equal lags do after a fit.
+    """
+    E = np.asarray(scipy.linalg.expm(X))
+    for at in np.ndindex(X.shape[:-2]):
+        low, high = scipy.linalg.bandwidth(X[at])
+        if low and high:
+            continue
+        apart = np.abs(np.diff(X[at].diagonal()))
+        if ((apart > 0) & (apart < _NEAR)).any():
+            E[at] = _upper(X[at]) if low == 0 else _upper(X[at].T).T
+    return E
+
+
+def _upper(X: Array) -> Array:
+    """exp(X) of an upper triangular matrix by scaling and squaring, its two diagonals exact.
+
+    Source: Al-Mohy and Higham, SIAM J. Matrix Analysis 31, 2009, code fragment 2.1.
+    """
+    size = float(np.linalg.norm(X, 1))
+    squarings = max(int(np.ceil(np.log2(size))), 0) if size > 0 else 0
+    E = np.asarray(scipy.linalg.expm(X / 2**squarings))
+    for i in range(squarings - 1, -1, -1):
+        E = E @ E
+        d, above = X.diagonal() / 2**i, X.diagonal(1) / 2**i
+        np.fill_diagonal(E, np.exp(d))
+        np.fill_diagonal(E[:, 1:], above * _mean_exponential(d[:-1], d[1:]))
+    return E
+
+
+def _mean_exponential(a: Array, b: Array) -> Array:
+    """(eᵇ − eᵃ)/(b − a)."""
+    half = (b - a) / 2
+    with np.errstate(all="ignore"):
+        near = np.exp((a + b) / 2) * np.where(half == 0, 1.0, np.sinh(half) / half)
+        far = (np.exp(b) - np.exp(a)) / (b - a)
+    return np.asarray(np.where(np.abs(half) < 1, near, far))

@@ -1,0 +1,85 @@
+"""How many digits of a plant's response and sampled matrices its own entries leave."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from freqid.checks import Array, FloatArray
+from freqid.lti.bases import basis_of
+from freqid.lti.holds import Hold, InputHolds, PeriodicHold
+from freqid.lti.responses import points, transfer
+from freqid.lti.state_space import StateSpace
+
+# last digits by which entries of A are moved, and how often
+_MOVED, _TIMES = 8 * float(np.finfo(float).eps), 3
+# relative rounding from which on a user should know
+VISIBLE = 1e-11
+# rates further apart than this, or closer as a part of the largest, cost digits
+_APART, _CLOSE = 100.0, 1e-3
+# lines at which a response is tried
+_LINES = 6
+
+
+def rounding(plant: StateSpace, hold: Hold, omega: FloatArray) -> float:
+    """Largest relative change of the response at omega (rad/s), and of what a hold samples, as
+    entries of A move by a few last digits: no algorithm can promise better.
+
+    States whose rates lie many decades apart leave little to the slow ones where they are mixed.
+    """
+    if not len(plant.A) or not len(omega) or not _delicate(plant.A):
+        return 0.0
+    # entries of one size are of one parameter: a spring pulls both masses alike
+    own = np.unique(np.abs(plant.A), return_inverse=True)[1].reshape(plant.A.shape)
+    rng, worst = np.random.default_rng(0), 0.0
+    before = _seen(plant, hold, omega)
+    for _ in range(_TIMES):
+        A = plant.A * (1 + _MOVED * rng.choice([-1.0, 1.0], own.max() + 1)[own])
+        after = _seen(StateSpace(A, *plant[1:]), hold, omega)
+        for old, new in zip(before, after, strict=True):
+            size = np.abs(old).max(axis=(-2, -1), initial=0)
+            gap = np.abs(new - old).max(axis=(-2, -1), initial=0)
+            worst = max(worst, float((gap[size > 0] / size[size > 0]).max(initial=0)))
+    return worst
+
+
+def warn_of_rounding(plant: StateSpace, hold: Hold, omega: FloatArray, stacklevel: int = 3) -> None:
+    """A RuntimeWarning where the response, or what a hold samples, has lost visible digits."""
+    at = np.unique(np.abs(omega[np.linspace(0, len(omega) - 1, _LINES).astype(int)]))
+    for own in InputHolds.each(hold, 1):
+        try:
+            lost = rounding(plant, own, at)
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return
+        if lost >= VISIBLE:
+            warnings.warn(sentence(plant, lost), RuntimeWarning, stacklevel=stacklevel)
+            return
+
+
+def sentence(plant: StateSpace, lost: float) -> str:
+    """What was lost, and what to do, in words."""
+    rates = np.abs(np.linalg.eigvals(plant.A))
+    return (
+        f"rounding: the model's matrices tell its response to {lost:.1g} only; their states mix "
+        f"motions of up to {rates.max():.3g} rad/s with slow or nearly equal ones: take states of "
+        "their own for these, or leave the fastest out"
+    )
+
+
+def _delicate(A: FloatArray) -> bool:
+    """Whether rates lie so far apart, or so close, that entries may not tell them well."""
+    poles = np.linalg.eigvals(A)
+    size = np.abs(poles)
+    largest = float(size.max())
+    if not np.isfinite(largest) or largest == 0 or len(A) == 1:
+        return False
+    gaps = np.abs(poles[:, None] - poles) + largest * np.eye(len(A))
+    return bool(size.min() * _APART < largest or gaps.min() < _CLOSE * largest)
+
+
+def _seen(plant: StateSpace, hold: Hold, omega: FloatArray) -> list[Array]:
+    """The response, lines first, and the sampled matrices."""
+    G = transfer(basis_of(plant).through(hold), points(omega, hold))
+    sampled = hold.sampled(plant.A, plant.B) if isinstance(hold, PeriodicHold) else ()
+    return [np.moveaxis(G, -1, 0), *(M[None] for M in sampled)]

@@ -1,0 +1,92 @@
+"""Matrix exponentials against fifty digits where eigenvalues nearly agree; what rounding costs."""
+
+import mpmath
+import numpy as np
+import pytest
+import scipy.linalg
+
+import freqid as fq
+from freqid.lti import StateSpace, exponential, rounding
+
+
+def error(ours, X):
+    with mpmath.workdps(50):
+        exact = np.array(mpmath.expm(mpmath.matrix(X.tolist())).tolist(), dtype=float)
+    return np.abs(ours - exact).max() / np.abs(exact).max()
+
+
+@pytest.mark.parametrize("apart", [0.0, 2e-16, 1e-13, 1e-10, 1e-7, 1e-4, 1e-2, 0.3, 2.0])
+@pytest.mark.parametrize("turned", [False, True])
+def test_lags_in_a_row_whose_rates_nearly_agree(apart, turned):
+    n = 5
+    X = np.diag(-3.0 * (1 + apart * np.arange(n))) + 4 * np.diag(np.ones(n - 1), 1)
+    X = X.T.copy() if turned else X
+    assert error(exponential(X), X) < 3e-15
+    stack = np.stack([X, 0.5 * X, -0.1 * X])
+    for ours, one in zip(exponential(stack), stack, strict=True):
+        assert error(ours, one) < 1e-13
+
+
+def test_what_scipy_makes_of_them_is_why():
+    """Should this fail one day, scipy's own serves again."""
+    X = np.diag([-30.0, -30.0 * (1 + 1e-13)]) + 40 * np.diag([1.0], 1)
+    assert error(scipy.linalg.expm(X), X) > 1e-5
+
+
+def test_fast_and_slow_lags_keep_their_digits():
+    X = np.array([[-1e6, 1e6, 0.0], [0, -1e6 * (1 + 1e-12), 1.0], [0, 0, -1e-3]])
+    assert error(exponential(X), X) < 1e-13
+
+
+@pytest.mark.parametrize("hold", [fq.ZeroOrderHold(0.5), fq.FirstOrderHold(0.5)])
+def test_two_equal_lags_are_simulated_and_fitted_as_they_are(hold):
+    def matrices(a, b):
+        return [[-a, 1.0], [0.0, -b]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]]
+
+    model = fq.GreyBox(matrices, [fq.Parameter("a", 5.0), fq.Parameter("b", 5.0)])
+    near = model.with_values(b=5.0 * (1 + 1e-12))
+    u = fq.white_noise(200, seed=1)
+    one, other = (fq.simulate(m, u, 0.5, hold=hold).y for m in (model, near))
+    assert np.abs(one - other).max() < 1e-10 * np.abs(one).max()
+    w = np.linspace(0.1, 6, 50)
+    G, H = (m.frequency_response(w, hold).response for m in (model, near))
+    assert np.abs(G - H).max() < 1e-10 * np.abs(G).max()
+
+
+def mixed(fast):
+    """A slow lag and a fast one whose states were turned into one another."""
+    T = np.array([[1.0, 0.4], [-0.6, 0.8]])
+    A = T @ np.diag([-1e-3, -fast]) @ np.linalg.inv(T)
+    return StateSpace(A, np.array([[1.0], [0.5]]), np.array([[1.0, 0.3]]), np.zeros((1, 1)))
+
+
+def test_rounding_is_told_where_states_mix_fast_and_slow():
+    hold, omega = fq.ZeroOrderHold(10.0), np.array([1e-3, 1e-2])
+    assert rounding(mixed(1.0), hold, omega) < 1e-11
+    assert rounding(mixed(1e7), hold, omega) > 1e-7
+    plain = fq.GreyBox(lambda g: mixed(1e7), [fq.Parameter("g", 1.0)])
+    with pytest.warns(RuntimeWarning, match="rounding: .* rad/s"):
+        plain.frequency_response(omega, hold)
+    with pytest.warns(RuntimeWarning, match="rounding"):
+        fq.simulate(plain, np.ones(10), 10.0)
+
+
+def test_springs_between_masses_are_no_rounding():
+    """A rigid body's rate of zero is a difference of large entries, which are of one spring."""
+    hold, omega = fq.ZeroOrderHold(1e-3), np.array([1e-3, 1.0, 1e3])
+    assert rounding(fq.two_mass().state_space(), hold, omega) < 1e-11
+    assert rounding(fq.drivetrain(5).state_space(), hold, omega) < 1e-11
+
+
+def test_a_fit_says_what_rounding_leaves():
+    def matrices(a):
+        return mixed(1e10 * a)
+
+    model = fq.GreyBox(matrices, [fq.Parameter("a", 1.0)])
+    u = fq.white_noise(300, seed=2)
+    y = fq.white_noise(300, seed=3)
+    est = fq.fit(model, fq.Record(u, y, 10.0), n_starts=1)
+    found = [w for w in est.warnings if w.kind == "rounding"]
+    assert found
+    assert found[0].severity == "minor"
+    assert found[0].number > 1e-6
