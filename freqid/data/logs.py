@@ -80,6 +80,11 @@ def record_from_logs(
         )
     kind = as_hold(hold, u_clock.period).name
     choice("hold", kind, ("zoh", "foh", "bl"))
+    if apart and kind == "foh":
+        raise InputError(
+            "offset='estimate' and hold='foh': a delay is exact behind a zero-order hold alone; "
+            "give the offset in seconds"
+        )
     notes = [] if told is None else [told]
     notes += [u_clock.sentence("u_time"), y_clock.sentence("y_time")]
     ratio = y_clock.period / u_clock.period

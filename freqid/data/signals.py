@@ -116,8 +116,9 @@ class Signals:
         ``fit`` takes as they are; ``resample=True`` puts them on a grid instead. ``notes`` tell of
         the clocks. A ``reference`` has a sample for each of y, or of u. ``offset`` (s) is by how
         much the output's stamps come late; ``"estimate"`` leaves it to a ``fit``, as the parameter
-        ``clock_offset``. Raises ValueError for stamps that go back, clocks that do not overlap, or
-        numbers of samples that disagree.
+        ``clock_offset`` beside the input's ticks; ``est.notes`` tell it from the stamps. Raises
+        ValueError for stamps that go back, clocks that do not overlap, or numbers of samples that
+        disagree.
 
         >>> import freqid as fq
         >>> t = np.arange(6) * 0.1

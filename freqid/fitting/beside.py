@@ -10,7 +10,8 @@ from functools import partial
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import rate_factor
+from freqid.data import Record, rate_factor
+from freqid.fitting.black_box.lag_scan import likely_lags
 from freqid.fitting.black_box.late import in_step, whole_samples
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.box_distance import BoxDistance
@@ -22,12 +23,15 @@ from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.log_stage import Smooth, log_targets, told
 from freqid.fitting.search.stopping import Bound
 from freqid.fitting.uncertainty.shared_noise import shared
+from freqid.lti import PeriodicHold
 from freqid.models import GreyBox
 
 # lines on which many starts walk together: where responses bend, and evenly
 ROUND_LINES, _EVEN_LINES = 60, 120
 # samples of an unknown delay that are tried
 _DELAYS = 20
+# the longest delay is such a part of a record, and so many samples
+_LONGEST, _LAGS = 8, 2000
 # lines that each of several black boxes takes at least
 _LEAST_LINES = 100
 
@@ -77,15 +81,7 @@ class Beside:
 
     def begun(self, structure: GreyStructure, start: FloatArray) -> FloatArray:
         """The start with its unknown delays within the samples in which the black box has them."""
-        moved = start.copy()
-        for source, q in zip(structure.model.delay_sources, self.shifts, strict=True):
-            if source in structure.physical_names:
-                i = structure.physical_names.index(source)
-                delay = start[i] * structure.scale[i] / self.period
-                if not q - 1.5 < delay < q + 0.5:
-                    inside = max(q - 0.5, 0.0) * self.period / structure.scale[i]
-                    moved[i] = np.clip(inside, structure.lower[i], structure.upper[i])
-        return moved
+        return _with_delays(structure, start, self.shifts, self.period)
 
 
 @dataclass(frozen=True)
@@ -171,10 +167,58 @@ def _candidates(
         for s, free in zip(model.delay_sources, unknown, strict=True) if free
     ]  # fmt: skip
     least = -longest if np.isfinite(early).all() and max(early) < 0 else 0
-    shared = [q for q in range(least, longest + 1) if (q,) * len(own) != own]
+    lags = {*range(least, longest + 1), *_far(readings[0], len(model.state_space().A), least < 0)}
+    shared = [q for q in sorted(lags) if (q,) * len(own) != own]
     return [own] + [
         tuple(q if free else kept for free, kept in zip(unknown, own, strict=True)) for q in shared
     ]
+
+
+def _far(reading: Reading, order: int, early: bool) -> list[int]:
+    """Lags of a whole record that are likely, up to a part of its length."""
+    record = reading.data
+    if not isinstance(record, Record) or not isinstance(reading.hold, PeriodicHold):
+        return []
+    most = min(record.n_samples // _LONGEST, _LAGS)
+    if most <= _DELAYS or reading.hold.period < record.dt * (1 - 1e-9):
+        return []
+    return likely_lags(record, order, -most if early else 0, most)
+
+
+def begun_slowly(
+    structure: GreyStructure, readings: Sequence[Reading], start: FloatArray
+) -> FloatArray:
+    """The start with an unknown delay near the likeliest, of an output slower than its input."""
+    record = readings[0].data
+    sources = set(structure.model.delay_sources)
+    if not isinstance(record, Record) or record.factor == 1 or len(sources) > 1:
+        return start
+    if not sources <= set(structure.physical_names):
+        return start
+    count, M = record.n_samples, record.factor
+    means = record.inputs[: count * M].reshape(count, M, -1).mean(axis=1)
+    most = min(count // _LONGEST, _LAGS)
+    i = structure.physical_names.index(str(*sources))
+    early = structure.lower[i] < 0 and np.isfinite(structure.lower[i])
+    order = len(structure.at(start).state_space().A)
+    lags = likely_lags(Record(means, record.y, record.dt), order, -most if early else 0, most)
+    shifts = lags[:1] * len(structure.model.delay_sources)
+    return _with_delays(structure, start, shifts, record.dt)
+
+
+def _with_delays(
+    structure: GreyStructure, start: FloatArray, shifts: Sequence[int], period: float
+) -> FloatArray:
+    """The start with unknown delays within these samples of a period (s)."""
+    moved = start.copy()
+    for source, q in zip(structure.model.delay_sources, shifts, strict=True):
+        if source in structure.physical_names:
+            i = structure.physical_names.index(str(source))
+            delay = start[i] * structure.scale[i] / period
+            if not q - 1.5 < delay < q + 0.5:
+                inside = (q - 0.5 if q else 0.0) * period / structure.scale[i]
+                moved[i] = np.clip(inside, structure.lower[i], structure.upper[i])
+    return moved
 
 
 def bound_of(beside: Beside | BesidePlaces, structure: GreyStructure, share: float) -> Bound | None:

@@ -14,7 +14,7 @@ from freqid.models import GreyBox, Parameter
 
 NAME = "clock_offset"
 # part of a record that its clocks may be apart
-_PART = 0.25
+_PART = 0.12
 
 
 def with_clock_offset(model: object, sets: Sequence[DataSet]) -> tuple[object, list[str]]:
@@ -46,10 +46,13 @@ def with_clock_offset(model: object, sets: Sequence[DataSet]) -> tuple[object, l
         )
     if NAME in model.values:
         raise InputError(f"parameter {NAME!r} is taken: offset='estimate' makes one of that name")
-    most = _PART * min(d.duration for d in apart)
+    return behind_offset(model, _PART * min(d.duration for d in apart)), []
+
+
+def behind_offset(model: GreyBox, most: float = np.inf) -> GreyBox:
+    """The model behind an offset of up to ``most`` (s)."""
     offset = Parameter(NAME, 0.0, "s", lower=-most, upper=most, physical=(-np.inf, np.inf))
-    late = dataclasses.replace(model, parameters=[*model.parameters, offset], input_delay=NAME)
-    return late, []
+    return dataclasses.replace(model, parameters=[*model.parameters, offset], input_delay=NAME)
 
 
 def clock_notes(est: Estimate, sets: Sequence[DataSet]) -> list[str]:

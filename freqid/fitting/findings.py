@@ -29,6 +29,8 @@ _CERTAIN = 2.0
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
 _NONE = 0.02
+# a response that rounding moves by so much is worth a word beside noise
+_ROUNDED = 1e-6
 # part of the input's power that may be folded without harm
 _FOLDED = 0.002
 
@@ -76,7 +78,8 @@ class Evidence:
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
     ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
     a black box whose motions grow, ``out_of_sight`` modes (Hz) above the Nyquist frequency;
-    ``aliased`` is the part of the input's power that decimation has folded.
+    ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
+    rounding of the matrices moves the response, with the sentence on it.
     """
 
     parameters: Sequence[Parameter]
@@ -91,6 +94,7 @@ class Evidence:
     growing: Sequence[complex] = ()
     out_of_sight: Sequence[float] = ()
     aliased: float = 0.0
+    rounding: tuple[float, str] = (0.0, "")
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -190,6 +194,14 @@ def aliased(e: Evidence) -> Iterator[Finding]:
             "decimate(factor, keep_input=True), or antialias=True",
             number=e.aliased,
         )
+
+
+@sign
+def rounded(e: Evidence) -> Iterator[Finding]:
+    """Matrices that tell the response badly."""
+    lost, sentence = e.rounding
+    if lost > _ROUNDED:
+        yield Finding("rounding", sentence.removeprefix("rounding: "), "minor", lost)
 
 
 def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 Grade = Literal["trust", "doubt", "do not use"]
 
+# starts after which one that is alone is a doubt
+_MANY = 10
 # what makes numbers useless where it is what explains most of what is wrong
 _USELESS = frozenset(
     {"not converged", "no signal", "feedback", "swapped", "wrong sign", "hold rejected"}
@@ -57,10 +59,21 @@ def verdict(est: Estimate) -> Verdict:
         return Verdict("do not use", reasons)
     if est.witness.verdict == "lacking":
         reasons.append(est.witness.sentence)
+    reasons += _lonely(est)
     reasons += _open(est, std)
     if reasons:
         return Verdict("doubt", reasons)
     return Verdict("trust", [_supported(est, std)])
+
+
+def _lonely(est: Estimate) -> list[str]:
+    """Many starts of which one alone ended here, where no black box can say that it is best."""
+    if est.witness.verdict != "absent" or est.n_starts < _MANY or est.n_agreed > 1:
+        return []
+    return [
+        f"not settled: of {est.n_starts} starts this one alone ended here, and no black box says "
+        f"that nothing better is left ({est.witness.sentence}); begin from better values, start="
+    ]
 
 
 def _open(est: Estimate, std: np.ndarray) -> list[str]:

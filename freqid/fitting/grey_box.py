@@ -25,7 +25,7 @@ from freqid.fitting.search.stopping import Found
 from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
-from freqid.lti import ZeroOrderHold
+from freqid.lti import Hold, InputHolds, StateSpace, ZeroOrderHold, rounding, sentence
 from freqid.models import GreyBox
 
 
@@ -157,6 +157,16 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
     return values
 
 
+def _rounding(plant: StateSpace, hold: Hold, reading: Reading) -> tuple[float, str]:
+    """How far rounding of the matrices moves what was fitted, and the sentence on it."""
+    omega = reading.at_lines().lines().lines.omega
+    if isinstance(hold, InputHolds) or not len(omega):
+        return 0.0, ""
+    low = omega[omega > 0].min(initial=np.inf)
+    lost = rounding(plant, hold, np.geomspace(low, omega.max(), 3) if low < np.inf else omega[:0])
+    return lost, sentence(plant, lost) if lost else ""
+
+
 def _estimate(
     structure: GreyStructure, minimum: Minimum, found: Found, readings: Sequence[Reading]
 ) -> Estimate:
@@ -181,6 +191,7 @@ def _estimate(
         len(values),
         out_of_sight=out_of_sight(structure.at(minimum.x).poles, hold),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
+        rounding=_rounding(structure.at(minimum.x).state_space(), hold, reading),
     )
     return Estimate(
         model=structure.at(minimum.x),

@@ -9,7 +9,7 @@ from functools import partial
 from typing import cast
 
 from freqid.checks import FloatArray, InputError
-from freqid.fitting.beside import Beside, beside_of, guide_of
+from freqid.fitting.beside import Beside, begun_slowly, beside_of, guide_of
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -132,6 +132,8 @@ def _searched(
     beside = beside_of(structure, readings, data.lines)
     if isinstance(beside, Beside) and structure.model.delay_sources:
         start = beside.begun(structure, start)
+    elif beside is None and structure.model.delay_sources:
+        start = begun_slowly(structure, readings, start)
     few = cast("Sequence[SpectralExperiment]", scout.experiments)
 
     def deepened(x: FloatArray) -> Guide | None:

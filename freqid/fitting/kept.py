@@ -12,6 +12,7 @@ import numpy as np
 
 from freqid.checks import InputError, path_of
 from freqid.data import DataSet, Record, whole_file
+from freqid.fitting.clock_offset import NAME, behind_offset
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.grades import Verdict
@@ -126,6 +127,9 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
     covariance = np.array(kept["covariance"], dtype=float).reshape(P, P)
     if values.shape != (P,):
         raise InputError(f"has {P} names and {len(values)} values")
+    if model is not None and NAME in names and NAME not in model.values:
+        # the fit itself has added it to the plant
+        model = behind_offset(model)
     est = Estimate(
         model=model_of_dict(kept["model"], model),
         names=names, values=values, nominal=np.array(kept["nominal"], dtype=float),

@@ -88,13 +88,13 @@ class Testimony:
 
     def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
         grey = self._grey(structure, readings)
-        order = observed_order(structure.model)
+        placed = isinstance(structure, PlacedStructure)
+        order = structure.order if placed else observed_order(structure.model)  # type: ignore[attr-defined]
         if grey.cost <= 1e-18 * self.minimum.objective.energy:
             sentence = "the estimate leaves nothing but the rounding of the data"
             return Witness("complete", sentence, 0.0, 0.0, 1.0)
         if not self.minimum.solution.converged:
             return Witness("absent", "the descent has not come to a minimum")
-        placed = isinstance(structure, PlacedStructure)
         if placed and structure.black_boxes > MOST_UNKNOWNS:  # type: ignore[attr-defined]
             return Witness(
                 "absent",

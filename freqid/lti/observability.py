@@ -12,17 +12,21 @@ from freqid.lti.state_space import StateSpace
 _ROUNDING = 1e-9
 # responses that differ by more than this are those of two plants
 _SAME = 1e-9
-_POINTS = 24
+# last digits of entries, and the slowest motion beside the fastest that is no rounding of zero
+_LAST, _SLOWEST = 1e-13, 1e-11
+_POINTS = 32
+# how far from an undamped pole
+_BESIDE = 1e-6
 
 
 def observed(plant: StateSpace, least: int = 0) -> tuple[FloatArray, FloatArray]:
     """W (r, n) and X (n, r), W X = I, that reduce a plant to the states that its outputs show.
 
-    W A X, W B and C X have the response of A, B and C; it is compared, and where it is another
+    W A X, W B and C X move as A, B and C do from every state; it is tried, and where they do not
     W and X are the identity. The rows of C and of what A makes of them span those states (Kailath,
     Linear Systems, 1980, section 2.4). At ``least`` so many states are kept.
     """
-    A, _, C, _ = plant
+    A, B, C, _ = plant
     n = len(A)
     whole = np.eye(n), np.eye(n)
     if least >= n or np.linalg.matrix_rank(C) == n:
@@ -41,7 +45,7 @@ def observed(plant: StateSpace, least: int = 0) -> tuple[FloatArray, FloatArray]
     if len(rows) == n:
         return whole
     W, X = rows @ np.linalg.inv(T), T @ rows.T
-    return (W, X) if _alike(plant, reduced(plant, W, X)) else whole
+    return (W, X) if _alike(balanced, np.linalg.inv(T) @ B, C @ T, rows) else whole
 
 
 def reduced(plant: StateSpace, W: FloatArray, X: FloatArray) -> StateSpace:
@@ -61,22 +65,38 @@ def _spanned(rows: FloatArray, known: FloatArray) -> FloatArray:
     return np.asarray(Vt[s > _ROUNDING])
 
 
-def _alike(one: StateSpace, other: StateSpace) -> bool:
-    """Whether two plants have one response where their poles lie and around."""
-    size = np.abs(np.linalg.eigvals(one.A))
-    largest = float(size.max())
-    moving = size[size > _ROUNDING * largest]
-    if not len(moving):
+def _alike(A: FloatArray, B: FloatArray, C: FloatArray, rows: FloatArray) -> bool:
+    """Whether a plant moves alike in the states ``rows`` alone, driven and from every state, but
+    for rounding.
+
+    The initial state of a record may show what no input drives. The two are compared to the right
+    of the imaginary axis, where undamped motions have no poles, and across it from each pole, where
+    what is lightly damped is loud.
+    """
+    poles = np.linalg.eigvals(A)
+    size = np.abs(poles)
+    largest = float(size.max()) or float(np.linalg.norm(A)) or 1.0
+    least = max(float(size[size > 0].min(initial=largest)), _SLOWEST * largest)
+    s = np.geomspace(least / 10, largest * 10, _POINTS) * np.exp(1j * np.pi / 3)
+    across = np.abs(poles.real) + _BESIDE * size + 1j * np.abs(poles.imag)
+    s = np.concatenate([s, across[size >= least]])
+    try:
+        every, some = _resolvents(A, s), _resolvents(rows @ A @ rows.T, s)
+    except np.linalg.LinAlgError:
         return False
-    s = 1j * np.geomspace(moving.min() / 10, largest * 10, _POINTS)
-    s = np.concatenate([s, 1j * moving])
-    first, second = _response(one, s), _response(other, s)
-    gap = np.abs(first - second)
-    return bool((gap <= _SAME * np.abs(first) + _SAME**2 * np.abs(first).max()).all())
+    G, H = C @ every, C @ rows.T @ some @ rows
+    # entries that move by their last digit move the response by so much
+    R = np.abs(every)
+    inner = R @ (np.abs(A) + np.abs(s)[:, None, None] * np.eye(len(A))) @ R
+    known = np.abs(C) @ inner
+    driven = _close(G @ B, H @ B, known @ np.abs(B))
+    return driven and _close(G, H, known + np.abs(G).max(axis=2, keepdims=True))
 
 
-def _response(plant: StateSpace, s: ComplexArray) -> ComplexArray:
-    A, B, C, D = plant
-    resolvent = s[:, None, None] * np.eye(len(A)) - A
-    response: ComplexArray = C @ np.linalg.solve(resolvent, B.astype(complex)) + D
-    return response
+def _close(one: ComplexArray, other: ComplexArray, known: FloatArray) -> bool:
+    return bool((np.abs(one - other) <= _SAME * np.abs(one) + _LAST * known).all())
+
+
+def _resolvents(A: FloatArray, s: ComplexArray) -> ComplexArray:
+    resolvent: ComplexArray = np.linalg.inv(s[:, None, None] * np.eye(len(A)) - A)
+    return resolvent

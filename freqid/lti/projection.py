@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 
 from freqid.checks import FloatArray
 from freqid.lti.sampled import BLOCK
@@ -68,8 +69,19 @@ def inner(A: FloatArray, B: FloatArray) -> FloatArray:
     return total
 
 
-# least pivot of the scaled Gram matrix below which half of the digits are gone
-_LEAST_PIVOT = 1e-4
+# reciprocal condition of a Gram matrix's factor below which half of the digits are gone: pivots do
+# not tell it, they may all be moderate where rows depend on one another
+_LEAST_CONDITION = 1e-5
+# so far from orthonormal after one pass, another does not mend it
+_SKEW = 0.1
+
+
+def _condition(L: FloatArray) -> float:
+    """Reciprocal condition of a lower triangle, as LAPACK estimates it."""
+    if not L.size:
+        return 1.0
+    rcond, info = scipy.linalg.lapack.dtrcon(L, norm="1", uplo="L")
+    return float(rcond) if info == 0 else 0.0
 
 
 def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None]]) -> FloatArray:
@@ -94,7 +106,7 @@ def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None
             L = np.linalg.cholesky(G / np.outer(size, size))
         except np.linalg.LinAlgError:
             L = np.zeros_like(G)
-        if L.diagonal().min(initial=1.0) > _LEAST_PIVOT:
+        if _condition(L) > _LEAST_CONDITION:
             R = np.zeros((P + 1, P + 1))
             R[:P, :P] = L.T * size
             R[:P, P] = np.linalg.solve(L, g / size)
@@ -124,16 +136,18 @@ def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         L = np.linalg.cholesky(gram)
     except np.linalg.LinAlgError:
         L = np.zeros_like(gram)
-    least = L.diagonal().min()
-    if least > _LEAST_PIVOT:
+    told = _condition(L)
+    if told > _LEAST_CONDITION:
         first = np.linalg.inv(L) / size
         Q = first @ T
-        if least < 0.03:
-            # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
-            second = np.linalg.inv(np.linalg.cholesky(inner(Q, Q)))
-            Q, first = second @ Q, second @ first
-        delta[used] = -first.T @ (Q @ r)
-        return Q, delta
+        again = inner(Q, Q) if told < 0.03 else np.eye(len(Q))
+        if np.abs(again - np.eye(len(Q))).max() < _SKEW:
+            if told < 0.03:
+                # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
+                second = np.linalg.inv(np.linalg.cholesky(again))
+                Q, first = second @ Q, second @ first
+            delta[used] = -first.T @ (Q @ r)
+            return Q, delta
     unit = T / size[:, None]
     # modes that the output hardly shows: keep the directions that it does
     U, s, Vt = np.linalg.svd(unit.T, full_matrices=False)

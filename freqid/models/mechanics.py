@@ -78,8 +78,6 @@ def mechanical(
 
 # so small a part of the largest mass is none
 _MASSLESS = 1e-15
-# matrices of a moment ago that are kept
-_KEPT = 7
 
 
 class _Named:
@@ -89,8 +87,6 @@ class _Named:
         self.letter, self.given = letter, given
         self.names: tuple[str, ...] = ()
         self.takes_all = False
-        # derivatives by one parameter leave most matrices as they were a moment ago
-        self._kept: tuple[tuple[tuple[object, ...], Array], ...] = ()
         if callable(given):
             taken = inspect.signature(given).parameters.values()
             own = inspect.Parameter
@@ -108,19 +104,9 @@ class _Named:
         if not callable(self.given):
             return np.atleast_2d(np.asarray(self.given, dtype=float))
         chosen = values if self.takes_all else {name: values[name] for name in self.names}
-        key = tuple(chosen.values())
-        plain = not self.takes_all and all(isinstance(v, (float, complex, int)) for v in key)
-        if plain:
-            for known, matrix in self._kept:
-                if known == key:
-                    return matrix
-        kind = complex if any(np.iscomplexobj(v) for v in key) else float
+        kind = complex if any(np.iscomplexobj(v) for v in chosen.values()) else float
         # a copy: the function may fill the same array at every call
-        made = np.atleast_2d(np.array(self.given(**chosen), dtype=kind))
-        if plain:
-            made.flags.writeable = False
-            self._kept = (*self._kept[-_KEPT:], (key, made))
-        return made
+        return np.atleast_2d(np.array(self.given(**chosen), dtype=kind))
 
 
 def _named(letter: str, given: MatrixLike | None) -> _Named | None:
@@ -140,7 +126,6 @@ class _Mechanical:
         measured: str,
     ) -> None:
         self.parts, self.measured = (M, K, D, B, C), measured
-        self._sound: Array | None = None
 
     def __call__(self, **values: Any) -> StateSpace:
         M, K, D, B, C = (None if part is None else part(values) for part in self.parts)
@@ -160,8 +145,7 @@ class _Mechanical:
                 f"measured={self.measured!r} beside C of shape {seen.shape}, which takes positions "
                 f"and velocities already; give C (outputs, {n}), or leave measured out"
             )
-        if M is not self._sound:
-            self._check_mass(M, values)
+        self._check_mass(M, values)
         if seen.shape[1] not in (n, 2 * n):
             raise InputError(f"C has shape {seen.shape}; expected (outputs, {n}) or (…, {2 * n})")
         return self._assembled(M, np.concatenate([K, damping, force], axis=1), seen)
@@ -222,8 +206,6 @@ class _Mechanical:
             sound = False
         if not sound:
             raise InputError(f"the mass matrix M is not positive definite at {_where(values)}")
-        # the same array comes again as long as what it is a function of stays
-        self._sound = M
 
 
 def _where(values: Mapping[str, complex]) -> str:

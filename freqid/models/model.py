@@ -26,6 +26,7 @@ from freqid.lti import (
     on_circle,
     points,
     transfer,
+    warn_of_rounding,
 )
 
 if TYPE_CHECKING:
@@ -121,7 +122,8 @@ class Model(ABC):
 
         That of a sampled model is taken at exp(jω·dt): it has its hold inside. Returns a
         FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega that is not
-        finite or a hold that is not one.
+        finite or a hold that is not one. Warns (RuntimeWarning) where rounding of the matrices is
+        visible in eleven digits.
 
         >>> import freqid as fq
         >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
@@ -138,6 +140,8 @@ class Model(ABC):
                 "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
             )
         G = self.responses_at(at, hold)
+        if not self.dt:
+            warn_of_rounding(self.state_space(), hold or BandLimited(), at)
         hold = self.own_hold or hold
         each = InputHolds.each(hold, 1) if hold is not None else ()
         periods = [h.period for h in each if isinstance(h, PeriodicHold)]

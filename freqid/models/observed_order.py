@@ -34,5 +34,7 @@ def _moved(model: GreyBox) -> GreyBox:
     values = {}
     for i, p in enumerate(model.free_parameters):
         step = _MOVED * np.sin(1.0 + i) * (abs(p.value) or 1.0)
-        values[p.name] = float(np.clip(p.value + step, p.lower, p.upper))
+        # away from a bound, at which something may vanish
+        moved = p.value + step if p.lower < p.value + step < p.upper else p.value - step
+        values[p.name] = float(np.clip(moved, p.lower, p.upper))
     return model.with_values(**values)

@@ -145,3 +145,56 @@ def test_a_delay_of_a_decimated_record_is_found(keep_input):
     assert est.model.delay == pytest.approx(3.4 * DT, abs=0.05 * DT)
     grey = fq.fit(lag(), record, start={"b": 60.0, "a": 15.0})
     assert grey["Td"] == pytest.approx(3.4 * DT, abs=0.05 * DT)
+
+
+def swinging(delay=0.1):
+    """A lightly damped motion of 12 rad/s that comes late."""
+    return fq.GreyBox(
+        lambda w, z, g: ([[0, 1], [-w * w, -2 * z * w]], [[0], [g * w * w]], [[1, 0]], [[0]]),
+        [fq.Parameter("w", 12.0), fq.Parameter("z", 0.05), fq.Parameter("g", 1.0),
+         fq.Parameter("Td", delay, "s", lower=-1.0, upper=1.0)],
+        input_delay="Td",
+    )  # fmt: skip
+
+
+def swung(seed, delay, samples=400, before=100):
+    """A record that begins when the input has been acting for long."""
+    u = fq.white_noise(samples + before, seed=seed)
+    y = fq.simulate(swinging(delay), u, 0.01).y[before:]
+    y = y + 0.01 * y.std() * np.random.default_rng(seed).standard_normal(samples)
+    return fq.Record(u[before:], y, 0.01)
+
+
+@pytest.mark.parametrize("delay", [0.034, 0.154, 0.296, 0.396])
+def test_error_bars_of_delays_of_many_samples(delay):
+    score, std = [], []
+    for seed in range(16):
+        record = swung(seed, delay)
+        est = fq.fit(swinging(delay), record, n_starts=1)
+        std.append(est.parameters["std"]["Td"])
+        score.append((est["Td"] - delay) / std[-1])
+    assert np.sqrt(np.mean(np.square(score))) == pytest.approx(1, abs=0.45)
+    assert max(std) < 10 * min(std)
+
+
+@pytest.mark.parametrize("delay", [0.296, 0.396, -0.296])
+def test_the_cost_is_smooth_in_a_long_delay(delay):
+    u = fq.white_noise(1200, seed=5)
+    y = fq.simulate(swinging(max(delay, 0.0)), u, 0.01).y
+    ahead = max(-round(delay / 0.01), 0)
+    y = np.roll(y, -ahead)[100 : 1100 - ahead]
+    u = u[100 : 1100 - ahead]
+    cost = [
+        fq.fit(swinging(delay + step).fix("Td", "w", "z"), fq.Record(u, y, 0.01), n_starts=1).cost
+        for step in np.linspace(-2e-3, 2e-3, 9)
+    ]
+    rough = np.abs(np.diff(cost, 4))
+    assert rough.max() < 0.05 * np.ptp(cost)
+
+
+@pytest.mark.parametrize("delay", [0.004, 0.213, 0.396])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_delay_of_many_samples_is_found_without_a_start(delay, seed):
+    est = fq.fit(swinging(0.0), swung(seed, delay))
+    assert est["Td"] == pytest.approx(delay, abs=5 * est.parameters["std"]["Td"])
+    assert est.verdict.grade == "trust"

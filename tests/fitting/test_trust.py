@@ -330,3 +330,13 @@ def test_error_bars_of_closed_loops():
     assert ((ratio > 0.65) & (ratio < 1.5)).all(), ratio
     off = (np.mean(values, axis=0) - list(true.values())) / np.std(values, axis=0)
     assert (np.abs(off) < 1).all()
+
+
+def test_a_minimum_that_one_start_alone_found_is_a_doubt():
+    record = fq.simulate(fq.two_mass(), fq.chirp(5, 60, 4, 1e-3), 1e-3).with_noise(0.01, seed=1)
+    est = fq.fit(fq.two_mass(), record, n_starts=1, initial_state="zero")
+    assert est.witness.verdict == "absent"
+    lonely = dataclasses.replace(est, n_starts=40, n_agreed=1)
+    assert lonely.verdict.grade == "doubt"
+    assert any("not settled" in r for r in lonely.verdict.reasons)
+    assert dataclasses.replace(est, n_starts=40, n_agreed=2).verdict.grade == "trust"

@@ -56,6 +56,10 @@ def two_axes(**start):
         (two_axes(), 6),
         (fq.two_mass(), 3),
         (fq.drivetrain(5), 9),
+        # free of friction, and of damping: a double pole at zero, which rounding splits
+        (axis(f=0.0), 3),
+        (axis(f=0.0, d=0.0), 3),
+        (fq.mechanical([[2.0]], [[0.0]], measured="velocity", parameters=[]), 1),
     ],
 )
 def test_states_that_no_output_shows_are_none_of_a_black_box(model, order):
@@ -131,3 +135,21 @@ def test_p_values_of_two_axes_in_a_loop_are_those_of_chance():
         est = fq.fit(two_axes(k=1000.0, d=1.2), periods(seed, two_axes(), 2, True), n_starts=1)
         p.append(est.witness.p_value)
     assert uniform(p) > 1e-3, np.sort(p).round(4)
+
+
+def test_states_that_only_an_initial_state_shows_are_kept():
+    model = fq.GreyBox(
+        lambda a: ([[-1.0, 1e-10], [0.0, -a]], [[1.0], [0.0]], [[1.0, 0.0]], [[0.0]]),
+        [fq.Parameter("a", 0.3)],
+    )
+    assert observed_order(model) == 2
+
+
+@pytest.mark.parametrize("number", range(1, 7))
+def test_a_coupling_at_its_bound_is_a_coupling(number):
+    idle = [fq.Parameter(f"p{i}", 1.0) for i in range(number)]
+    model = fq.GreyBox(
+        lambda c, **p: ([[-1.0, c], [0.0, -3.0]], [[1.0], [1.0]], [[1.0, 0.0]], [[0.0]]),
+        [*idle, fq.Parameter("c", 0.0, lower=0.0)],
+    )
+    assert observed_order(model) == 2

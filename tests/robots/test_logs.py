@@ -213,3 +213,39 @@ def test_stamps_that_may_be_milliseconds_are_doubted():
     x = fq.white_noise(300, seed=1)
     assert any("milliseconds" in n for n in fq.Record.from_logs(t, x, t, x).notes)
     assert not any("milliseconds" in n for n in fq.Record.from_logs(t / 1e3, x, t / 1e3, x).notes)
+
+
+@pytest.mark.parametrize("late", [0.4, -0.4])
+def test_clocks_that_are_a_tenth_of_the_record_apart(late, tmp_path):
+    model = fq.GreyBox(
+        lambda w, z, g: ([[0, 1], [-w * w, -2 * z * w]], [[0], [g * w * w]], [[1, 0]], [[0]]),
+        [fq.Parameter("w", 12.0), fq.Parameter("z", 0.05), fq.Parameter("g", 1.0)],
+    )
+    for seed in range(3):
+        u = fq.white_noise(400, seed=seed)
+        y = fq.simulate(model, u, 0.01).y
+        y = y + 0.01 * y.std() * np.random.default_rng(seed).standard_normal(400)
+        t = 0.01 * np.arange(400)
+        record = fq.Record.from_logs(t, u, t + late, y, offset="estimate")
+        est = fq.fit(model, record)
+        found, std = est["clock_offset"] + record.clocks_apart, est.parameters["std"]
+        assert found == pytest.approx(late, abs=5 * std["clock_offset"])
+        assert std["clock_offset"] < 1e-3
+    est.save(tmp_path / "axis.json")
+    assert fq.load(tmp_path / "axis.json", model=model)["clock_offset"] == est["clock_offset"]
+    with pytest.raises(ValueError, match="hold='foh'"):
+        fq.Record.from_logs(t, u, t, y, offset="estimate", hold="foh")
+
+
+@pytest.mark.parametrize(("rates", "late"), [((1000, 250), 0.0123), ((1000, 300), 0.0213)])
+def test_an_offset_of_a_slow_output_in_noise_is_found(plant, rates, late):
+    h, T = 1 / rates[0], 1 / rates[1]
+    u = fq.chirp(5, 60, 6, h)
+    u_time, y_time = h * np.arange(len(u)), 0.05 + T * np.arange(int(5.85 / T))
+    y = simulated(plant, u_time, u, y_time)
+    for seed in range(3):
+        noise = 0.02 * y.std() * np.random.default_rng(seed).standard_normal(len(y))
+        record = fq.Record.from_logs(u_time, u, y_time + late, y + noise, offset="estimate")
+        est = fq.fit(plant, record, start=start_of(plant))
+        far = est["clock_offset"] + record.clocks_apart - late
+        assert abs(far) < 5 * est.parameters["std"]["clock_offset"] < 1e-4

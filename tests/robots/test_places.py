@@ -383,3 +383,12 @@ def test_derivatives_of_mechanics_are_those_of_each_matrix_alone(measured):
     ):
         assert one.shape == other.shape
         assert np.allclose(one, other, rtol=1e-13, atol=1e-15)
+
+
+def test_what_a_matrix_takes_from_elsewhere_is_seen_when_it_changes():
+    load = {"k": 1.0}
+    model = fq.mechanical([[1.0]], lambda k: [[k * load["k"]]], parameters=[fq.Parameter("k", 3.0)])
+    assert model.state_space().A[1, 0] == -3
+    load["k"] = 2.0
+    assert model.state_space().A[1, 0] == -6
+    assert model.linearisation().derivative.A[0, 1, 0] == pytest.approx(-2)

@@ -1,44 +1,52 @@
 """What late inputs bring into a finite record from before its beginning.
 
 On N samples z^(−q) U is the DFT of the input shifted round in a circle: its last q samples come
-first. Those that really acted there, u(−q) … u(−1), are not in the record. Behind a free initial
-state the two differ by q columns, one for each sample, the plant's response to an impulse among the
-first q samples of the late input (theory, section 14); they are eliminated with the state.
+first. Those that really acted there, u(−q) … u(−1), are not in the record. So the first outputs,
+which alone they reach but by the state that they leave, are left open, and the state that is free
+is that at the first sample after them (theory, section 14). Unknown inputs in their place would say
+the same, through a deconvolution of which nothing is left after some samples.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from freqid.checks import ComplexArray, InputError
+from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.lines import Lines, Transient
+from freqid.lti import on_circle
 
 # values of all columns together beyond which a record is so long that its ends do not matter
 _LONG = 4e7
 
 
-def unknown_inputs(
-    z: ComplexArray, unit: ComplexArray, shifts: Sequence[int], rows: int
-) -> ComplexArray | None:
-    """Late inputs that were not recorded, (inputs, columns, lines); None where there are none.
+def open_ends(
+    lines: Lines, transient: Transient, shifts: Sequence[int], period: float, rows: int
+) -> tuple[FloatArray | None, Transient]:
+    """Rows (c, R) of outputs that unknown inputs reach, and the free motion from after them.
 
-    ``unit`` (lines,) is a sample of one as the lines weight it, ``shifts`` are whole samples of
-    delay for each input, negative where it is early. Raises InputError where these would be more
-    than an eighth of the data's ``rows``, and explain noise.
+    ``shifts`` are whole samples of ``period`` (s) of delay for each input, negative where it is
+    early. Raises InputError where these would be more than an eighth of the data's ``rows``.
     """
-    # early inputs lack the samples after the end: N − 1 … N − r, and z^N is one
-    powers = [range(q) if q > 0 else range(-1, q - 1, -1) for q in shifts]
-    count = sum(map(abs, shifts))
-    if count == 0 or count * len(z) > _LONG:
-        return None
+    # of early inputs those after the end are unknown
+    first, last = (
+        int(np.ceil(max(0, *(sign * q for q in shifts), 0) * period / transient.dt - 1e-9))
+        for sign in (1, -1)
+    )
+    p, K = len(lines.Y), len(lines.omega)
+    count = p * (first + last)
+    if count == 0 or count * K > _LONG:
+        return None, transient
     if 8 * count > rows:
         samples = max(map(abs, shifts))
         raise InputError(f"a delay of {samples} samples leaves too little of the data")
-    E = np.zeros((len(shifts), count, len(z)), complex)
-    at = 0
-    for i, some in enumerate(powers):
-        for power in some:
-            E[i, at] = unit * z ** -float(power)
-            at += 1
-    return E
+    z = on_circle(lines.omega * transient.dt)
+    powers = np.concatenate([np.arange(first), -1.0 - np.arange(last)])
+    samples = transient.weight * z ** -powers[:, None]
+    each = np.zeros((p, len(powers), p, 1, K), complex)
+    for output in range(p):
+        each[output, :, output, 0] = samples
+    after = transient.factor * np.repeat(z**-first, transient.aliases)
+    return lines.rows(each.reshape(count, p, 1, K)), dataclasses.replace(transient, factor=after)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import copy
-import dataclasses
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.fitting.cost.delays import unknown_inputs
+from freqid.fitting.cost.delays import open_ends
 from freqid.lti import BandLimited, PeriodicHold, Realisation, sum_runs, transition
 
 if TYPE_CHECKING:
@@ -27,15 +25,13 @@ class SpectralEvaluation:
         # a sampled model's matrices are what they are, whatever made them
         hold = BandLimited() if e.discrete else e.hold
         omega = e.lines.omega_input.ravel()
-        self.unknown: ComplexArray | None = None
+        self.motion, ends = e.transient, None
         if self.delay is not None:
             self.plant, late, shifts = realisation.delayed(hold, omega, e.points.z)
             self.z, self.moving, self.delay = e.points.z, None, realisation.delays
             self.U, self.U_state = self.U * late[:, None], self.U_state * late[:, None]
-            if e.transient is not None:
-                unit = np.repeat(e.transient.factor / e.transient.z, e.lines.aliases)
-                unit = unit / e.lines.aliases
-                self.unknown = unknown_inputs(self.z, unit, shifts, e.n_rows)
+            if e.transient is not None and isinstance(hold, PeriodicHold):
+                ends, self.motion = open_ends(e.lines, e.transient, shifts, hold.period, e.n_rows)
         else:
             self.plant, self.z, self.moving = realisation.seen_through(
                 hold, e.lift, omega, e.points.z
@@ -47,41 +43,34 @@ class SpectralEvaluation:
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
         # a plant without states has no free motion
-        if e.transient is not None and basis.to_basis.size:
-            self.shared = e.transient.shared and realisation.period is None
+        t = self.motion
+        if t is not None and basis.to_basis.size:
+            self.shared = t.shared and realisation.period is None
             same = self.shared or e.discrete
-            self.free = self.plant if same else transition(basis, e.transient.dt)
+            self.free = self.plant if same else transition(basis, t.dt)
             self.free_inverse = self.inverse if self.shared else None
-            self._w = self.free.output_rows(e.transient.z, self.free_inverse)
+            self._w = self.free.output_rows(t.z, self.free_inverse)
             # (outputs, states, K) to one column for each physical state
-            seen = sum_runs(self._w * e.transient.factor, e.transient.aliases)
+            seen = sum_runs(self._w * t.factor, t.aliases)
             columns = np.moveaxis(basis.to_basis.T @ seen, 0, 1)
             self.transient = e.lines.rows(columns[:, :, None, :])
-            if self.unknown is not None:
-                self._x_unknown = self._states(self.unknown)
-                y = self.plant.output(self._x_unknown, self.unknown)
-                late_rows = e.lines.rows(sum_runs(y, e.lines.aliases).swapaxes(0, 1)[:, :, None])
-                self.transient = np.concatenate([self.transient, late_rows])
-        if e.added is not None:
+        # what the plant does not move
+        still = [rows for rows in (ends, e.added) if rows is not None]
+        if still:
             free = [] if self.transient is None else [self.transient]
-            self.transient = np.concatenate([*free, e.added])
+            self.transient = np.concatenate([*free, *still])
 
     def _states(self, U: ComplexArray) -> ComplexArray:
         return self.plant.solve(self.z, self.plant.drive(self.z, U), self.inverse)
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         """Derivative of the residual by each parameter, (P, rows)."""
-        rows, t = self.experiment.lines.rows, self.experiment.transient
-        if initial is not None and self.experiment.added is not None:
-            initial = initial[: len(initial) - len(self.experiment.added)]
+        rows, t = self.experiment.lines.rows, self.motion
         if initial is None or self._w is None or t is None:
             return rows(self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x))
-        if self.unknown is not None:
-            known = len(initial) - self.unknown.shape[1]
-            other = self._with_past(initial[known:])
-            other.experiment = dataclasses.replace(self.experiment, added=None)
-            return other.jacobian(initial[:known])
-        delta = (self.basis.to_basis @ initial)[:, None, None]
+        # of all that is free the state alone is moved by the plant
+        states = self.basis.to_basis.shape[-1]
+        delta = (self.basis.to_basis @ initial[:states])[:, None, None]
         x_free = self.free.solve(t.z, delta * t.factor, self.free_inverse)
         if self.shared:
             return rows(self._forced_change(self._w, self.x + x_free))
@@ -102,15 +91,6 @@ class SpectralEvaluation:
                 change = self.plant.output(self._states(turned), turned)
                 dy[t.parameter] += sum_runs(change, aliases)
         return dy
-
-    def _with_past(self, samples: FloatArray) -> SpectralEvaluation:
-        """The same with the samples that were not recorded in its input."""
-        assert self.unknown is not None
-        other = copy.copy(self)
-        more = np.einsum("mck,c->mk", self.unknown, samples)[:, None]
-        other.unknown, other.U, other.U_state = None, self.U + more, self.U_state + more
-        other.x = self.x + np.einsum("nck,c->nk", self._x_unknown, samples)[:, None]
-        return other
 
 
 class SumOfEvaluations:

@@ -166,6 +166,11 @@ class Transient:
             factor = factor * np.repeat(lines.scale[0, 0], aliases)
         return cls(dt, z, factor, aliases, shared)
 
+    @property
+    def weight(self) -> ComplexArray:
+        """What multiplies a sample of one at each line, (K,)."""
+        return (self.factor / self.z)[:: self.aliases] * self.aliases
+
     def some(self, lines: IntArray, factor: FloatArray) -> Transient:
         """At some of the lines."""
         at = runs(lines, self.aliases)

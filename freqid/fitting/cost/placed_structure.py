@@ -23,6 +23,8 @@ from freqid.models import GreyBox, Parameter, observed_order
 
 # unknowns of all black boxes together that are worth their time: some seconds
 MOST_UNKNOWNS = 300
+# places at which the order is looked for
+_TRIED = 5
 
 
 class PlacedStructure(GreyStructure):
@@ -73,8 +75,14 @@ class PlacedStructure(GreyStructure):
     @property
     def black_boxes(self) -> int:
         """Unknowns of a black box of the plant's order beside each group of experiments."""
-        order = observed_order(self.model)
-        return len(self.groups) * order * (self.model.n_inputs + self.model.n_outputs)
+        each = self.order * (self.model.n_inputs + self.model.n_outputs)
+        return len(self.groups) * each
+
+    @property
+    def order(self) -> int:
+        """States that the outputs show, at the first of the places."""
+        seen = (self.at(self.start, g[0]) for g in self.groups[:_TRIED])
+        return max(observed_order(model) for model in seen)
 
     @property
     def groups(self) -> list[list[int]]:

@@ -18,7 +18,7 @@ import scipy
 from freqid.checks import FloatArray, InputError
 from freqid.data import StampedRecord
 from freqid.fitting.cost.experiments import Evaluation
-from freqid.lti import Hold, InputHolds, Linearisation, Realisation
+from freqid.lti import Hold, InputHolds, Linearisation, Realisation, exponential
 
 # points of the interpolation, and ‖A‖Δ that it is good for
 _POINTS, _REACH = 28, 6.0
@@ -107,7 +107,7 @@ class _StampedEvaluation:
         X[:n, :n], X[:n, n : n + m] = A, B
         X[n : n + m, n + m :] = np.eye(m)
         self.points, self.generator = points, X
-        at = scipy.linalg.expm(X * points[:, None, None])[:, :n]
+        at = exponential(X * points[:, None, None])[:, :n]
         every = np.tensordot(self.weights, at, 1)
         self.E, self.F1, self.F2 = every[..., :n], every[..., n : n + m], every[..., n + m :]
 
@@ -132,7 +132,7 @@ class _StampedEvaluation:
             big = np.zeros((2 * size, 2 * size))
             big[:size, :size] = big[size:, size:] = self.generator
             big[:n, size : size + n], big[:n, size + n : size + n + m] = self.d.A[p], self.d.B[p]
-            moved = scipy.linalg.expm(big * self.points[:, None, None])[:, :n, size:]
+            moved = exponential(big * self.points[:, None, None])[:, :n, size:]
             every = np.tensordot(self.weights, moved, 1)
             forced = self._forced(every[..., n : n + m], every[..., n + m :])
             driven[..., p] = np.einsum("kij,kj->ki", every[..., :n], before) + forced
