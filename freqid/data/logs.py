@@ -52,7 +52,8 @@ def record_from_logs(
     u_seconds, y_seconds, told = common_seconds(u_time, y_time)
     apart = isinstance(offset, str)
     if apart:
-        choice("offset", offset, ("estimate",))
+        if offset != "estimate":
+            raise InputError(f"offset={offset!r}: expected a number of seconds, or 'estimate'")
     else:
         y_seconds = y_seconds - finite("offset", offset)
     clocks = Clock.of("u_time", u_seconds), Clock.of("y_time", y_seconds)

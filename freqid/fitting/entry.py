@@ -141,8 +141,8 @@ def fit(
         raise InputError("a delay needs domain='frequency' and no initial state at rest")
     if late and estimated:
         raise InputError(
-            "hold='estimate' and input_delay: a longer hold is a later input, so that one of them "
-            "must be known; name the hold"
+            "hold='estimate' and input_delay, or an unknown offset of the clocks: a longer hold is "
+            "a later input, so that one of them must be known; name the hold"
         )
     check_stamped(model, sets, hold, {
         "band": band, "weights": weights, "initial_state": initial_state, "offset": offset,

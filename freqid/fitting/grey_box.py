@@ -170,7 +170,7 @@ def _rounding(plant: StateSpace, hold: Hold, reading: Reading) -> tuple[float, s
 def _estimate(
     structure: GreyStructure, minimum: Minimum, found: Found, readings: Sequence[Reading]
 ) -> Estimate:
-    reading = readings[0]
+    reading, model = readings[0], structure.at(minimum.x)
     values, count = minimum.x * structure.scale, structure.count
     spread = Spread(structure.scale, minimum)
     std = np.sqrt(np.diag(spread.covariance))
@@ -189,12 +189,12 @@ def _estimate(
         output_dt(reading.data),
         minimum.objective.n_rows,
         len(values),
-        out_of_sight=out_of_sight(structure.at(minimum.x).poles, hold),
+        out_of_sight=out_of_sight(model.poles, hold),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
-        rounding=_rounding(structure.at(minimum.x).state_space(), hold, reading),
+        rounding=_rounding(model.state_space(), hold, reading),
     )
     return Estimate(
-        model=structure.at(minimum.x),
+        model=model,
         names=structure.names,
         values=values,
         nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),

@@ -10,12 +10,15 @@ from freqid.checks import FloatArray
 from freqid.data import PeriodicResponse
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.uncertainty.evenness import may_be_tied, tied, together
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.lti import directions
 
 # directions of unknowns below this part of the largest are none
 _LOOSE = 1e-7
+# a line of which a black box leaves less says nothing
+_TAKEN = 0.2
 
 
 def noise_freedom(data: Sequence[object]) -> float:
@@ -30,11 +33,14 @@ def shared(boxes: Sequence[tuple[Objective, FloatArray]]) -> float:
     the minima of black boxes, each an objective and its unknowns; at least 1.
 
     Lines of local models share their windows, entries of a response those of their neighbours that
-    were measured with them.
+    were measured with them; means whose covariance few periods told badly weigh too much or little.
     """
     parts: list[tuple[FloatArray, SpectralExperiment]] = []
     joined = alone = 0.0
     for objective, x in boxes:
+        if any(isinstance(e, PeriodicExperiment) for e in objective.experiments):
+            more = _of_means(objective, x)
+            joined, alone = joined + more[0], alone + more[1]
         experiments = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
         entries = any(may_be_tied(e) for e in experiments)
         if not (entries or any(e.reach for e in experiments)):
@@ -63,3 +69,29 @@ def shared(boxes: Sequence[tuple[Objective, FloatArray]]) -> float:
             joined += tied(rows, own, e) * count / freedom if may_be_tied(e) else plain
     wider = together(parts) if parts else 1.0
     return wider * max(joined / alone if alone > 0 else 1.0, 1.0)
+
+
+def _of_means(objective: Objective, x: FloatArray) -> tuple[float, float]:
+    """Σ variances along all directions of a black box beside means: as its lines show them, and as
+    if all were alike.
+
+    What is left of a line is made as large as it was before the box took its part (HC2: MacKinnon
+    and White, J. Econometrics 29, 1985).
+    """
+    realisation = objective.structure.realise(x)
+    means = [e for e in objective.experiments if isinstance(e, PeriodicExperiment)]
+    at = [e.at(realisation) for e in means]
+    ways = directions(np.concatenate([a.jacobian(None) for a in at], axis=1), _LOOSE)[2]
+    left = [a.residual for a in at]
+    ends = np.cumsum([len(rows) for rows in left])[:-1]
+    joined = size = total = 0.0
+    for e, rows, own in zip(means, left, np.split(ways, ends, axis=1), strict=True):
+        p = len(e.data.response)
+        each = np.ascontiguousarray(own).view(complex).reshape(len(own), -1, p)
+        along = (each.conj() * rows.view(complex).reshape(-1, p)).sum(axis=2)
+        taken = (np.abs(each) ** 2).sum(axis=(0, 2)) / p / 2
+        kept = np.maximum(1 - taken, _TAKEN)
+        joined += float(((np.abs(along) ** 2).sum(axis=0) / kept).sum()) / 2
+        size, total = size + float(rows @ rows), total + len(rows)
+    freedom = max(total - len(ways), 1.0)
+    return joined, size / freedom * len(ways)
