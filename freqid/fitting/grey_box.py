@@ -171,6 +171,7 @@ def _estimate(
     structure: GreyStructure, minimum: Minimum, found: Found, readings: Sequence[Reading]
 ) -> Estimate:
     reading, model = readings[0], structure.at(minimum.x)
+    plant = model.state_space()
     values, count = minimum.x * structure.scale, structure.count
     spread = Spread(structure.scale, minimum)
     std = np.sqrt(np.diag(spread.covariance))
@@ -189,9 +190,9 @@ def _estimate(
         output_dt(reading.data),
         minimum.objective.n_rows,
         len(values),
-        out_of_sight=out_of_sight(model.poles, hold),
+        out_of_sight=out_of_sight(np.linalg.eigvals(plant.A).astype(complex), hold),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
-        rounding=_rounding(model.state_space(), hold, reading),
+        rounding=_rounding(plant, hold, reading),
     )
     return Estimate(
         model=model,
