@@ -16,6 +16,8 @@ from freqid.lti.state_space import StateSpace
 _MOVED, _TIMES = 8 * float(np.finfo(float).eps), 3
 # relative rounding from which on a user should know
 VISIBLE = 1e-11
+# and from which on it is said unasked
+_SAID = 1e-9
 # rates further apart than this, or closer as a part of the largest, cost digits
 _APART, _CLOSE = 100.0, 1e-3
 # lines at which a response is tried
@@ -45,14 +47,14 @@ def rounding(plant: StateSpace, hold: Hold, omega: FloatArray) -> float:
 
 
 def warn_of_rounding(plant: StateSpace, hold: Hold, omega: FloatArray, stacklevel: int = 3) -> None:
-    """A RuntimeWarning where the response, or what a hold samples, has lost visible digits."""
+    """A RuntimeWarning where the response, or what a hold samples, is told to less than nine digits."""
     at = np.unique(np.abs(omega[np.linspace(0, len(omega) - 1, _LINES).astype(int)]))
     for own in InputHolds.each(hold, 1):
         try:
             lost = rounding(plant, own, at)
         except (ArithmeticError, np.linalg.LinAlgError):
             return
-        if lost >= VISIBLE:
+        if lost >= _SAID:
             warnings.warn(sentence(plant, lost), RuntimeWarning, stacklevel=stacklevel)
             return
 

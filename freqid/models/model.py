@@ -123,7 +123,7 @@ class Model(ABC):
         That of a sampled model is taken at exp(jω·dt): it has its hold inside. Returns a
         FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega that is not
         finite or a hold that is not one. Warns (RuntimeWarning) where rounding of the matrices is
-        visible in eleven digits.
+        visible in nine digits.
 
         >>> import freqid as fq
         >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)

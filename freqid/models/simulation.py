@@ -146,7 +146,7 @@ def simulate(
         initial_state: state of the plant at the first sample, (n,); None starts from rest.
 
     Returns a Record with that hold. Raises ValueError for wrong shapes or a hold whose period is
-    not ``dt``. Warns (RuntimeWarning) where rounding of the matrices is visible in eleven digits.
+    not ``dt``. Warns (RuntimeWarning) where rounding of the matrices is visible in nine digits.
 
     >>> import freqid as fq
     >>> fq.simulate(fq.first_order(), fq.sine(8, 1, 1e-3), dt=1e-3)
@@ -173,7 +173,7 @@ def simulate(
     if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
         raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
     if not plant.dt:
-        warn_of_rounding(system, between, np.pi / dt * np.geomspace(1e-3, 1, 3))
+        warn_of_rounding(system, between, np.pi / dt * np.geomspace(0.1, 1, 3))
     y = np.zeros((len(u), len(system.C)))
     groups = between.groups if isinstance(between, InputHolds) else [(between, list(range(m)))]
     for number, (each, members) in enumerate(groups):
