@@ -48,6 +48,8 @@ def rounding(plant: StateSpace, hold: Hold, omega: FloatArray) -> float:
 
 def warn_of_rounding(plant: StateSpace, hold: Hold, omega: FloatArray, stacklevel: int = 3) -> None:
     """A RuntimeWarning where the response, or what is sampled, is told to less than nine digits."""
+    if not len(omega):
+        return
     at = np.unique(np.abs(omega[np.linspace(0, len(omega) - 1, _LINES).astype(int)]))
     for own in InputHolds.each(hold, 1):
         try:
