@@ -38,9 +38,13 @@ def rounding(plant: StateSpace, hold: Hold, omega: FloatArray) -> float:
     before = _seen(plant, hold, omega)
     for _ in range(_TIMES):
         A = plant.A * (1 + _MOVED * rng.choice([-1.0, 1.0], own.max() + 1)[own])
-        after = _seen(StateSpace(A, *plant[1:]), hold, omega)
-        for old, new in zip(before, after, strict=True):
-            size = np.abs(old).max(axis=(-2, -1), initial=0)
+        # a last digit may make a long step grow beyond all numbers: nothing is told then
+        with np.errstate(over="ignore", invalid="ignore"):
+            after = _seen(StateSpace(A, *plant[1:]), hold, omega)
+        if not all(np.isfinite(seen).all() for seen, _ in after):
+            return np.inf
+        for (old, floor), (new, _) in zip(before, after, strict=True):
+            size = np.abs(old).max(axis=(-2, -1), initial=floor)
             gap = np.abs(new - old).max(axis=(-2, -1), initial=0)
             worst = max(worst, float((gap[size > 0] / size[size > 0]).max(initial=0)))
     return worst
@@ -82,8 +86,14 @@ def _delicate(A: FloatArray) -> bool:
     return bool(size.min() * _APART < largest or gaps.min() < _CLOSE * largest)
 
 
-def _seen(plant: StateSpace, hold: Hold, omega: FloatArray) -> list[Array]:
-    """The response, lines first, and the sampled matrices."""
-    G = transfer(basis_of(plant).through(hold), points(omega, hold))
-    sampled = hold.sampled(plant.A, plant.B) if isinstance(hold, PeriodicHold) else ()
-    return [np.moveaxis(G, -1, 0), *(M[None] for M in sampled)]
+def _seen(plant: StateSpace, hold: Hold, omega: FloatArray) -> list[tuple[Array, float]]:
+    """The response, lines first, and the sampled matrices, with the least size that counts: what
+    is left of a state after a long step is told against the state, exp(A·0) = I.
+    """
+    found = [
+        (np.moveaxis(transfer(basis_of(plant).through(hold), points(omega, hold)), -1, 0), 0.0)
+    ]
+    if isinstance(hold, PeriodicHold):
+        phi, *gammas = hold.sampled(plant.A, plant.B)
+        found += [(phi[None], 1.0), *((gamma[None], 0.0) for gamma in gammas)]
+    return found

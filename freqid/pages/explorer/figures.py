@@ -9,7 +9,7 @@ import numpy as np
 from freqid.checks import FloatArray
 from freqid.fitting import Z95
 from freqid.models import simulate
-from freqid.pages.explorer.state import Scene, label_of
+from freqid.pages.explorer.state import Scene, label_of, rounding_said
 from freqid.plots import COLOURS, Part, Shown, bode_axes, bode_curve, bode_traces, line, trace
 
 
@@ -78,7 +78,9 @@ def time_figure(shown: Scene) -> Part:
 def simulate_slow(shown: Scene) -> FloatArray:
     """What the true plant would have answered, had the input been held for the slow period."""
     u = shown.slow.inputs[:: shown.slow.factor, 0]
-    return simulate(shown.state.model(), u, shown.slow.dt).y[: shown.slow.n_samples]
+    with rounding_said():
+        answer = simulate(shown.state.model(), u, shown.slow.dt)
+    return answer.y[: shown.slow.n_samples]
 
 
 def bias_figure(shown: Scene) -> Part:

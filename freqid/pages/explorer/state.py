@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -169,17 +171,19 @@ class Scene:
         """True plant at both rates and the estimate, up to the slow Nyquist limit."""
         plant, dt, held = self.state.model(), self.slow.dt, self.fast.input_dt
         omega = 2 * np.pi * _frequencies(plant, self.state, 0.5 / dt)
-        found = {
-            f"{self.truth}, ZOH at {1e3 * period:g} ms": plant.frequency_response(
-                omega, ZeroOrderHold(period)
-            )
-            for period in ((held, dt) if self.state.factor > 1 else (held,))
-        }
-        if self.estimate is not None:
-            model = self.estimate.model
-            # a sampled model has its hold inside
-            between = self.hold if isinstance(model, GreyBox) else None
-            found["estimate"] = model.frequency_response(omega, between)
+        held_for = (held, dt) if self.state.factor > 1 else (held,)
+        estimate = self.estimate.model if self.estimate is not None else None
+        with rounding_said():
+            found = {
+                f"{self.truth}, ZOH at {1e3 * period:g} ms": plant.frequency_response(
+                    omega, ZeroOrderHold(period)
+                )
+                for period in held_for
+            }
+            if estimate is not None:
+                # a sampled model has its hold inside
+                between = self.hold if isinstance(estimate, GreyBox) else None
+                found["estimate"] = estimate.frequency_response(omega, between)
         return found
 
 
@@ -218,6 +222,11 @@ def scene(state: State, record: Record | None = None) -> Scene:
     except InputError as error:
         return replace(found, message=str(error))
     return replace(found, estimate=est, message="; ".join(est.signs))
+
+
+def rounding_said() -> AbstractContextManager[None]:
+    """Within it rounding is not warned of: the estimate's findings, on the page, tell it."""
+    return warnings.catch_warnings(action="ignore", category=RuntimeWarning)
 
 
 def _frequencies(model: GreyBox, state: State, nyquist: float) -> FloatArray:
