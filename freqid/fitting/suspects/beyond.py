@@ -135,12 +135,18 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         return []
     if isinstance(inquiry.minimum.structure, PlacedStructure):
         return []
-    if any(r.own_cost for r in inquiry.readings) or inquiry.minimum.prior is not None:
+    if inquiry.minimum.prior is not None:
         return []
-    readings = [r.at_lines() for r in inquiry.readings]
+    # means over periods are asked in their own cost, everything else at its lines
+    means = all(r.both_ends for r in inquiry.readings)
+    readings = [r.beside() if means else r.at_lines() for r in inquiry.readings]
+    asked = readings if means else inquiry.readings
+    if any(r.own_cost != means for r in asked):
+        return []
     order = observed_order(inquiry.model) + 2
     try:
         box = Reference.of(inquiry.model, readings, order=order)
+        box = box.on(readings) if means else box
     except (InputError, np.linalg.LinAlgError):
         return []
     objective = box.objective
@@ -150,13 +156,15 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     degrees = box.unknowns - len(scene.absorbed) + started
     if freedom < 10 or degrees < 1:
         return []
-    if box.cost >= scene.cost:
+    grey = inquiry.minimum.solution
+    if box.cost >= grey.cost:
         return []
     structure = inquiry.minimum.structure
     assert isinstance(structure, GreyStructure)
-    more = excess(structure, readings, [box], inquiry.minimum.solution, True)
+    more = excess(structure, readings, [box], grey, True)
     wider = shared([(box.objective, box.solution.x)])
-    f, freedom = more * freedom / degrees / wider, int(freedom / wider)
+    f = more * freedom / degrees / wider
+    freedom = int(min(freedom / wider, scene.noise_freedom))
     gain = scene.cost * more / (1 + more)
     # where the noise is coloured its shape is as uncertain as the place of the mode
     places = sum(s.experiment.n_lines for s in scene.seen) ** (1 if scene.even else 2)
