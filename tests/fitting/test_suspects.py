@@ -228,3 +228,11 @@ def test_a_mode_that_means_over_three_periods_show_is_named(share):
         assert all(kinds and kinds[0] == "another mode" for kinds in told), told
     else:
         assert sum("another mode" in kinds for kinds in told) == 0, told
+
+
+def test_an_offset_is_not_asked_where_the_band_leaves_it_out():
+    """A constant has no line but that at zero; its transform's rounding came out as 1e13."""
+    inside = fq.fit(LAG, healthy(3), band=(0.5, 40), initial_state="steady").suspects
+    assert "offset" not in inside.index and "drift" in inside.index
+    whole = fq.fit(LAG, healthy(3), initial_state="steady").suspects
+    assert abs(whole.loc["offset", "size"]) < 0.1

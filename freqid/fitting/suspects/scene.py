@@ -34,6 +34,8 @@ from freqid.models import Model
 
 # singular values of the Jacobian below this part of the largest are directions left open
 _LOOSE = 1e-7
+# and parts of a signal that are but the rounding of its transform
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,10 @@ class Seen:
         assert record is not None
         N = len(record.u) // record.factor
         at = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
-        weighted = np.fft.rfft(signals[..., :N], axis=-1)[..., at] * lines.scale[:, 0]
+        spectrum = np.fft.rfft(signals[..., :N], axis=-1)[..., at]
+        # a constant has no line but that at zero: what rounding leaves at others is nothing
+        most = np.abs(signals[..., :N]).sum(axis=-1, keepdims=True)
+        weighted = np.where(np.abs(spectrum) < _ROUNDING * most, 0, spectrum) * lines.scale[:, 0]
         return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-2], -1)).view(float)
 
     def without_free(self, columns: FloatArray) -> FloatArray:
