@@ -11,13 +11,27 @@ from freqid.lti import StateSpace
 
 
 def as_dense(matrices: Sequence[object], dtype: type) -> list[Array]:
-    """A, B, C, D as arrays of their own; D may be nothing, or a number."""
-    A, B, C, D = matrices
-    # copies: a function may fill the same arrays at every call
-    A, B, C = (np.array(M, dtype=dtype) for M in (A, B, C))
-    if D is None or np.asarray(D).ndim == 0:
-        D = np.full((C.shape[0], B.shape[1]), 0 if D is None else D, dtype)
-    return [A, B, C, np.array(D, dtype=dtype)]
+    """A, B, C, D as arrays of their own; D may be nothing, or a number.
+
+    Raises ValueError for complex numbers where real ones are wanted.
+    """
+    A, B, C, D = (_numbers(name, M, dtype) for name, M in zip("ABCD", matrices, strict=True))
+    if D.ndim == 0:
+        D = np.full((C.shape[0], B.shape[1]), D, dtype)
+    return [A, B, C, D]
+
+
+def _numbers(name: str, M: object, dtype: type) -> Array:
+    """A copy, for a function may fill the same arrays at every call."""
+    found = np.array(0 if name == "D" and M is None else M)
+    if dtype is float and np.iscomplexobj(found):
+        if found.imag.any():
+            raise InputError(
+                f"matrices returned complex numbers in {name}; expected real ones: write a pair "
+                "of poles p, p* as [[p.real, p.imag], [-p.imag, p.real]]"
+            )
+        found = found.real
+    return found.astype(dtype)
 
 
 def shaped(matrices: Sequence[object], values: Mapping[str, float]) -> StateSpace:

@@ -8,7 +8,10 @@ from freqid.fitting.suspects.scores import Score
 _CURES = {
     "delay": "give the model an input_delay, a number or a free parameter",
     "hold rejected": "use hold='estimate', or the hold that the converter had",
-    "feedthrough": "give the model a direct term D",
+    "feedthrough": (
+        "give the model a direct term D, or the record its reference where a controller that "
+        "answers within the sample drives the input"
+    ),
     "offset": "fit with offset='estimate', or take the offset off the record",
     "drift": "use record.detrend(order=1), and look for what drifts",
     "spikes": "look at the record there; fit with loss='huber', or mend the sample",
