@@ -15,24 +15,17 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import DataSet, Record
-from freqid.fitting.black_box.reference import lines_in_plane
-from freqid.fitting.black_box.refinement import nested_model
-from freqid.fitting.cost.charts import Chart
-from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.loop_noise import Loop, loop_scores
+from freqid.fitting.loop_box import LoopBox
+from freqid.fitting.loop_noise import Loop, LoopShare, loop_scores
 from freqid.fitting.noise_models import NoiseModel, as_noise_model
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
-from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.uncertainty.minimum import Spread
+from freqid.fitting.witness import Testimony
 from freqid.lti import ZeroOrderHold
-from freqid.models import DiscreteModel, GreyBox, observed_order
+from freqid.models import GreyBox, observed_order
 
-# states of controller and delays that a loop may have beyond the plant's own
-_BEYOND = (0, 1, 2, 4)
-# lines on which the orders are compared, evaluations of each, and the gain that ends one
-_LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
 # part of the input's power of which the reference leaves too little to do harm
 _WHOLE = 0.995
 
@@ -88,14 +81,21 @@ def through_references(
     return seen, noise, notes, found
 
 
-def with_loop_noise(est: Estimate, readings: Sequence[Reading], loops: Sequence[Loop]) -> Estimate:
-    """The estimate whose standard errors know that the explained input has errors, too."""
-    score = loop_scores(est, readings, loops)
+def with_loop_noise(
+    est: Estimate, readings: Sequence[Reading], loops: Sequence[Loop]
+) -> tuple[Estimate, LoopShare]:
+    """The estimate whose standard errors, witness and suspects know that the explained input has
+    errors, too.
+    """
+    score, share = loop_scores(est, readings, loops)
+    testimony = est.testimony
+    if isinstance(testimony, Testimony):
+        est = dataclasses.replace(est, testimony=dataclasses.replace(testimony, share=share))
     if score is None:
-        return est
+        return est, share
     minimum = dataclasses.replace(est.minimum, score=score)
     spread = Spread(est.spread.change, minimum)
-    return dataclasses.replace(est, problem=minimum, uncertainty=spread)
+    return dataclasses.replace(est, problem=minimum, uncertainty=spread), share
 
 
 def _explained(
@@ -114,27 +114,10 @@ def _explained(
     size = both.std(axis=0)
     size[size == 0] = 1
     loops = [_loop(r, size) for r in records]
-    readings = [Reading.of(loop) for loop in loops]
-    best: tuple[float, int, Chart, Solution] | None = None
-    for n in (max(order, 1) + more for more in _BEYOND):
-        try:
-            chart, found, rows = _black_box(readings, n, _LINES)
-        except (InputError, np.linalg.LinAlgError):
-            continue
-        unknowns = len(found.x) + n * len(records)
-        length = rows * np.log(max(found.cost, 1e-300)) + unknowns * np.log(rows)
-        if best is None or length < best[0]:
-            best = float(length), n, chart, found
-    if best is None:
-        raise InputError(
-            "reference: no black box from it to input and output could be fitted; use "
-            "reference=False to fit the record directly"
-        )
-    _, n, chart, found = best
-    names = loops[0].input_names, loops[0].output_names
-    model = DiscreteModel(chart.in_z(found.x), first.dt, ZeroOrderHold(first.dt), *names)
+    box = LoopBox.of(loops, order)
+    model = box.model
     m, seen, left, power = first.n_inputs, [], 0.0, 0.0
-    for record, loop, reading in zip(records, loops, readings, strict=True):
+    for record, loop, reading in zip(records, loops, box.readings, strict=True):
         # errors are model less data
         error = errors_of(model, reading).in_time()[:, :m]
         explained = (loop.outputs[:, :m] + error) * size[:m]
@@ -152,11 +135,11 @@ def _explained(
         )
         return list(records), note, None
     note = (
-        f"fitted through the reference: a black box of order {n} explains "
+        f"fitted through the reference: a black box of order {box.order} explains "
         f"{100 * share:.3g} % of the input's power by it; "
         "reference=False fits the input as it is"
     )
-    return seen, note, Loop(chart, found.x, readings, size, ())
+    return seen, note, Loop(box.chart, box.found.x, box.readings, size, ())
 
 
 def _loop(record: Record, size: np.ndarray) -> Record:
@@ -168,17 +151,6 @@ def _loop(record: Record, size: np.ndarray) -> Record:
         hold=ZeroOrderHold(record.dt), input_names=names,
         output_names=[*record.input_names, *record.output_names],
     )  # fmt: skip
-
-
-def _black_box(readings: Sequence[Reading], order: int, count: int) -> tuple[Chart, Solution, int]:
-    """A stable black box of the loop, and the real values that it was fitted to."""
-    lines, plane = lines_in_plane(readings, count)
-    start = nested_model(lines, order, True, True)
-    chart = Chart(start, True, plane, readings[0].sample_time, stable=True)
-    objective = Objective(chart, lines)
-    x = np.zeros(chart.size)
-    found = polish(objective, x, limit=_LIMIT, tolerance=_TOLERANCE)
-    return chart, found, objective.n_rows
 
 
 def _plant_order(model: object) -> int:

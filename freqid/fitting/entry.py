@@ -172,8 +172,9 @@ def fit(
     _LOG.info("%s: cost %.6g, starts: %d; %s", what, est.cost, est.n_starts, said)
     if offset is not None:
         notes += offsets(est, readings)
+    share = None
     if loops:
-        est = with_loop_noise(est, readings, loops)
+        est, share = with_loop_noise(est, readings, loops)
     given = {
         "hold": asked_hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
@@ -181,7 +182,7 @@ def fit(
         "error": error,
     }  # fmt: skip
     call = _call(model, len(sets), given)
-    inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings)
+    inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings, share)
     return dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes, *est.notes],

@@ -14,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy
@@ -32,7 +33,7 @@ from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.fitting.uncertainty.shared_noise import noise_freedom, shared
+from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom, shared
 from freqid.lti import in_one_blas_thread
 from freqid.models import DiscreteModel, Model, observed_order
 
@@ -46,6 +47,21 @@ _OPEN, _WANTED = 0.5, 4
 _ALIKE = 1e-6
 
 
+class Share(InputNoise, Protocol):
+    """How much more of what black boxes explain is chance than noise of the output makes."""
+
+    def __call__(
+        self,
+        structure: GreyStructure,
+        grey: Solution,
+        boxes: Sequence[Reference],
+        groups: Sequence[Sequence[int]],
+        readings: Sequence[Reading],
+    ) -> float | None:
+        """A multiple; None where it is not known."""  # fmt: skip
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Testimony:
     """What a witness is heard on: it is called when it is asked for."""
@@ -53,6 +69,7 @@ class Testimony:
     minimum: Minimum
     readings: Sequence[Reading]
     n_agreed: int
+    share: Share | None = None
 
     def after(self, search: Testimony) -> Testimony:
         """The same where the minimum was found by an earlier search."""
@@ -110,7 +127,12 @@ class Testimony:
             return Witness("absent", "the data are too few for a black box beside it", cost)
         if top < 1:
             return self._alike(order, cost, grey.cost / cost - 1)
-        wider = shared([(b.objective, b.solution.x) for b in boxes])
+        wider = None
+        if self.share is not None and structure is self.minimum.structure:
+            wider = self.share(structure, grey, boxes, _groups(structure, readings), readings)
+        if wider is None:
+            wider = shared([(b.objective, b.solution.x) for b in boxes])
+        wider = max(wider, 1.0)
         f = excess(structure, readings, boxes, grey) * bottom / top / wider
         told = int(min(bottom / wider, noise_freedom([r.data for r in readings])))
         p = float(scipy.stats.f.sf(f, top, max(told, 1)))

@@ -22,7 +22,7 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, score
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.shared_noise import shared
-from freqid.fitting.witness import excess
+from freqid.fitting.witness import Share, excess
 from freqid.lti import directions
 from freqid.models import GreyBox, Model, OutputError, observed_order
 
@@ -48,6 +48,11 @@ class Asking(Protocol):
     @property
     def readings(self) -> Sequence[Reading]:
         """The data."""
+        ...
+
+    @property
+    def share(self) -> Share | None:
+        """What errors of inputs that a reference explained add."""
         ...
 
 
@@ -163,6 +168,9 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     assert isinstance(structure, GreyStructure)
     more = excess(structure, readings, [box], grey, True)
     wider = shared([(box.objective, box.solution.x)])
+    if inquiry.share is not None:
+        every = [range(len(readings))]
+        wider = max(inquiry.share(structure, grey, [box], every, readings) or wider, 1.0)
     f = more * freedom / degrees / wider
     freedom = int(min(freedom / wider, scene.noise_freedom))
     gain = scene.cost * more / (1 + more)

@@ -24,6 +24,7 @@ from freqid.fitting.suspects.scores import Asked, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.witness import Share
 from freqid.lti import in_one_blas_thread
 from freqid.models import GreyBox, Model
 
@@ -59,6 +60,8 @@ class Inquiry:
     minimum: Minimum
     model: Model
     readings: Sequence[Reading]
+    # what the inputs' own errors add, where a reference explained them
+    share: Share | None = None
 
     @cached_property
     def scene(self) -> Scene | None:
@@ -66,7 +69,7 @@ class Inquiry:
         if self.minimum.exact or not self.minimum.solution.converged:
             return None
         try:
-            return Scene.of(self.minimum, self.readings)
+            return Scene.of(self.minimum, self.readings, self.share)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return None
 

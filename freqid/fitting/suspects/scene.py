@@ -28,7 +28,7 @@ from freqid.fitting.uncertainty.evenness import (
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import local_power
-from freqid.fitting.uncertainty.shared_noise import noise_freedom
+from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom
 from freqid.lti import Plane, directions, sum_runs
 from freqid.models import Model
 
@@ -116,7 +116,9 @@ class Scene:
     held: BoolArray
 
     @classmethod
-    def of(cls, minimum: Minimum, readings: Sequence[Reading]) -> Scene:
+    def of(
+        cls, minimum: Minimum, readings: Sequence[Reading], share: InputNoise | None = None
+    ) -> Scene:
         """At the minimum on lines; InputError where there are none."""
         if any(isinstance(r.data, StampedRecord) for r in readings):
             raise InputError("samples at times of their own have no lines")
@@ -144,8 +146,9 @@ class Scene:
         known = np.zeros((0, len(x) + 1))
         near = 1e-6 * np.maximum(np.abs(x), 1e-300)
         held = (x - structure.lower <= near) | (structure.upper - x <= near)
-        return cls(structure, x, seen, sum(e.energy for e in experiments), known, held)
+        return cls(structure, x, seen, sum(e.energy for e in experiments), known, held, share)
 
+    share: InputNoise | None = None
     # rows of columns that are free beside the parameters
     more: FloatArray | None = None
 
@@ -242,21 +245,23 @@ class Scene:
         return together(list(parts))
 
     def tied(self, rows: FloatArray, ways: Sequence[FloatArray]) -> float:
-        """How much entries of responses that share their lines' noise widen what ``ways`` (q, rows
-        of an experiment) tell where rows (R,) are what is left; at least 1.
+        """How much entries of responses that share their lines' noise, or errors of the inputs,
+        widen what ``ways`` (q, rows of an experiment) tell where rows (R,) are left; at least 1.
         """
-        if not any(may_be_tied(s.experiment) for s in self.seen):
+        experiments = [s.experiment for s in self.seen]
+        if self.share is None and not any(may_be_tied(e) for e in experiments):
             return 1.0
-        variance, shared, plain = self.variance_of(rows), 0.0, 0.0
-        share = len(rows) / max(self.freedom, 1)
-        for s, left, known, V in zip(
-            self.seen, self.parted(rows), self.parted(variance), ways, strict=True
-        ):
-            alone = float(np.sum(V**2 * known))
-            plain += alone
-            is_tied = may_be_tied(s.experiment)
-            shared += tied(left, V, s.experiment) * share if is_tied else alone
-        return max(shared / max(plain, 1e-300), 1.0)
+        known, left = self.parted(self.variance_of(rows)), self.parted(rows)
+        alone = [float(np.sum(V**2 * v)) for V, v in zip(ways, known, strict=True)]
+        if self.share is None:
+            share = len(rows) / max(self.freedom, 1)
+            shared = sum(
+                tied(r, V, e) * share if may_be_tied(e) else plain
+                for r, V, e, plain in zip(left, ways, experiments, alone, strict=True)
+            )
+        else:
+            shared = self.share.along(experiments, ways, left) or 0.0
+        return max(shared / max(sum(alone), 1e-300), 1.0)
 
     def variance_of(self, rows: FloatArray) -> FloatArray:
         """Variance of each row's noise (R,) where these are what it leaves."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
@@ -19,6 +20,21 @@ from freqid.lti import directions
 _LOOSE = 1e-7
 # a line of which a black box leaves less says nothing
 _TAKEN = 0.2
+
+
+class InputNoise(Protocol):
+    """What errors of inputs that a reference explained add to those of the outputs."""
+
+    def along(
+        self,
+        experiments: Sequence[SpectralExperiment],
+        ways: Sequence[FloatArray],
+        left: Sequence[FloatArray],
+    ) -> float | None:
+        """Σ variances along ``ways`` (q, rows of an experiment) where these are ``left`` (rows,);
+        None where it is not known.
+        """
+        ...
 
 
 def noise_freedom(data: Sequence[object]) -> float:

@@ -1,0 +1,118 @@
+"""A black box of a loop, from its reference to input and output together.
+
+The order is that of the shortest description (Rissanen, Automatica 14, 1978) of both ends under the
+noise that they have: a plant colours what disturbs it, and modes would follow the peaks of noise
+that counted as white.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data import Record
+from freqid.fitting.black_box.reference import lines_in_plane
+from freqid.fitting.black_box.refinement import nested_model
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.experiments import thinned_to
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.noise_models import MeasuredNoise
+from freqid.fitting.reading import Reading
+from freqid.fitting.residuals import errors_of
+from freqid.fitting.search.descent import Solution, polish
+from freqid.fitting.uncertainty.evenness import evenly_spread
+from freqid.lti import Plane, ZeroOrderHold
+from freqid.models import DiscreteModel
+
+# states of controller and delays that a loop may have beyond the plant's own
+_BEYOND = (0, 1, 2, 4)
+# lines on which the orders are compared, evaluations of each, and the gain that ends one
+_LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class LoopBox:
+    """A black box where its cost is least, and the records that it was fitted to."""
+
+    chart: Chart
+    found: Solution
+    readings: Sequence[Reading]
+    rows: int
+
+    @classmethod
+    def of(cls, records: Sequence[Record], order: int) -> LoopBox:
+        """Of records from the reference to both ends, beside a plant of ``order``.
+
+        Raises InputError where no black box can be fitted.
+        """
+        readings = [Reading.of(r) for r in records]
+        orders = [max(order, 1) + more for more in _BEYOND]
+        tried = [box for n in orders if (box := _begun(readings, n)) is not None]
+        first = _shortest(tried)
+        model = first.model
+        errors = [errors_of(model, r) for r in readings]
+        if all(evenly_spread(e.error) for e in errors):
+            return first
+        weighted = [
+            r.with_(noise=MeasuredNoise().learnt(e.error, e.n_samples))
+            for r, e in zip(readings, errors, strict=True)
+        ]
+        again = [_begun(weighted, n) for n in orders]
+        again += [_descended(box.chart.moved(box.found.x), weighted) for box in tried]
+        return _shortest([box for box in again if box is not None])
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return len(self.chart.centre.A)
+
+    @property
+    def model(self) -> DiscreteModel:
+        """The black box as a model of the records."""
+        record = self.readings[0].data
+        assert isinstance(record, Record)
+        return DiscreteModel(
+            self.chart.in_z(self.found.x), record.dt, ZeroOrderHold(record.dt),
+            record.input_names, record.output_names,
+        )  # fmt: skip
+
+    @property
+    def length(self) -> float:
+        """How long a description of the records by it is."""
+        unknowns = len(self.found.x) + self.order * len(self.readings)
+        return float(
+            self.rows * np.log(max(self.found.cost, 1e-300)) + unknowns * np.log(self.rows)
+        )
+
+
+def _shortest(boxes: Sequence[LoopBox]) -> LoopBox:
+    if not boxes:
+        raise InputError(
+            "reference: no black box from it to input and output could be fitted; use "
+            "reference=False to fit the record directly"
+        )
+    return min(boxes, key=lambda box: box.length)
+
+
+def _begun(readings: Sequence[Reading], order: int) -> LoopBox | None:
+    """A stable one of an order, begun from the data; None where there is no start."""
+    try:
+        lines, plane = lines_in_plane(readings, _LINES)
+        start = nested_model(lines, order, True, True)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    return _descended(Chart(start, True, plane, readings[0].sample_time, stable=True), readings)
+
+
+def _descended(chart: Chart, readings: Sequence[Reading]) -> LoopBox | None:
+    """The minimum next to the centre of a chart."""
+    try:
+        lines = thinned_to([r.at_lines().lines(Plane()) for r in readings], _LINES)
+        objective = Objective(chart, [e.in_plane(chart.plane) for e in lines])
+        found = polish(objective, np.zeros(chart.size), limit=_LIMIT, tolerance=_TOLERANCE)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    return LoopBox(chart, found, readings, objective.n_rows)
