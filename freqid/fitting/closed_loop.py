@@ -28,6 +28,8 @@ from freqid.models import GreyBox, observed_order
 
 # part of the input's power of which the reference leaves too little to do harm
 _WHOLE = 0.995
+# said where that part did harm
+FED_BACK = "the input as it is shows the feedback in what its fit leaves, so that it was not used"
 
 
 def through_references(
@@ -96,6 +98,16 @@ def with_loop_noise(
     minimum = dataclasses.replace(est.minimum, score=score)
     spread = Spread(est.spread.change, minimum)
     return dataclasses.replace(est, problem=minimum, uncertainty=spread), share
+
+
+def fed_back(est: Estimate, loops: Sequence[Loop]) -> bool:
+    """Whether what an input that was fitted as it is leaves shows the feedback all the same."""
+    through = {place for loop in loops for place in loop.places}
+    direct = [
+        i not in through and isinstance(d, Record) and d.reference is not None and d.factor == 1
+        for i, d in enumerate(est.data)
+    ]
+    return any(direct) and "feedback" in [w.kind for w in est.warnings]
 
 
 def _explained(

@@ -6,14 +6,14 @@ import dataclasses
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Literal
+from typing import Any, Literal
 
 from freqid.checks import InputError, choice, flag, listed, named_values, whole
 from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.clock_offset import clock_notes, with_clock_offset
-from freqid.fitting.closed_loop import through_references, with_loop_noise
+from freqid.fitting.closed_loop import FED_BACK, fed_back, through_references, with_loop_noise
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
@@ -87,7 +87,8 @@ def fit(
         domain: ``"frequency"`` or ``"time"``, the paper's output error.
         reference: ``"auto"`` fits a record that has a reference through it, as one of a closed loop
             must be, weighted by the noise unless ``weights`` says otherwise, but where the
-            reference explains nearly all of the input; ``True`` always; ``False`` never.
+            reference explains nearly all of the input and no feedback is seen in what is left;
+            ``True`` always; ``False`` never.
         offset: ``"estimate"`` makes a constant of each output of each record an unknown.
         loss: ``"huber"`` lets samples that are far off count less, as spikes should.
         error: ``"log"`` fits the logarithm of responses, magnitude and phase, which is robust
@@ -110,7 +111,7 @@ def fit(
     """
     choice("domain", domain, ("frequency", "time"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
-    near = isinstance(start, Near)
+    asked_model, near = model, isinstance(start, Near)
     start = None if start is None else named_values("start", start)
     auto = isinstance(n_starts, str) and n_starts == "auto"
     count = None if auto else whole("n_starts", n_starts, most=_STARTS)
@@ -175,7 +176,7 @@ def fit(
     share = None
     if loops:
         est, share = with_loop_noise(est, readings, loops)
-    given = {
+    given: dict[str, Any] = {
         "hold": asked_hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
         "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
@@ -183,10 +184,15 @@ def fit(
     }  # fmt: skip
     call = _call(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings, share)
-    return dataclasses.replace(
+    est = dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes, *est.notes],
     )  # fmt: skip
+    if reference != "auto" or near or not fed_back(est, loops):
+        return est
+    given |= {"reference": True, "separate": own, "progress": progress}
+    through = fit(asked_model, given_sets, **given)
+    return dataclasses.replace(through, notes=[FED_BACK, *through.notes])
 
 
 # starts that may be asked for: more would never end
