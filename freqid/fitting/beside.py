@@ -30,6 +30,8 @@ from freqid.models import GreyBox
 ROUND_LINES, _EVEN_LINES = 60, 120
 # samples of an unknown delay that are tried
 _DELAYS = 20
+# samples around a likely one that are tried, too
+_NEAR = 3
 # the longest delay is such a part of a record, and so many samples
 _LONGEST, _LAGS = 8, 2000
 # lines that each of several black boxes takes at least
@@ -167,11 +169,21 @@ def _candidates(
         for s, free in zip(model.delay_sources, unknown, strict=True) if free
     ]  # fmt: skip
     least = -longest if np.isfinite(early).all() and max(early) < 0 else 0
-    lags = {*range(least, longest + 1), *_far(readings[0], len(model.state_space().A), least < 0)}
+    lags = set(range(least, longest + 1))
+    far = _far(readings[0], len(model.state_space().A), least < 0)
+    if far:
+        # of many each would take a black box: those near none, the start's and the likely ones do
+        near = {*range(-_DELAYS, _DELAYS + 1), *_around(own)}
+        lags = (lags & near) | {q for q in _around(far) if q >= 0 or least < 0}
     shared = [q for q in sorted(lags) if (q,) * len(own) != own]
     return [own] + [
         tuple(q if free else kept for free, kept in zip(unknown, own, strict=True)) for q in shared
     ]
+
+
+def _around(lags: Sequence[int]) -> list[int]:
+    """Lags next to some."""
+    return [lag + step for lag in lags for step in range(-_NEAR, _NEAR + 1)]
 
 
 def _far(reading: Reading, order: int, early: bool) -> list[int]:
