@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -22,6 +23,9 @@ from freqid.data import Record, as_holds
 from freqid.lti import Hold, InputHolds, PeriodicHold, Sampled, ZeroOrderHold, warn_of_rounding
 from freqid.models.conversion import ModelLike, as_model
 from freqid.models.model import Model
+
+# where the functions of ready-made plants are
+_READY = "freqid.models.plants"
 
 
 def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
@@ -142,7 +146,8 @@ def simulate(
         hold: what the input does between its samples: None or ``"zoh"``, ``"foh"``, ``"bl"``
             (then the response is the periodic one, the input repeating for ever), or one of these
             for each input by name.
-        input_names, output_names: of the channels, ``u`` and ``y`` where not given.
+        input_names, output_names: of the channels; where not given those that the model was given,
+            and ``u`` and ``y`` of a ready-made plant.
         initial_state: state of the plant at the first sample, (n,); None starts from rest.
 
     Returns a Record with that hold. Raises ValueError for wrong shapes or a hold whose period is
@@ -186,10 +191,20 @@ def simulate(
         y[:, 0] if y.shape[1] == 1 and u.ndim == 1 else y,
         dt,
         hold=between,
-        input_names=input_names,
-        output_names=output_names,
+        input_names=_given(plant, plant.inputs) if input_names is None else input_names,
+        output_names=_given(plant, plant.outputs) if output_names is None else output_names,
         conditions=getattr(plant, "conditions", None),
     )
+
+
+def _given(plant: Model, names: Sequence[str] | None) -> Sequence[str] | None:
+    """Names of channels that a user gave the model; None for those of ready-made plants, whose
+    records are u and y since the first version, and for the labels that control makes up.
+    """
+    function = getattr(plant, "matrices", None)
+    ready = getattr(getattr(function, "func", function), "__module__", "") == _READY
+    made_up = names is not None and all(re.fullmatch(r"[uy]\[\d+\]", name) for name in names)
+    return None if ready or made_up else names
 
 
 def _outputs(

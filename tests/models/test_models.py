@@ -1,5 +1,6 @@
 """Plants, ties, priors and user Jacobians."""
 
+import control
 import numpy as np
 import pytest
 
@@ -127,3 +128,21 @@ def test_a_users_jacobian_is_used(rng):
     est = fq.fit(model, record, start={"m": 2.5, "k": 40})
     assert est["m"] == pytest.approx(2, rel=1e-8)
     assert calls
+
+
+def test_a_simulation_has_the_names_that_a_model_was_given():
+    axis = fq.GreyBox(
+        lambda J, d: ([[-d / J]], [[1 / J]], [[1.0]], None),
+        [fq.Parameter("J", 0.5), fq.Parameter("d", 2.0)], inputs=["torque"], outputs=["speed"],
+    )  # fmt: skip
+    u = fq.white_noise(300, seed=1)
+    record = fq.simulate(axis, u, 0.01)
+    assert (record.input_names, record.output_names) == (("torque",), ("speed",))
+    est = fq.fit(axis, record.with_noise(0.01, seed=2))
+    for model in (est, est.model, est.to_control(), fq.fit(fq.OutputError(1), record)):
+        assert fq.simulate(model, u, 0.01).output_names == ("speed",)
+    said = fq.simulate(axis, u, 0.01, input_names=["m"], output_names=["v"])
+    assert (said.input_names, said.output_names) == (("m",), ("v",))
+    # ready-made plants, and labels that control makes up
+    for model in (fq.two_mass(), fq.drivetrain(3), control.tf([1], [1, 1])):
+        assert fq.simulate(model, u, 0.01).input_names == ("u",)
