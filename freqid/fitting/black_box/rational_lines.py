@@ -33,8 +33,6 @@ _ROUNDING = 1e-16
 # Gauss-Newton steps at the most, and the part of the cost that the last one gains
 _DESCENTS = 60
 _GAIN = 1e-9
-# a gain of this part of the mean error of a line is none
-_NOTHING = 1e-3
 # mirrored poles stay this far inside
 _MARGIN = 0.9999
 
@@ -166,8 +164,6 @@ class RationalLines:
         n = len(basis.Q) - 1
         best, damping, straight = Fitted(basis, x, np.inf, True), 0.0, True
         R = np.zeros((0, 0))
-        # gains far below what chance explains lead nowhere
-        least = max(_GAIN, _NOTHING / len(self.Y))
         for _ in range(steps):
             inverse = 1 / basis.denominator(x)
             columns = self._columns(basis, inverse)
@@ -178,7 +174,7 @@ class RationalLines:
                 gain = best.cost - cost
                 best = Fitted(basis, x, cost, straight)
                 R = _triangle([*columns, basis.Q[:n] * (-output * inverse)], error)
-                if damping and gain <= least * cost:
+                if damping and gain <= _GAIN * cost:
                     break
                 damping = damping / 10 if damping > 1e-6 else 0.0
             elif not len(R) or best.cost <= self.rounding:
@@ -193,7 +189,7 @@ class RationalLines:
                 x = best.x + _least(R, damping)
             if self.stable and not _inside(basis, x):
                 break
-            if not damping and cost - R[-1, -1] ** 2 <= least * cost:
+            if not damping and cost - R[-1, -1] ** 2 <= _GAIN * cost:
                 return Fitted(basis, x, R[-1, -1] ** 2, straight)
         return best
 
@@ -202,9 +198,6 @@ class RationalLines:
         basis, x = found.basis, found.x
         n = len(basis.Q) - 1
         poles = found.poles
-        # a pole at a line, an undamped motion at a frequency of the data, has no response there
-        hit = (self.w == poles[:, None]).any(axis=1)
-        poles = np.where(hit, poles * _MARGIN, poles)
         A, C = with_poles(poles)
         if not self.feedthrough:
             # q_n + Σ a_k q_k = lead Π (w − λ)
