@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,6 +49,14 @@ class Loop:
         """Duration of each record in s."""
         records = [r.data for r in self.readings]
         return [d.n_samples * d.dt for d in records if isinstance(d, Record)]
+
+    @cached_property
+    def stages(self) -> list[_Stage]:
+        """The black box at the lines of each record, computed once for all that is asked."""
+        at = self.chart.realise(self.x)
+        seen = [r.lines(Plane()).in_plane(self.chart.plane) for r in self.readings]
+        pairs = zip(seen, self.lasted, strict=True)
+        return [_Stage.of(lines, lines.at(at), duration) for lines, duration in pairs]
 
 
 @dataclass(frozen=True)
@@ -217,8 +226,7 @@ def _scores(
             if part is None:
                 return None
             stage = part.stage
-            lines = loop.readings[i].lines(Plane()).in_plane(loop.chart.plane)
-            box = _Stage.of(lines, lines.at(loop.chart.realise(loop.x)), loop.lasted[i])
+            box = loop.stages[i]
             # the input's error at the lines of the plant's fit, through the plant
             at = np.searchsorted(box.number, stage.number)
             m = part.response.shape[1]

@@ -134,7 +134,10 @@ class Reference:
         best: Reference | None = None
         for begin in (partial(self._around, model, readings), self._exchanged):
             try:
-                found = self._beginning(begin())
+                # a poor start may grow beyond all numbers within a sample
+                with np.errstate(all="ignore"):
+                    centre = begin()
+                found = self._beginning(centre)
             except (InputError, np.linalg.LinAlgError):
                 continue
             least = best or self
