@@ -101,13 +101,12 @@ def with_loop_noise(
 
 
 def fed_back(est: Estimate, loops: Sequence[Loop]) -> bool:
-    """Whether what an input that was fitted as it is leaves shows the feedback all the same."""
-    through = {place for loop in loops for place in loop.places}
-    direct = [
-        i not in through and isinstance(d, Record) and d.reference is not None and d.factor == 1
-        for i, d in enumerate(est.data)
-    ]
-    return any(direct) and "feedback" in [w.kind for w in est.warnings]
+    """Whether what inputs that were fitted as they are leave shows the feedback, and all could be
+    fitted through their references.
+    """
+    direct = sum(len(loop.places) for loop in loops) < len(est.data)
+    could = (isinstance(d, Record) and d.reference is not None and d.factor == 1 for d in est.data)
+    return direct and all(could) and "feedback" in [w.kind for w in est.warnings]
 
 
 def _explained(

@@ -168,7 +168,7 @@ class LoopShare:
     ) -> float | None:
         """Σ variances along all directions that the boxes have beside the plant, as a multiple of
         what noise of the output alone makes; None where that is not known.
-        """  # fmt: skip
+        """
         at = structure.realise(grey.x)
         plants = {
             i: _Fitted.of(r.lines(), at, structure.at(grey.x, r.place), r)

@@ -58,7 +58,7 @@ class Share(InputNoise, Protocol):
         groups: Sequence[Sequence[int]],
         readings: Sequence[Reading],
     ) -> float | None:
-        """A multiple; None where it is not known."""  # fmt: skip
+        """A multiple; None where it is not known."""
         ...
 
 
