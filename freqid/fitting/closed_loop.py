@@ -96,7 +96,7 @@ def with_loop_noise(
     if score is None:
         return est, share
     minimum = dataclasses.replace(est.minimum, score=score)
-    spread = Spread(est.spread.change, minimum)
+    spread = Spread(est.scatter.change, minimum)
     return dataclasses.replace(est, problem=minimum, uncertainty=spread), share
 
 

@@ -16,7 +16,7 @@ from freqid.data import DataSet, FrequencyResponse
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding, Inquired
-from freqid.fitting.grades import Verdict, verdict
+from freqid.fitting.questioned import Questioned
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.shown import Shown
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
@@ -33,7 +33,7 @@ Z95 = 1.959963984540054
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimate(Shown):
+class Estimate(Questioned, Shown):
     """The result of ``fit``: parameters, how certain they are, and what speaks against them.
 
     Attributes:
@@ -91,52 +91,8 @@ class Estimate(Shown):
             raise InputError("this estimate does not hold its cost any more; fit again")
         return self.problem
 
-    @cached_property
-    def witness(self) -> Witness:
-        """What a black box of the plant's order says: is a better minimum left, does a part lack.
-
-        Its ``verdict`` is "complete", "lacking" or "absent", with ``cost``, ``f``, ``p_value`` and
-        a ``sentence``.
-        """
-        if self.testimony is None:
-            return Witness("absent", "a black box of its own order is no witness")
-        return self.testimony()
-
-    @cached_property
-    def warnings(self) -> list[Finding]:
-        """Why the result should not be trusted: sentences (``str``) with ``kind``, ``severity`` and
-        ``number``. The suspects are asked when this is read for the first time.
-        """
-        asked = [] if self.inquiry is None else self.inquiry.findings()
-        return [*asked, *self.signs]
-
-    @cached_property
-    def verdict(self) -> Verdict:
-        """Whether to use the numbers: ``grade`` "trust", "doubt" or "do not use", and ``reasons``.
-
-        >>> import freqid as fq
-        >>> record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3).with_noise(0.01)
-        >>> fq.fit(fq.first_order(), record).verdict.grade
-        'trust'
-        """
-        return verdict(self)
-
-    @cached_property
-    def suspects(self) -> pd.DataFrame:
-        """What the data may hold that the model lacks, by score tests, the strongest first.
-
-        Index: suspect; columns ``statistic`` (F), ``p_value``, ``size`` in its ``unit``, ``power``,
-        the part of it that the parameters leave to be seen, and ``largest_shift``, what it would do
-        to a parameter in standard errors. Empty where nothing is left to be tested.
-
-        Source: Söderström and Stoica, System Identification, 1989, appendix B.
-        """
-        import pandas as pd
-
-        return pd.DataFrame() if self.inquiry is None else self.inquiry.table()
-
     @property
-    def spread(self) -> Spread:
+    def scatter(self) -> Spread:
         """How the estimate scatters: covariance, and how it is carried to modes and responses."""
         own = self.uncertainty
         return own if isinstance(own, Spread) else Spread(np.ones(len(self.values)), given=own)
@@ -147,7 +103,7 @@ class Estimate(Shown):
         if self.problem is not None and isinstance(self.uncertainty, Spread):
             return self.problem.structure, self.problem.x, self.uncertainty
         if not isinstance(self.model, GreyBox):
-            return self.minimum.structure, self.minimum.x, self.spread
+            return self.minimum.structure, self.minimum.x, self.scatter
         # an estimate that is not of a fit: the grey box itself still tells all that is asked
         structure = GreyStructure(self.model)
         own = self.covariance_matrix[: structure.count, : structure.count]
@@ -183,7 +139,7 @@ class Estimate(Shown):
     @cached_property
     def covariance_matrix(self) -> FloatArray:
         """Covariance of the parameters, (P, P)."""
-        return self.spread.covariance
+        return self.scatter.covariance
 
     @cached_property
     def parameters(self) -> pd.DataFrame:
@@ -210,10 +166,10 @@ class Estimate(Shown):
         if (
             self.problem is None
             or not isinstance(self.model, GreyBox)
-            or self.spread.given is not None
+            or self.scatter.given is not None
         ):
             return lower, upper
-        return self.minimum.inside_bounds(self.spread.change, std, lower, upper)
+        return self.minimum.inside_bounds(self.scatter.change, std, lower, upper)
 
     @cached_property
     def covariance(self) -> pd.DataFrame:
@@ -288,10 +244,10 @@ class Estimate(Shown):
         if not 0 < finite("level", level) < 1:
             raise InputError(f"level={level!r} must lie between 0 and 1")
         if method == "profile":
-            if not isinstance(self.model, GreyBox) or self.spread.given is not None:
+            if not isinstance(self.model, GreyBox) or self.scatter.given is not None:
                 raise InputError("profile intervals need a grey-box estimate from data")
             std = np.sqrt(np.diag(self.covariance_matrix))
-            return profile_intervals(self.minimum, self.spread.change, std, level)
+            return profile_intervals(self.minimum, self.scatter.change, std, level)
         half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
         return pd.DataFrame(
             {"lower": self.values - half, "upper": self.values + half},

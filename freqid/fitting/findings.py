@@ -19,6 +19,8 @@ from freqid.models import Parameter
 if TYPE_CHECKING:
     import pandas as pd
 
+    from freqid.fitting.estimate import Estimate
+
 Severity = Literal["serious", "minor"]
 
 # a bound that is nearer than this part of the value, or of its standard error, is reached
@@ -67,6 +69,10 @@ class Inquired(Protocol):
 
     def findings(self) -> list[Finding]:
         """Sentences on those that are no chance."""
+        ...
+
+    def spread(self, est: Estimate) -> pd.DataFrame:
+        """How far the numbers of an estimate move between parts of its data."""
         ...
 
 

@@ -44,11 +44,24 @@ def _said(est: Estimate) -> list[str]:
     return [*lines, *(f"note: {n}" for n in est.notes)]
 
 
+def _widened(est: Estimate) -> dict[str, float]:
+    """Standard errors that know how experiments differ, where these are named as unlike."""
+    if not any(getattr(w, "kind", "") == "unlike experiments" for w in est.warnings):
+        return {}
+    wide = est.spread
+    return {} if wide.empty else dict(wide["widened"].groupby(level="parameter").first())
+
+
 def as_text(est: Estimate) -> str:
     """Each parameter with its error, then verdict, witness, warnings and notes."""
     lines = [f"<Estimate: {est.fit_percent:.2f} % fit, cost {est.cost:.4g}, {est.hold!r}"]
+    wide = _widened(est)
     for name, row in est.parameters.iterrows():
-        lines.append(f"  {name} = {row['value']:.6g} ± {row['std']:.2g} {row['unit']}".rstrip())
+        value = f"  {name} = {row['value']:.6g} ± {row['std']:.2g} {row['unit']}".rstrip()
+        more = wide.get(str(name), 0.0) > row["std"]
+        lines.append(
+            f"{value} (± {wide[str(name)]:.2g} as the experiments differ)" if more else value
+        )
     lines += [f"  {line}" for line in _said(est)]
     return "\n".join(lines) + ">"
 
@@ -57,4 +70,7 @@ def as_html(est: Estimate) -> str:
     """The same as a table with a list under it."""
     notes = "".join(f"<li>{escape(w)}</li>" for w in _said(est))
     head = f"fit {est.fit_percent:.2f} %, {escape(repr(est.hold))}"
-    return f"<p>{head}</p>{est.parameters.to_html(escape=True)}<ul>{notes}</ul>"
+    table, wide = est.parameters, _widened(est)
+    if wide:
+        table = table.assign(widened=[wide.get(str(n), s) for n, s in table["std"].items()])
+    return f"<p>{head}</p>{table.to_html(escape=True)}<ul>{notes}</ul>"

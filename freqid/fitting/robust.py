@@ -55,7 +55,7 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
         "deviations and count less"
     )
     minimum = dataclasses.replace(est.minimum, inflation=1 / inside**2)
-    spread = Spread(est.spread.change, minimum)
+    spread = Spread(est.scatter.change, minimum)
     est = dataclasses.replace(est, problem=minimum, uncertainty=spread, notes=[*est.notes, note])
     return est, cut
 

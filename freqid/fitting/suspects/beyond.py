@@ -16,10 +16,13 @@ from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.reading import Reading
+from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.suspects import plant
+from freqid.fitting.suspects.parts import fitted_apart, widths
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, score
+from freqid.fitting.suspects.spread import difference, told_by
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.fitting.witness import Share, excess
@@ -28,6 +31,9 @@ from freqid.models import GreyBox, Model, OutputError, observed_order
 
 # experiments times parameters whose separate fits are compared at the most
 _MOST = 4000
+# level at which one step apart is enough, experiments that are fitted apart at the most, and cost
+# over that of their own noise from which they are
+_SURELY, _APART, _NOISY = 1e-6, 40, 1.3
 # the highest order of a black box beside which feedback is asked
 _BOX = 8
 
@@ -128,9 +134,47 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     f = chi / degrees / wider
     p = float(scipy.stats.f.sf(f, degrees, min(freedom, scene.noise_freedom)))
     x = scene.x[free]
-    size = float(np.max(np.abs(np.array(steps)) / np.maximum(np.abs(x), 1e-300)))
+    # that which moves most of its own error bars
+    told = int(np.argmax(np.where(np.isfinite(shift), shift, -1).max(axis=0)))
+    size = float(np.max(np.abs(np.array(steps)[:, told]) / max(abs(x[told]), 1e-300)))
     change = float(np.max(np.abs(steps[most]) / np.maximum(np.abs(x), 1e-300)))
     test = Score(f, degrees, p, size, 1.0, largest, gain, change)
+    stepped = [Asked("unlike experiments", test, "relative", p)]
+    return _fitted_apart(inquiry, scene) or stepped if p > _SURELY else stepped
+
+
+def _fitted_apart(inquiry: Asking, scene: Scene) -> list[Asked]:
+    """Experiments fitted apart, where more is left of them than their own noise.
+
+    One step from what lies between two sharp resonances tells nothing of either.
+    """
+    structure, count = inquiry.minimum.structure, len(scene.seen)
+    if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
+        return []
+    if count > _APART or not isinstance(inquiry.model, GreyBox):
+        return []
+    floor = noise_floor([s.experiment for s in scene.seen])
+    if scene.cost <= _NOISY * floor:
+        return []
+    found = fitted_apart(inquiry.model, inquiry.minimum, [[r] for r in inquiry.readings])
+    fits = [f for f in found if f is not None and f.converged]
+    if len(fits) < count:
+        return []
+    whole = inquiry.minimum.x * structure.scale
+    wider = widths(inquiry.minimum)
+    named = dict(zip(structure.names, whole, strict=True))
+    apart = difference([told_by(f, named, wider) for f in fits], whole)
+    if apart.degrees < 1:
+        return []
+    with np.errstate(all="ignore"):
+        std = np.sqrt(np.diag(inquiry.minimum.covariance)) * np.abs(structure.scale)
+        moved = np.abs(np.array([f.values for f in fits]) - whole) / std
+    gain = max(scene.cost - sum(f.cost for f in fits), 0.0)
+    # that which is farthest apart of its own error bars
+    size = float(apart.percent[np.nanargmax(apart.shift)]) / 100
+    shift = float(np.nanmax(np.where(np.isfinite(moved), moved, np.nan), initial=0.0))
+    statistic, degrees, p = apart.statistic, apart.degrees, apart.p_value
+    test = Score(statistic, degrees, p, size, 1.0, shift, gain, size)
     return [Asked("unlike experiments", test, "relative", p)]
 
 

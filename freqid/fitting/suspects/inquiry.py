@@ -16,12 +16,13 @@ from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
 from freqid.fitting.suspects.beyond import looped, one_more_mode, unlike
-from freqid.fitting.suspects.halves import between_halves
+from freqid.fitting.suspects.parts import fitted_apart, partings
 from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, score
 from freqid.fitting.suspects.sentences import sentence, words
+from freqid.fitting.suspects.spread import compared, modes_moved
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
@@ -30,6 +31,8 @@ from freqid.models import GreyBox, Model
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from freqid.fitting.estimate import Estimate
 
 # tests that are answered by one fit with another hold
 _HOLDS = ("hold", "hold period")
@@ -190,7 +193,7 @@ class Inquiry:
         if isinstance(self.model, GreyBox) or not said or said[0].name in _LIKELY:
             return found
         # the unknowns of a black box have no standard errors that mean anything: its modes have
-        moved = between_halves(self.model, self.readings)
+        moved = modes_moved(self.model, self.minimum, self.readings)
         if not moved < _HOLDS_GOOD:
             return found
         text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
@@ -237,6 +240,17 @@ class Inquiry:
         small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS
         severity: Severity = "minor" if small else "serious"
         return Finding(a.name, text, severity, float(a.test.statistic))
+
+    @in_one_blas_thread
+    def spread(self, est: Estimate) -> pd.DataFrame:
+        """How far its numbers move between parts of the data; see ``Estimate.spread``."""
+        import pandas as pd
+
+        if est.problem is None:
+            return pd.DataFrame()
+        parted = partings(self.readings, self.scene, len(est.values))
+        found = [(p.between, fitted_apart(self.model, self.minimum, p.parts)) for p in parted]
+        return compared(est, found)
 
     @in_one_blas_thread
     def table(self) -> pd.DataFrame:

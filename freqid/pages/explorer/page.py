@@ -138,7 +138,11 @@ def _layout(dash: ModuleType, record: Record | None) -> Component:
           slider("noise", 0, 20, 0.5, 0, {}), html.Div(id="sliders")]),
         dcc.Store(id="sine", data=0.0),
     ])  # fmt: skip
-    config = {"displaylogo": False, "toImageButtonOptions": {"format": "svg", "scale": 1}}
+    config = {
+        "displaylogo": False, "toImageButtonOptions": {"format": "svg", "scale": 1},
+        # nothing is sent anywhere
+        "showSendToCloud": False, "plotlyServerURL": "",
+    }  # fmt: skip
 
     def graph(name: str) -> Component:
         return dcc.Graph(id=name, config=config, responsive=True, className="graph")

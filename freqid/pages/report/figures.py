@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse, Record
 from freqid.fitting import Estimate
 from freqid.frf import etfe
@@ -16,7 +16,7 @@ from freqid.plots import COLOURS, Part, Shown, Style, bode_axes, bode_curve, bod
 from freqid.validation import compare
 
 # points of a curve that a page can carry
-_POINTS = 3000
+_POINTS = 2000
 _DATA: Style = {"color": "#7f7f7f"}
 _BLACK, _BLUE, _ORANGE = (Style(color=colour) for colour in COLOURS[:3])
 
@@ -113,16 +113,20 @@ def _residuals(
     except InputError:
         return []
     simulated = c.simulated.reshape(len(c.simulated), -1)
-    step = max(len(simulated) // _POINTS, 1)
-    t = record.time[: len(simulated) : step]
-    drawn = []
+    t, drawn = record.time[: len(simulated)], []
     for o, name in enumerate(record.output_names):
-        y, s = c.measured[::step, o], simulated[::step, o]
+        y, s = c.measured[:, o], simulated[:, o]
         note = f"{c.fit_percent[o]:.2f} % (NRMSE), simulated with {c.hold!r}"
         note += f", {est.band[0]:g} to {est.band[1]:g} Hz" if est.band else ""
-        note += f"; every {step}th sample is drawn." if step > 1 else "."
-        data = [trace(t, y, "measured", _BLACK), trace(t, s, "simulated", _ORANGE),
-                trace(t, y - s, "difference", _BLUE, axis=2)]  # fmt: skip
+        thinned = len(t) > _POINTS
+        note += (
+            "; of long records the extremes are drawn, so that no peak is lost." if thinned else "."
+        )
+        data = [
+            trace(*_envelope(t, y), "measured", _BLACK),
+            trace(*_envelope(t, s), "simulated", _ORANGE),
+            trace(*_envelope(t, y - s), "difference", _BLUE, axis=2),
+        ]
         axes: Part = {
             "xaxis": {"anchor": "y2", "title": {"text": "time / s"}},
             "yaxis": {"domain": [0.36, 1], "title": {"text": escape(str(name))}},
@@ -130,6 +134,19 @@ def _residuals(
         }
         drawn.append(_figure(f"{title}{name}", note, data, 460, 1.1, axes))
     return drawn
+
+
+def _envelope(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The least and the largest sample of each of many short pieces, in the order of their times.
+
+    Every n-th sample of a fast signal would be a slow one that was never there.
+    """
+    if len(y) <= _POINTS:
+        return t, y
+    pieces = np.array_split(np.arange(len(y)), _POINTS // 2)
+    ends = [sorted({p[np.argmin(y[p])], p[np.argmax(y[p])]}) for p in pieces]
+    at = np.concatenate(ends)
+    return t[at], y[at]
 
 
 def records(est: Estimate) -> list[Record]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import base64
+from importlib import resources
 from pathlib import Path
 
 from freqid.checks import InputError, path_of
 from freqid.data import Record, whole_file
 from freqid.fitting import Estimate
+from freqid.models import GreyBox
 from freqid.pages.report.figures import figures
-from freqid.pages.report.sentences import bias, data, parameters, tests, verdict, versions
+from freqid.pages.report.sentences import bias, data, verdict, versions
+from freqid.pages.report.tables import correlations, modes, parameters, spread, tests
 
 
 def write_report(
@@ -17,9 +21,8 @@ def write_report(
     """Write the page; see ``Estimate.report``."""
     try:
         import jinja2
-        import plotly.offline
     except ImportError:
-        raise InputError("a report needs jinja2 and plotly; pip install 'freqid[report]'") from None
+        raise InputError("a report needs jinja2; pip install 'freqid[report]'") from None
     path = path_of("path", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"path={str(path)!r} must end in .html")
@@ -35,18 +38,28 @@ def write_report(
         title=title or f"Estimate of {getattr(est.model, 'name', type(est.model).__name__)}",
         verdict=found,
         warnings=list(est.warnings),
+        notes=list(est.notes),
         parameters=parameters(est, away),
         bias_note="The bias is what the assumed hold adds: the estimate less that under the hold "
         "which the records remember."
         if away
         else "",
+        modes=modes(est),
+        spread=spread(est),
+        correlations=correlations(est) if isinstance(est.model, GreyBox) else None,
         plots=drawn,
         figures=[{"data": f.data, "layout": f.layout} for f in drawn],
         tests=tests(est),
         data=data(est),
         call=est.call or "(made without fit)",
         versions=versions(),
-        plotly=plotly.offline.get_plotlyjs() if drawn else "",
+        plotly=_plotly() if drawn else "",
     )
     with whole_file(path) as beside:
         beside.write_text(page, encoding="utf-8")
+
+
+def _plotly() -> str:
+    """The basic bundle of plotly.js (MIT license), packed; the page unpacks it by itself."""
+    packed = resources.files("freqid.pages.report").joinpath("plotly-basic.min.js.gz")
+    return base64.b64encode(packed.read_bytes()).decode("ascii")

@@ -1,13 +1,10 @@
-"""What a report says: whether to trust the estimate, and its tables as rows of words."""
+"""What a report says in words: whether to trust the estimate, and what was fitted."""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
 from importlib.metadata import version
 from typing import NamedTuple
-
-import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import Record
@@ -15,10 +12,10 @@ from freqid.fitting import Estimate, Verdict as Graded
 from freqid.lti import ZeroOrderHold
 from freqid.models import GreyBox
 from freqid.pages.report.figures import records
-from freqid.validation import compare, hold_bias, residual_test
+from freqid.validation import compare, hold_bias
 
-# rows of the parameter table, and experiments, that a page can carry
-_ROWS, _EXPERIMENTS = 500, 50
+# experiments that a page can carry
+_EXPERIMENTS = 50
 # what another record leaves may be so many times as much as the own does, or this many per cent
 _WORSE, _LEAST = 1.0, 5.0
 
@@ -29,14 +26,6 @@ class Verdict(NamedTuple):
     head: str
     text: str
     trusted: bool = False
-
-
-class Table(NamedTuple):
-    """A table's cells, and how many rows are left out of it."""
-
-    columns: list[str]
-    rows: list[list[str]]
-    left_out: int
 
 
 def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
@@ -75,48 +64,6 @@ def bias(est: Estimate) -> dict[str, float]:
         return dict(hold_bias(est, known, band=est.band, weights=est.weights)["bias"])
     except InputError:
         return {}
-
-
-def parameters(est: Estimate, bias: Mapping[str, float]) -> Table:
-    """The parameters with their error bars, and bias bars where there are any."""
-    columns = ["parameter", "value", "±", "95 % from", "to", "began at", "unit"]
-    if bias:
-        columns.insert(3, "bias")
-    rows = []
-    for name, p in est.parameters.head(_ROWS).iterrows():
-        row = [str(name), _number(p["value"], 7), _number(p["std"], 2), _number(p["lower"], 6),
-               _number(p["upper"], 6), _number(p["nominal"], 6), str(p["unit"])]  # fmt: skip
-        if bias:
-            row.insert(3, _number(bias.get(str(name), np.nan), 3))
-        rows.append(row)
-    return Table(columns, rows, max(len(est.names) - _ROWS, 0))
-
-
-def _number(x: float, digits: int) -> str:
-    if np.isnan(x):
-        return ""
-    return "∞" if np.isposinf(x) else "−∞" if np.isneginf(x) else f"{x:.{digits}g}"
-
-
-def tests(est: Estimate) -> list[dict[str, object]]:
-    """The residual tests on the first record, a row each."""
-    if not records(est):
-        return []
-    try:
-        table = residual_test(est, records(est)[0], band=est.band)
-    except InputError:
-        return []
-    return [
-        {
-            "test": row["test"],
-            "channels": f"{row['output']} and {row['input']}" if row["input"] else row["output"],
-            "statistic": f"{row['statistic']:.3g}",
-            "limit": f"{row['limit']:.3g}",
-            "p": f"{row['p_value']:.2g}",
-            "passed": bool(row["passed"]),
-        }
-        for row in table.to_dict("records")
-    ]
 
 
 def data(est: Estimate) -> list[tuple[str, str]]:

@@ -1,0 +1,80 @@
+"""What is asked of every estimate: whether it may be trusted, and what speaks against it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from freqid.fitting.findings import Finding, Inquired
+from freqid.fitting.grades import Verdict, verdict
+from freqid.fitting.search.verdict import Witness
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Questioned:
+    """The part of an Estimate that answers for it. Each question is asked once, when it is read."""
+
+    signs: list[Finding]
+    testimony: Callable[[], Witness] | None
+    inquiry: Inquired | None
+
+    @cached_property
+    def witness(self) -> Witness:
+        """What a black box of the plant's order says: is a better minimum left, does a part lack.
+
+        Its ``verdict`` is "complete", "lacking" or "absent", with ``cost``, ``f``, ``p_value`` and
+        a ``sentence``.
+        """
+        if self.testimony is None:
+            return Witness("absent", "a black box of its own order is no witness")
+        return self.testimony()
+
+    @cached_property
+    def warnings(self) -> list[Finding]:
+        """Why the result should not be trusted: sentences (``str``) with ``kind``, ``severity`` and
+        ``number``. The suspects are asked when this is read for the first time.
+        """
+        asked = [] if self.inquiry is None else self.inquiry.findings()
+        return [*asked, *self.signs]
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether to use the numbers: ``grade`` "trust", "doubt" or "do not use", and ``reasons``.
+
+        >>> import freqid as fq
+        >>> record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3).with_noise(0.01)
+        >>> fq.fit(fq.first_order(), record).verdict.grade
+        'trust'
+        """
+        return verdict(self)  # type: ignore[arg-type]
+
+    @cached_property
+    def suspects(self) -> pd.DataFrame:
+        """What the data may hold that the model lacks, by score tests, the strongest first.
+
+        Index: suspect; columns ``statistic`` (F), ``p_value``, ``size`` in its ``unit``, ``power``,
+        the part of it that the parameters leave to be seen, and ``largest_shift``, what it would do
+        to a parameter in standard errors. Empty where nothing is left to be tested.
+
+        Source: Söderström and Stoica, System Identification, 1989, appendix B.
+        """
+        import pandas as pd
+
+        return pd.DataFrame() if self.inquiry is None else self.inquiry.table()
+
+    @cached_property
+    def spread(self) -> pd.DataFrame:
+        """How far the numbers move between parts of the data, each fitted apart.
+
+        Index: what lies ``between`` (experiments, record halves, band halves), and parameter, or
+        mode of a black box. Columns: how many ``parts``, ``value``, the largest ``shift`` in
+        standard errors and in ``percent``, ``p_value`` of all together, ``std``, and ``widened``,
+        the standard error by the parts' own scatter where that is more than noise (p < 0.001).
+        Source: Birge, Physical Review 40, 1932.
+        """
+        import pandas as pd
+
+        return pd.DataFrame() if self.inquiry is None else self.inquiry.spread(self)  # type: ignore[arg-type]

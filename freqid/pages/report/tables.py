@@ -1,0 +1,105 @@
+"""Tables of a report: parameters, modes, what lies between parts of the data, residual tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.fitting import Estimate
+from freqid.pages.report.figures import records
+from freqid.validation import residual_test
+
+# rows of a table that a page can carry
+_ROWS = 500
+# correlations of this size leave two parameters hard to tell apart
+_CORRELATED = 0.9
+
+
+class Table(NamedTuple):
+    """A table's cells, and how many rows are left out of it."""
+
+    columns: list[str]
+    rows: list[list[str]]
+    left_out: int
+
+
+def parameters(est: Estimate, bias: Mapping[str, float]) -> Table:
+    """The parameters with their error bars, and bias bars where there are any."""
+    columns = ["parameter", "value", "±", "95 % from", "to", "began at", "unit"]
+    if bias:
+        columns.insert(3, "bias")
+    rows = []
+    for name, p in est.parameters.head(_ROWS).iterrows():
+        row = [str(name), _number(p["value"], 7), _number(p["std"], 2), _number(p["lower"], 6),
+               _number(p["upper"], 6), _number(p["nominal"], 6), str(p["unit"])]  # fmt: skip
+        if bias:
+            row.insert(3, _number(bias.get(str(name), np.nan), 3))
+        rows.append(row)
+    return Table(columns, rows, max(len(est.names) - _ROWS, 0))
+
+
+def _number(x: float, digits: int) -> str:
+    if np.isnan(x):
+        return ""
+    return "∞" if np.isposinf(x) else "−∞" if np.isneginf(x) else f"{x:.{digits}g}"
+
+
+def tests(est: Estimate) -> list[dict[str, object]]:
+    """The residual tests on the first record, a row each."""
+    if not records(est):
+        return []
+    try:
+        table = residual_test(est, records(est)[0], band=est.band)
+    except InputError:
+        return []
+    return [
+        {
+            "test": row["test"],
+            "channels": f"{row['output']} and {row['input']}" if row["input"] else row["output"],
+            "statistic": f"{row['statistic']:.3g}",
+            "limit": f"{row['limit']:.3g}",
+            "p": f"{row['p_value']:.2g}",
+            "passed": bool(row["passed"]),
+        }
+        for row in table.to_dict("records")
+    ]
+
+
+def modes(est: Estimate) -> Table:
+    """Frequency and damping of each mode, or the time constant of a real pole."""
+    columns = ["mode", "frequency in Hz", "±", "damping ratio", "±", "time constant in s", "±"]
+    named = ["frequency", "frequency_std", "damping", "damping_std", "time_constant",
+             "time_constant_std"]  # fmt: skip
+    found = est.modes()
+    rows = [
+        [str(i + 1), *(_number(float(mode[n]), 2 if n.endswith("std") else 6) for n in named)]
+        for i, (_, mode) in enumerate(found.head(_ROWS).iterrows())
+    ]
+    return Table(columns, rows, max(len(found) - _ROWS, 0))
+
+
+def spread(est: Estimate) -> Table:
+    """How far the numbers move between parts of the data."""
+    columns = ["between", "parameter", "difference in %", "in its ±", "p", "±", "± widened"]
+    found = est.spread
+    if found.empty:
+        return Table(columns, [], 0)
+    found = found[found["shift"].notna()]
+    rows = [
+        [row["between"], row["parameter"], _number(row["percent"], 3), _number(row["shift"], 3),
+         _number(row["p_value"], 2), _number(row["std"], 2), _number(row["widened"], 2)]
+        for row in found.head(_ROWS).reset_index().to_dict("records")
+    ]  # fmt: skip
+    return Table(columns, rows, max(len(found) - _ROWS, 0))
+
+
+def correlations(est: Estimate) -> Table:
+    """Pairs of parameters that the data hardly tell apart, the closest first."""
+    C = est.correlation.to_numpy()
+    pairs = np.argwhere(np.triu(np.abs(C) > _CORRELATED, 1))
+    pairs = pairs[np.argsort(-np.abs(C[pairs[:, 0], pairs[:, 1]]), kind="stable")]
+    rows = [[est.names[i], est.names[j], f"{C[i, j]:.4f}"] for i, j in pairs[:_ROWS]]
+    return Table(["parameter", "and", "correlation"], rows, max(len(pairs) - _ROWS, 0))

@@ -1,0 +1,58 @@
+"""A report: small, whole, and sending nothing anywhere."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+
+@pytest.fixture(scope="module")
+def unlike():
+    """Two runs of one axis that differ by two per cent, 20,000 samples each."""
+    u = fq.chirp(10, 80, 20, 1e-3)
+    runs = [fq.simulate(fq.two_mass(k=k), u, 1e-3).with_noise(0.5, seed=i)
+            for i, k in enumerate((1.5e5, 1.53e5))]  # fmt: skip
+    return fq.fit(fq.two_mass(), runs)
+
+
+def test_of_long_records_it_stays_below_a_megabyte(unlike, tmp_path):
+    unlike.report(tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    assert len(text.encode()) < 1e6
+    assert "src=" not in text
+    assert 'plotlyServerURL: ""' in text
+
+
+def test_it_has_modes_correlations_and_what_lies_between_parts(unlike, tmp_path):
+    unlike.report(tmp_path / "r.html")
+    text = (tmp_path / "r.html").read_text()
+    for table in ("parameters", "modes", "spread", "correlations"):
+        assert f'<table id="{table}">' in text
+    row = unlike.spread.loc[("experiments", "k")]
+    assert f"<td>{row['percent']:.3g}</td>" in text
+    assert "<td>25." in text
+
+
+def test_a_long_record_keeps_its_peaks(tmp_path):
+    """One sample of a million stands out, between those that a thinned curve would show."""
+    from freqid.pages.report.figures import figures
+
+    u = fq.white_noise(100_000, seed=1)
+    record = fq.simulate(fq.first_order(), u, 1e-3)
+    y = record.y.copy()
+    y[54_321] += 50.0
+    est = fq.fit(fq.first_order(), fq.Record(u, y, 1e-3))
+    measured = next(t for f in figures(est) for t in f.data if t["name"] == "measured")
+    assert max(measured["y"]) == pytest.approx(y.max(), rel=1e-4)
+    assert measured["x"] == sorted(measured["x"])
+    assert len(measured["x"]) <= 2000
+    assert np.max(measured["y"]) > 40
+
+
+def test_what_was_done_on_the_way_is_said(tmp_path):
+    r = fq.white_noise(1500, seed=2)
+    record = fq.simulate(fq.first_order(), r, 1e-3).with_noise(0.01)
+    est = fq.fit(fq.first_order(), fq.Record(record.u, record.y, 1e-3, reference=r))
+    est.report(tmp_path / "r.html")
+    assert est.notes
+    assert est.notes[0].split(":")[0] in (tmp_path / "r.html").read_text().replace("&#39;", "'")
