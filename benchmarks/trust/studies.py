@@ -1,47 +1,137 @@
 """Coverage of 95 % intervals, and faults against what is said of them."""
 
+import dataclasses
+from functools import partial
+
 import numpy as np
+from search.plants import random_experiment
 
 import freqid as fq
 
 from .experiments import FAULTS, Setting, measured
 
-CELLS = ("white", "AR(0.9)", "weights='noise'", "prior", "domain='time'", "periodic",
-         "through the reference")  # fmt: skip
-
 
 def covered(case):
     """One run of one cell: the part of its intervals that hold the truth."""
-    cell = CELLS[case % len(CELLS)]
-    looped = cell == "through the reference"
-    s = Setting.drawn(case, ("lag",) if looped or cell == "periodic" else ("lag", "mode"))
-    truth, options, model = s.model, {}, s.model
-    if cell == "periodic":
-        data = _periodic(case)
-    elif looped:
-        plain = measured(s, "feedback")
-        data = fq.Record(plain.u, plain.y, plain.dt, reference=s.u())
-    else:
-        pole = 0.0 if cell == "white" else 0.9
-        data = measured(Setting(s.plant, s.input, s.samples, pole, s.ratio, s.seed))
-    if cell == "weights='noise'":
-        options = {"weights": "noise"}
-    elif cell == "domain='time'":
-        options = {"domain": "time"}
-    elif cell == "prior":
-        name = truth.free_parameters[0].name
-        model = truth.with_prior(**{name: (truth[name], 10 * truth[name])})
-    table = fq.fit(model, data, **options).parameters
-    held = [row["lower"] <= truth[n] <= row["upper"] for n, row in table.iterrows()]
-    return {"cell": cell, "held": float(np.mean(held))}
+    cell = list(CELLS)[case % len(CELLS)]
+    held = CELLS[cell](case)
+    return {"cell": cell, "held": float(np.mean(held)) if len(held) else float("nan")}
+
+
+def _held(truth, table):
+    """Which intervals of a table of parameters hold the truth."""
+    return [row["lower"] <= truth[n] <= row["upper"] for n, row in table.iterrows()]
+
+
+def _drawn(case, pole=0.9, plants=("lag", "mode")):
+    s = Setting.drawn(case, plants)
+    return Setting(s.plant, s.input, s.samples, pole, s.ratio, s.seed)
+
+
+def _plain(case, pole=0.9, **options):
+    s = _drawn(case, pole)
+    return _held(s.model, fq.fit(s.model, measured(s), **options).parameters)
+
+
+def _prior(case):
+    s = _drawn(case)
+    name = s.model.free_parameters[0].name
+    known = s.model.with_prior(**{name: (s.model[name], 10 * s.model[name])})
+    return _held(s.model, fq.fit(known, measured(s)).parameters)
+
+
+def _bounds(case):
+    """A bound half a standard error beside the truth: at it in a third of the runs."""
+    s = _drawn(case)
+    record = measured(s)
+    first = fq.fit(s.model, record).parameters.iloc[0]
+    name = s.model.free_parameters[0].name
+    low = s.model[name] - 0.5 * first["std"]
+    bounded = s.model.with_values(**{name: low + first["std"]}).with_bounds(**{name: (low, np.inf)})
+    return _held(s.model, fq.fit(bounded, record).parameters)
+
+
+def _decimated(case):
+    """Every fifth sample under the hold that it remembers, the fast input kept."""
+    s = _drawn(case)
+    u = np.repeat(s.u(), 5) + 0.3 * fq.white_noise(5 * s.samples, seed=case + 1)
+    slow = fq.simulate(s.model, u, s.dt / 5).decimate(5, keep_input=True)
+    y = slow.y + slow.y.std() / s.ratio * s.noise()
+    return _held(s.model, fq.fit(s.model, dataclasses.replace(slow, y=y)).parameters)
 
 
 def _periodic(case):
     rng = np.random.default_rng([13, case])
     u = np.tile(fq.multisine((1, 40), 1, 0.01, crest="random", seed=case), 9)
-    y = fq.simulate(fq.first_order(b=50.0, a=20.0), u, 0.01, hold="bl").y
+    plant = fq.first_order(b=50.0, a=20.0)
+    y = fq.simulate(plant, u, 0.01, hold="bl").y
     noisy = [x + 0.1 * x.std() * rng.standard_normal(len(x)) for x in (u, y)]
-    return fq.periodic(fq.Record(*noisy, 0.01, hold="bl"), 1.0, skip=1)
+    means = fq.periodic(fq.Record(*noisy, 0.01, hold="bl"), 1.0, skip=1)
+    return _held(plant, fq.fit(plant, means).parameters)
+
+
+def _bare(case):
+    """A response without variance, the same noise at all of its lines."""
+    s = _drawn(case)
+    rng = np.random.default_rng([17, case])
+    f = np.linspace(0.01, 0.45, 150) / s.dt
+    G = s.model.frequency_response(2 * np.pi * f, fq.ZeroOrderHold(s.dt)).response
+    noise = rng.standard_normal(G.shape) + 1j * rng.standard_normal(G.shape)
+    G = G + 0.02 * np.sqrt(np.mean(np.abs(G) ** 2)) * noise
+    frf = fq.FrequencyResponse(f, G, dt=s.dt, hold=fq.ZeroOrderHold(s.dt))
+    return _held(s.model, fq.fit(s.model, frf).parameters)
+
+
+def _local(case):
+    s = _drawn(case)
+    s = Setting(s.plant, "white", s.samples, s.pole, s.ratio, s.seed)
+    frf = fq.local_rational(measured(s))
+    return _held(s.model, fq.fit(s.model, frf, weights="noise").parameters)
+
+
+def _looped(case):
+    s = Setting.drawn(case, ("lag",))
+    plain = measured(s, "feedback")
+    record = fq.Record(plain.u, plain.y, plain.dt, reference=s.u())
+    return _held(s.model, fq.fit(s.model, record).parameters)
+
+
+def _modes(case):
+    """Frequency and damping of a black box's mode, in coloured noise."""
+    s = _drawn(case, plants=("mode",))
+    s = Setting(s.plant, "white", s.samples, s.pole, s.ratio, s.seed)
+    found = fq.fit(fq.OutputError(2), measured(s)).modes()
+    if len(found) != 1:
+        return [False, False]
+    mode = found.iloc[0]
+    truth = {"frequency": 40 / (2 * np.pi), "damping": 0.05}
+    return [abs(mode[n] - v) <= 1.96 * mode[f"{n}_std"] for n, v in truth.items()]
+
+
+def _random(case):
+    """A random plant of order 1 to 6 in white noise, where the data tell it."""
+    plant, record, _, _ = random_experiment(case)
+    table = fq.fit(plant, record).parameters
+    if not (table["std"] < 0.2 * table["value"].abs()).all():
+        return []
+    return _held(plant, table)
+
+
+CELLS = {
+    "white": partial(_plain, pole=0.0),
+    "AR(0.9)": _plain,
+    "weights='noise'": partial(_plain, weights="noise"),
+    "domain='time'": partial(_plain, domain="time"),
+    "prior": _prior,
+    "a bound beside the truth": _bounds,
+    "decimated, kept input": _decimated,
+    "periodic": _periodic,
+    "bare response": _bare,
+    "local_rational, weighted": _local,
+    "through the reference": _looped,
+    "modes of a black box": _modes,
+    "random plants that are told": _random,
+}  # fmt: skip
 
 
 def coverage_rows(table):
