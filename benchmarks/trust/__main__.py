@@ -13,10 +13,11 @@ from pathlib import Path
 from search import store
 from table import show
 
-from . import studies
+from . import loops, studies
 
 PARTS = {
     "coverage": (studies.covered, studies.coverage_rows, 2000 * len(studies.CELLS)),
+    "loops": (loops.one, loops.rows, 40 * len(loops.CELLS)),
     "faults": (studies.named, studies.fault_rows, 200 * len(studies.FAULTS)),
 }
 

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import DataSet, Record
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.heard_back import heard_back
 from freqid.fitting.loop_box import LoopBox
 from freqid.fitting.loop_noise import Loop, LoopShare, loop_scores
+from freqid.fitting.met import met_by
 from freqid.fitting.noise_models import NoiseModel, as_noise_model
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
@@ -26,10 +29,25 @@ from freqid.fitting.witness import Testimony
 from freqid.lti import ZeroOrderHold
 from freqid.models import GreyBox, observed_order
 
-# part of the input's power of which the reference leaves too little to do harm
+# an input of which the reference explains so much stays as it is unless it answers to the noise:
+# what a linear black box of the loop lacks would do more harm
 _WHOLE = 0.995
 # said where that part did harm
 FED_BACK = "the input as it is shows the feedback in what its fit leaves, so that it was not used"
+
+
+@dataclass(frozen=True, eq=False)
+class Through:
+    """Data, those with a reference as it explains them, their ``noise``, notes, and the loops.
+
+    ``unexplained`` is what references leave of inputs (N, m) that stayed as they are, by place.
+    """
+
+    sets: list[DataSet]
+    noise: list[NoiseModel]
+    notes: list[str]
+    loops: list[Loop]
+    unexplained: dict[int, FloatArray]
 
 
 def through_references(
@@ -39,8 +57,8 @@ def through_references(
     reference: object,
     plain: bool,
     apart: bool,
-) -> tuple[list[DataSet], list[NoiseModel], list[str], list[Loop]]:
-    """The data, those with a reference as it explains them, their noise, notes, and the loops.
+) -> Through:
+    """The way through the references of those records that have one.
 
     Experiments that have values of their own are loops ``apart``.
     """
@@ -53,8 +71,10 @@ def through_references(
     seen, noise = list(sets), list(models)
     found: list[Loop] = []
     notes: list[str] = []
+    unexplained: dict[int, FloatArray] = {}
+    way = Through(seen, noise, notes, found, unexplained)
     if reference is False:
-        return seen, noise, notes, found
+        return way
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, d in enumerate(sets):
         if not has[i] or not isinstance(d, Record):
@@ -71,16 +91,27 @@ def through_references(
         groups.setdefault((*alike, i if apart else None), []).append(i)
     for members in groups.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
-        explained, note, loop = _explained(records, _plant_order(model), reference is True)
-        notes.append(note)
-        if loop is not None:
-            found.append(dataclasses.replace(loop, places=members))
+        explained, share, loop, order = _explained(records, _plant_order(model))
+        if share > _WHOLE and reference is not True:
+            notes.append(
+                f"the reference explains {100 * share:.4g} % of the input's power: the loop brings "
+                "next to no noise into it, and the input was fitted as it is; reference=True goes "
+                "through the reference all the same"
+            )
+            for i, record, known in zip(members, records, explained, strict=True):
+                unexplained[i] = record.inputs - known.inputs
+            continue
+        notes.append(
+            f"fitted through the reference: a black box of order {order} explains "
+            f"{100 * share:.3g} % of the input's power by it; "
+            "reference=False fits the input as it is"
+        )
+        found.append(dataclasses.replace(loop, places=members))
         for i, record in zip(members, explained, strict=True):
-            changed = record is not seen[i]
             seen[i] = record
-            if plain and changed:
+            if plain:
                 noise[i] = as_noise_model("noise", record)
-    return seen, noise, notes, found
+    return way
 
 
 def with_loop_noise(
@@ -100,24 +131,29 @@ def with_loop_noise(
     return dataclasses.replace(est, problem=minimum, uncertainty=spread), share
 
 
-def fed_back(est: Estimate, loops: Sequence[Loop]) -> bool:
+def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
     """Whether what inputs that were fitted as they are leave shows the feedback, and all could be
     fitted through their references.
     """
-    direct = sum(len(loop.places) for loop in loops) < len(est.data)
+    direct = sum(len(loop.places) for loop in way.loops) < len(est.data)
     could = (isinstance(d, Record) and d.reference is not None and d.factor == 1 for d in est.data)
-    return direct and all(could) and "feedback" in [w.kind for w in est.warnings]
+    if not direct or not all(could):
+        return False
+    for place, unexplained in way.unexplained.items():
+        record = readings[place].data
+        assert isinstance(record, Record)
+        left = errors_of(met_by(est, readings[place]), readings[place]).in_time()
+        if heard_back(left, unexplained, float(np.mean(record.inputs**2))):
+            return True
+    return "feedback" in [w.kind for w in est.warnings]
 
 
-def _explained(
-    records: Sequence[Record], order: int, always: bool
-) -> tuple[list[Record], str, Loop | None]:
-    """Records of one loop with what the reference explains of their input, and a sentence on it.
+def _explained(records: Sequence[Record], order: int) -> tuple[list[Record], float, Loop, int]:
+    """Records of one loop with what the reference explains of their input, the share of its power
+    that this is, the loop, and its order.
 
     ``order`` is that of the plant; the loop's is chosen between that and some more by the minimum
-    description length. Unless ``always`` an input that the reference explains nearly whole stays as
-    it is: so little noise biases nothing, and what a linear black box of the loop lacks would.
-    Raises InputError where no black box of the loop can be fitted.
+    description length. Raises InputError where no black box of the loop can be fitted.
     """
     first = records[0]
     # like units, so that neither end rules the other
@@ -138,19 +174,7 @@ def _explained(
             dataclasses.replace(record, u=explained.reshape(record.u.shape), reference=None)
         )
     share = 1 - left / max(power, 1e-300)
-    if share > _WHOLE and not always:
-        note = (
-            f"the reference explains {100 * share:.4g} % of the input's power: the loop brings "
-            "next to no noise into it, and the input was fitted as it is; reference=True goes "
-            "through the reference all the same"
-        )
-        return list(records), note, None
-    note = (
-        f"fitted through the reference: a black box of order {box.order} explains "
-        f"{100 * share:.3g} % of the input's power by it; "
-        "reference=False fits the input as it is"
-    )
-    return seen, note, Loop(box.chart, box.found.x, box.readings, size, ())
+    return seen, share, Loop(box.chart, box.found.x, box.readings, size, ()), box.order
 
 
 def _loop(record: Record, size: np.ndarray) -> Record:

@@ -152,14 +152,13 @@ def fit(
     models = _noise_models(weights, data, sets)
     own = (separate,) if isinstance(separate, str) else tuple(listed("separate", separate))
     plain = weights is None
-    seen, models, notes, loops = through_references(
-        sets, models, model, reference, plain, bool(own)
-    )
+    way = through_references(sets, models, model, reference, plain, bool(own))
+    notes = way.notes
     readings: Sequence[Reading] = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late, i
         )
-        for i, (d, noise) in enumerate(zip(seen, models, strict=True))
+        for i, (d, noise) in enumerate(zip(way.sets, way.noise, strict=True))
     ]
     if error == "log":
         readings = [_logarithmic(r, model) for r in readings]
@@ -174,8 +173,8 @@ def fit(
     if offset is not None:
         notes += offsets(est, readings)
     share = None
-    if loops:
-        est, share = with_loop_noise(est, readings, loops)
+    if way.loops:
+        est, share = with_loop_noise(est, readings, way.loops)
     given: dict[str, Any] = {
         "hold": asked_hold, "band": band, "weights": weights, "initial_state": initial_state,
         "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
@@ -188,7 +187,7 @@ def fit(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes, *est.notes],
     )  # fmt: skip
-    if reference != "auto" or near or not fed_back(est, loops):
+    if reference != "auto" or near or not fed_back(est, readings, way):
         return est
     given |= {"reference": True, "separate": own, "progress": progress}
     through = fit(asked_model, given_sets, **given)

@@ -48,8 +48,7 @@ def test_disturbing_torques_are_no_fault_and_no_bias(torque):
 
 
 def test_an_input_as_it_is_stays_where_no_feedback_is_seen():
-    record = disturbed(1, 0.0, 1e-3)
-    est = fq.fit(PLANT, record)
+    est = fq.fit(PLANT, disturbed(1, 0.0, 0.0))
     assert any("as it is; reference=True" in note for note in est.notes)
     again = fq.fit(PLANT, disturbed(1, 0.005))
     assert any("shows the feedback" in note for note in again.notes)

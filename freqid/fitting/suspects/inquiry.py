@@ -153,7 +153,7 @@ class Inquiry:
         # a fault that explains what is left leaves no room for a loop
         poles = self.model.poles
         runaway = bool((poles.real > 0).any()) and not self.model.dt
-        alike = "unlike experiments" not in merged
+        alike = "unlike experiments" not in merged and self.share is None
         if not alike or (ranked[0].name not in ("another mode", "feedback") and not runaway):
             return ranked
         loop = looped(self, scene, LEVEL / max(len(self.asked), 1))

@@ -150,6 +150,9 @@ def feedback(scene: Scene, model: Model) -> Columns | None:
     """
     if any(s.record is None for s in scene.seen) or (isinstance(model, GreyBox) and model.late):
         return None
+    if scene.share is not None:
+        # what a reference explains of an input answers to nothing else
+        return None
     ahead = [_shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
     past = [_shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
     return Columns(ahead, beside=past)

@@ -1,0 +1,47 @@
+"""Whether what a fit leaves comes back in its input: feedback, heard beside the reference.
+
+In a loop what a reference leaves of the input is the controller's answer to the plant's own noise,
+and goes together with what a direct fit leaves at every frequency; where nothing is fed back the
+two are strangers. Their squared coherence γ² in n segments that do not overlap then exceeds x with
+the chance (1 − x)ⁿ⁻¹ (Carter, Proc. IEEE 75, 1987), whatever the colour of both, and Fisher's sum
+over the frequencies tells them together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from freqid.checks import FloatArray
+
+# segments, and the least samples of one
+_SEGMENTS, _LEAST = 24, 16
+# of the lines that a Hann window makes alike every third counts
+_APART = 3
+# level at which the two are no strangers, and part of the input's power that is but rounding
+_LEVEL, _NOTHING = 1e-4, 1e-12
+
+
+def heard_back(left: FloatArray, unexplained: FloatArray, power: float) -> bool:
+    """Whether what is ``left`` of the outputs (N, p) comes back in what is ``unexplained`` of the
+    inputs (N, m), whose whole ``power`` is known.
+    """
+    N = min(len(left), len(unexplained))
+    length = max(N // _SEGMENTS, _LEAST)
+    count = N // length
+    if count < 4:
+        return False
+    inputs = [d for d in unexplained.T if np.mean(d**2) > _NOTHING * power]
+    chances = [_chance(e, d, length) for e in left.T for d in inputs if e.any()]
+    return bool(chances) and min(chances) * len(chances) < _LEVEL
+
+
+def _chance(a: FloatArray, b: FloatArray, length: int) -> float:
+    """That of such a coherence between strangers."""
+    whole = {"nperseg": length, "noverlap": 0, "window": "hann"}
+    _, squared = scipy.signal.coherence(a, b, **whole)
+    # none of the ends, whose lines are real
+    told = np.clip(squared[1:-1:_APART], 0, 1 - 1e-12)
+    count = min(len(a), len(b)) // length
+    statistic = -2 * (count - 1) * np.log1p(-told).sum()
+    return float(scipy.stats.chi2.sf(statistic, 2 * len(told)))
