@@ -28,6 +28,9 @@ from freqid.fitting.witness import Testimony
 from freqid.lti import Hold, InputHolds, StateSpace, ZeroOrderHold, rounding, sentence
 from freqid.models import GreyBox
 
+# rates less far apart cost no fit as many digits as are worth a word
+_APART = 1e4
+
 
 @fits(GreyBox)
 def fit_grey_box(
@@ -163,7 +166,8 @@ def _rounding(plant: StateSpace, hold: Hold, reading: Reading) -> tuple[float, s
     if isinstance(hold, InputHolds) or not len(omega):
         return 0.0, ""
     low = omega[omega > 0].min(initial=np.inf)
-    lost = rounding(plant, hold, np.geomspace(low, omega.max(), 3) if low < np.inf else omega[:0])
+    at = np.geomspace(low, omega.max(), 3) if low < np.inf else omega[:0]
+    lost = rounding(plant, hold, at, _APART)
     return lost, sentence(plant, lost) if lost else ""
 
 

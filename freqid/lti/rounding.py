@@ -24,13 +24,14 @@ _APART, _CLOSE = 100.0, 1e-3
 _LINES = 6
 
 
-def rounding(plant: StateSpace, hold: Hold, omega: FloatArray) -> float:
+def rounding(plant: StateSpace, hold: Hold, omega: FloatArray, apart: float = _APART) -> float:
     """Largest relative change of the response at omega (rad/s), and of what a hold samples, as
     entries of A move by a few last digits: no algorithm can promise better.
 
-    States whose rates lie many decades apart leave little to the slow ones where they are mixed.
+    States whose rates lie many decades apart leave little to the slow ones where they are mixed;
+    nothing is asked of those less than ``apart`` times apart.
     """
-    if not len(plant.A) or not len(omega) or not _delicate(plant.A):
+    if not len(plant.A) or not len(omega) or not _delicate(plant.A, apart):
         return 0.0
     # entries of one size are of one parameter: a spring pulls both masses alike
     own = np.unique(np.abs(plant.A), return_inverse=True)[1].reshape(plant.A.shape)
@@ -75,7 +76,7 @@ def sentence(plant: StateSpace, lost: float) -> str:
     )
 
 
-def _delicate(A: FloatArray) -> bool:
+def _delicate(A: FloatArray, apart: float) -> bool:
     """Whether rates lie so far apart, or so close, that entries may not tell them well."""
     poles = np.linalg.eigvals(A)
     size = np.abs(poles)
@@ -83,7 +84,7 @@ def _delicate(A: FloatArray) -> bool:
     if not np.isfinite(largest) or largest == 0 or len(A) == 1:
         return False
     gaps = np.abs(poles[:, None] - poles) + largest * np.eye(len(A))
-    return bool(size.min() * _APART < largest or gaps.min() < _CLOSE * largest)
+    return bool(size.min() * apart < largest or gaps.min() < _CLOSE * largest)
 
 
 def _seen(plant: StateSpace, hold: Hold, omega: FloatArray) -> list[tuple[Array, float]]:

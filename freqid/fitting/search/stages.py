@@ -94,8 +94,11 @@ class Search:
         self._best, tried = found.solution, found.n_starts
         least = "none" if self.guide.bound is None else f"{self.guide.bound.cost:.6g}"
         _LOG.debug("first start: cost %.6g, of a black box %s", found.solution.cost, least)
-        more = self._together if self.guide.rounds else self._one_by_one
-        ends = iter(()) if self._done(found, rule) else more(start, rule, seed)
+        ends: Iterator[Visit] = iter(())
+        if not self._done(found, rule):
+            # targets of rounds take their time, and most fits need none
+            more = self._together if self.guide.rounds else self._one_by_one
+            ends = more(start, rule, seed)
         for count, visits, solution, ended in ends:
             tried += count
             found = dataclasses.replace(
