@@ -152,15 +152,13 @@ def difference(parts: Sequence[Values], whole: FloatArray) -> Difference:
         if not kept.any():
             continue
         x = (part.values - whole)[kept]
-        H = np.linalg.pinv(part.covariance[np.ix_(kept, kept)], hermitian=True)
+        H = _inverse(part.covariance[np.ix_(kept, kept)])
         information[np.ix_(kept, kept)] += H
         moment[kept] += H @ x
         square += float(x @ H @ x)
         degrees += int(kept.sum())
     told = np.diag(information) > 0
-    size = np.sqrt(np.where(told, np.diag(information), 1.0))
-    scaled = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
-    square -= float((moment / size) @ scaled @ (moment / size))
+    square -= float(moment @ _inverse(information) @ moment)
     degrees -= int(told.sum())
     values = np.array([part.values for part in parts])
     variance = np.array([np.diag(part.covariance) for part in parts])
@@ -178,6 +176,14 @@ def difference(parts: Sequence[Values], whole: FloatArray) -> Difference:
     return Difference(
         len(parts), shift, percent, scatter, square / max(degrees, 1), degrees, freedom
     )
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """That of a symmetric matrix whose rows may have any units; zero where it has none."""
+    size = np.sqrt(np.where(np.diag(matrix) > 0, np.diag(matrix), 1.0))
+    units = np.outer(size, size)
+    inverse: FloatArray = np.linalg.pinv(matrix / units, hermitian=True) / units
+    return inverse
 
 
 def compared(est: Estimate, found: Sequence[tuple[str, Sequence[Estimate | None]]]) -> pd.DataFrame:

@@ -98,6 +98,8 @@ def spread(est: Estimate) -> Table:
 
 def correlations(est: Estimate) -> Table:
     """Pairs of parameters that the data hardly tell apart, the closest first."""
+    if len(est.names) > _ROWS:
+        return Table([], [], len(est.names))
     C = est.correlation.to_numpy()
     pairs = np.argwhere(np.triu(np.abs(C) > _CORRELATED, 1))
     pairs = pairs[np.argsort(-np.abs(C[pairs[:, 0], pairs[:, 1]]), kind="stable")]
