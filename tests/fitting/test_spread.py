@@ -92,6 +92,17 @@ def test_black_boxes_have_their_modes_compared():
     assert row["widened"] > row["std"]
 
 
+def test_a_pole_that_channels_share_is_one_mode():
+    rng = np.random.default_rng(1)
+    one = _record(K, 3, n=1500)
+    both = fq.Record(one.u, np.column_stack([one.y, 2 * one.y]) + 0.02 * rng.standard_normal(
+        (1500, 2)), 0.01)  # fmt: skip
+    spread = fq.fit(fq.TransferFunction(1, 2), both, band=(1, 40)).spread
+    assert {"frequency 1"} <= set(spread.loc["record halves"].index)
+    assert "frequency 2" not in spread.loc["record halves"].index
+    assert (spread["widened"] == spread["std"]).all()
+
+
 def test_weights_and_values_of_their_own_are_parted_too():
     data = [_record(K, 9), _record(1.02 * K, 10)]
     weighted = fq.fit(MODE, data, weights="noise").spread

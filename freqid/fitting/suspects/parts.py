@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import Record, StampedRecord
+from freqid.data import Record, StampedRecord, as_band
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.estimate import Estimate
@@ -113,8 +113,8 @@ def _within(reading: Reading, low: float, high: float, last: bool) -> Reading:
     """The lines of a reading between two frequencies in Hz."""
     plain = reading.at_lines() if reading.in_time else reading
     if plain.band is not None:
-        low, high = max(low, plain.band[0]), min(high, plain.band[1])
-    return _at_fewer_lines(plain, plain.with_(band=(low, high)), last)
+        low, high = max(low, plain.band.low), min(high, plain.band.high)
+    return _at_fewer_lines(plain, plain.with_(band=as_band((low, high), np.inf)), last)
 
 
 def fitted_apart(

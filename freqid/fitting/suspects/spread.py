@@ -39,6 +39,8 @@ _STRAIGHT, _ELSEWHERE = 2.0, 1e-9
 _DAMPED = 0.5
 # what a mode has
 _QUANTITIES = ("frequency", "damping")
+# digits to which two modes are the same
+_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +201,8 @@ def compared(est: Estimate, found: Sequence[tuple[str, Sequence[Estimate | None]
     else:
         own = est.modes()
         own = own[np.abs(own["damping"]) < 1]
+        # a pole that several channels share is one mode
+        own = own[~own[[*_QUANTITIES]].round(_DIGITS).duplicated()]
         names = [f"{q} {i + 1}" for i in range(len(own)) for q in _QUANTITIES]
         values = own[[*_QUANTITIES]].to_numpy(float).ravel()
         std = own[[f"{q}_std" for q in _QUANTITIES]].to_numpy(float).ravel()
