@@ -32,8 +32,13 @@ from freqid.models import GreyBox, observed_order
 # an input of which the reference explains so much stays as it is unless it answers to the noise:
 # what a linear black box of the loop lacks would do more harm
 _WHOLE = 0.995
-# said where that part did harm
-FED_BACK = "the input as it is shows the feedback in what its fit leaves, so that it was not used"
+# and one of which it explains so little has another reference
+_NOTHING = 0.02
+# said where the rest of the input did harm
+FED_BACK = (
+    "what a fit to the input as it is leaves goes together with what the reference leaves of it: "
+    "the noise comes back through a loop, or the input was measured with noise; it was not used"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +97,12 @@ def through_references(
     for members in groups.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
         explained, share, loop, order = _explained(records, _plant_order(model))
+        if share < _NOTHING and reference is not True:
+            notes.append(
+                f"the reference explains {100 * share:.2g} % of the input's power: it comes too "
+                "late, or belongs to another input, and the input was fitted as it is"
+            )
+            continue
         if share > _WHOLE and reference is not True:
             notes.append(
                 f"the reference explains {100 * share:.4g} % of the input's power: the loop brings "
@@ -137,7 +148,7 @@ def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
     """
     direct = sum(len(loop.places) for loop in way.loops) < len(est.data)
     could = (isinstance(d, Record) and d.reference is not None and d.factor == 1 for d in est.data)
-    if not direct or not all(could):
+    if not direct or not all(could) or not way.unexplained:
         return False
     for place, unexplained in way.unexplained.items():
         record = readings[place].data

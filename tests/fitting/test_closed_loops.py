@@ -51,12 +51,12 @@ def test_an_input_as_it_is_stays_where_no_feedback_is_seen():
     est = fq.fit(PLANT, disturbed(1, 0.0, 0.0))
     assert any("as it is; reference=True" in note for note in est.notes)
     again = fq.fit(PLANT, disturbed(1, 0.005))
-    assert any("shows the feedback" in note for note in again.notes)
+    assert any("goes together with what the reference leaves" in note for note in again.notes)
     assert "reference=True" in str(again.call)
 
 
 def test_records_of_which_one_has_no_reference_are_fitted_as_they_are():
-    """What shows the feedback was sent through references that not all have."""
+    """They were sent through references that not all have."""
     with_one = disturbed(1, 0.005)
     without = fq.Record(with_one.u, with_one.y, DT)
     est = fq.fit(PLANT, [with_one, without], n_starts=1)

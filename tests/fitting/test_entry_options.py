@@ -66,8 +66,31 @@ def test_little_noise_in_a_loop_is_heard_in_the_input():
     off = []
     for seed in range(8):
         est = fq.fit(LAG, in_a_loop(seed, level=0.003))
-        assert "shows the feedback" in est.notes[0]
+        assert "goes together with what the reference leaves" in est.notes[0]
         off.append((est["a"] - 20) / est.parameters.loc["a", "std"])
+    assert np.sqrt(np.mean(np.square(off))) < 2
+
+
+def test_a_reference_that_comes_too_late_is_none():
+    """It was fitted through all the same, with a thousand times the error bar."""
+    u = fq.white_noise(1500, seed=4)
+    record = fq.simulate(LAG, u, DT).with_noise(0.02, seed=5)
+    est = fq.fit(LAG, fq.Record(u, record.y, DT, reference=np.r_[np.zeros(3), u[:-3]]))
+    assert "too late" in est.notes[0]
+    assert est["a"] == pytest.approx(20, rel=0.02)
+    assert est.verdict.trusted
+
+
+def test_noise_of_the_input_sensor_is_no_bias_where_there_is_a_reference():
+    off = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        r = fq.white_noise(1500, seed=seed)
+        y = fq.simulate(LAG, r, DT).with_noise(0.01, seed=seed).y
+        u = r + 0.05 * rng.standard_normal(1500)
+        est = fq.fit(LAG, fq.Record(u, y, DT, reference=r))
+        assert "measured with noise" in est.notes[0]
+        off.append((est["b"] - 50) / est.parameters.loc["b", "std"])
     assert np.sqrt(np.mean(np.square(off))) < 2
 
 
