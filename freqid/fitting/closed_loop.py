@@ -148,7 +148,8 @@ def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
     """
     direct = sum(len(loop.places) for loop in way.loops) < len(est.data)
     could = (isinstance(d, Record) and d.reference is not None and d.factor == 1 for d in est.data)
-    if not direct or not all(could) or not way.unexplained:
+    timed = any(r.in_time for r in readings)
+    if not direct or not all(could) or timed or not way.unexplained:
         return False
     for place, unexplained in way.unexplained.items():
         record = readings[place].data

@@ -151,7 +151,9 @@ def fit(
     })  # fmt: skip
     models = _noise_models(weights, data, sets)
     own = (separate,) if isinstance(separate, str) else tuple(listed("separate", separate))
-    plain = weights is None
+    # samples in time have no weights
+    timed = domain == "time" or initial_state == "zero"
+    plain = weights is None and not timed
     way = through_references(sets, models, model, reference, plain, bool(own))
     notes = way.notes
     readings: Sequence[Reading] = [

@@ -76,6 +76,15 @@ class Inquired(Protocol):
         ...
 
 
+def between_parts(rows: Sequence[tuple[object, ...]] = ()) -> pd.DataFrame:
+    """The table of ``Estimate.spread``; empty, with its columns, where there is nothing to tell."""
+    import pandas as pd
+
+    columns = ["between", "parameter", "parts", "value", "shift", "percent", "p_value", "std",
+               "widened"]  # fmt: skip
+    return pd.DataFrame(rows, columns=columns).set_index(["between", "parameter"])
+
+
 @dataclass(frozen=True)
 class Evidence:
     """What the warnings are read from.

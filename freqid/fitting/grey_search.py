@@ -134,6 +134,9 @@ def _searched(
         start = beside.begun(structure, start)
     elif beside is None and structure.model.delay_sources:
         start = begun_slowly(structure, readings, start)
+    if known is None and (start != structure.start).any():
+        # what the black box's delays lead to has to stand beside the user's own
+        known = structure.start
     few = cast("Sequence[SpectralExperiment]", scout.experiments)
 
     def deepened(x: FloatArray) -> Guide | None:

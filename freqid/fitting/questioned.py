@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from freqid.fitting.findings import Finding, Inquired
+from freqid.fitting.findings import Finding, Inquired, between_parts
 from freqid.fitting.grades import Verdict, verdict
 from freqid.fitting.search.verdict import Witness
 
@@ -75,6 +75,6 @@ class Questioned:
         the standard error by the parts' own scatter where that is more than noise (p < 0.001).
         Source: Birge, Physical Review 40, 1932.
         """
-        import pandas as pd
-
-        return pd.DataFrame() if self.inquiry is None else self.inquiry.spread(self)  # type: ignore[arg-type]
+        if self.inquiry is None:
+            return between_parts()
+        return self.inquiry.spread(self)  # type: ignore[arg-type]

@@ -76,6 +76,21 @@ def test_the_witness_of_a_late_drivetrain():
     assert fq.fit(fq.drivetrain(2), record).witness.verdict == "lacking"
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_delay_in_a_local_response_never_costs_more_than_its_start(seed):
+    """The black box's delay took the place of the start: a cost of 26,000 where the start has 7."""
+    late = fq.GreyBox(
+        lambda b, a, T: ([[-a]], [[b]], [[1.0]], None),
+        [fq.Parameter("b", 100.0), fq.Parameter("a", 100.0), fq.Parameter("T", 0.0023)],
+        input_delay="T",
+    )
+    record = fq.simulate(late, fq.white_noise(2000, seed=seed), 1e-3)
+    record = record.with_noise(0.02 * record.y.std(), seed=seed + 1)
+    est = fq.fit(late, fq.local_rational(record))
+    assert est["T"] == pytest.approx(0.0023, abs=5e-5)
+    assert est["a"] == pytest.approx(100, rel=0.02)
+
+
 def test_an_output_that_comes_before_the_input_is_named():
     record = late_record(0, 600)
     early = fq.Record(record.u[:-20], record.y[20:], DT)

@@ -94,6 +94,18 @@ def test_noise_of_the_input_sensor_is_no_bias_where_there_is_a_reference():
     assert np.sqrt(np.mean(np.square(off))) < 2
 
 
+@pytest.mark.parametrize("options", [{"domain": "time"}, {"initial_state": "zero"}])
+def test_records_with_a_reference_are_fitted_in_time_too(options):
+    """Their way through it was given weights, which samples in time have not."""
+    rng = np.random.default_rng(3)
+    r = scipy.signal.lfilter([0.3], [1, -0.7], fq.white_noise(1500, seed=3))
+    y = fq.simulate(LAG, r, DT).with_noise(0.01, seed=3).y
+    record = fq.Record(r + 0.02 * r.std() * rng.standard_normal(1500), y, DT, reference=r)
+    for reference in ("auto", True):
+        est = fq.fit(LAG, record, reference=reference, **options)
+        assert est["a"] == pytest.approx(20, rel=0.05)
+
+
 def test_an_actuator_that_adds_noise_of_its_own_is_no_loop():
     """What its reference does not explain of an input excites, where it is measured."""
     said = 0

@@ -112,10 +112,24 @@ def test_weights_and_values_of_their_own_are_parted_too():
     assert set(apart.index.get_level_values(1)) == {"z", "g"}
 
 
-def test_estimates_without_data_have_no_parts():
-    est = fq.fit(MODE, _record(K, 11))
-    assert len(fq.fit(MODE, fq.simulate(MODE, fq.white_noise(400), 0.01)).spread) >= 0
-    assert est.spread.equals(est.spread)
+def test_what_a_prior_knows_is_not_widened_by_parts_that_are_not_told_it():
+    given = MODE.with_prior(g=(1.0, 1e-5))
+    data = [_record(K, 31), _record(1.03 * K, 32)]
+    rows = fq.fit(given, data).spread.loc["experiments"]
+    assert rows.loc["w", "widened"] > 2 * rows.loc["w", "std"]
+    assert rows.loc["g", "widened"] < 3 * rows.loc["g", "std"]
+
+
+def test_without_data_or_noise_the_table_is_empty_with_its_columns(tmp_path):
+    est = fq.fit(MODE, [_record(K, 11), _record(1.1 * K, 12)])
+    columns = list(est.spread.columns)
+    est.save(tmp_path / "est.json")
+    clean = fq.simulate(MODE, fq.white_noise(400), 0.01)
+    others = fq.load(tmp_path / "est.json"), fq.fit(MODE, clean), fq.fit(fq.OutputError(2), clean)
+    for other in others:
+        assert other.spread.empty
+        assert list(other.spread.columns) == columns
+        assert list(other.spread.index.names) == ["between", "parameter"]
 
 
 def test_experiments_that_share_no_resonance_are_named():

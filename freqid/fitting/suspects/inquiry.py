@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import InputError
-from freqid.fitting.findings import Finding, Severity
+from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
 from freqid.fitting.suspects.beyond import looped, one_more_mode, unlike
@@ -244,10 +244,8 @@ class Inquiry:
     @in_one_blas_thread
     def spread(self, est: Estimate) -> pd.DataFrame:
         """How far its numbers move between parts of the data; see ``Estimate.spread``."""
-        import pandas as pd
-
-        if est.problem is None:
-            return pd.DataFrame()
+        if est.problem is None or est.minimum.exact:
+            return between_parts()
         parted = partings(self.readings, self.scene, len(est.values))
         found = [(p.between, fitted_apart(self.model, self.minimum, p.parts)) for p in parted]
         return compared(est, found)

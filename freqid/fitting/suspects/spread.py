@@ -17,6 +17,7 @@ import scipy
 from freqid.checks import FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.findings import between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.parts import fitted_apart, record_halves, widths
 from freqid.fitting.uncertainty.evenness import is_white
@@ -57,7 +58,8 @@ class Difference:
     """How far values (P,) of parts lie from one another.
 
     ``shift`` is the largest difference of two in standard errors of that difference, ``percent``
-    the same of the value; ``scatter`` the standard error of a mean as the parts themselves tell it.
+    the same of the value; ``scatter`` the standard error of a mean as the parts themselves tell it,
+    ``own`` the same as their noise does.
     NaN where fewer than two parts tell a value. ``statistic`` (F) on ``degrees`` and ``freedom``,
     with its ``p_value``, takes all values together.
     """
@@ -66,6 +68,7 @@ class Difference:
     shift: FloatArray
     percent: FloatArray
     scatter: FloatArray
+    own: FloatArray
     statistic: float
     degrees: int
     freedom: int
@@ -164,7 +167,7 @@ def difference(parts: Sequence[Values], whole: FloatArray) -> Difference:
     degrees -= int(told.sum())
     values = np.array([part.values for part in parts])
     variance = np.array([np.diag(part.covariance) for part in parts])
-    shift, percent, scatter = (np.full(P, np.nan) for _ in range(3))
+    shift, percent, scatter, own = (np.full(P, np.nan) for _ in range(4))
     for i in range(P):
         x, v = (a[np.isfinite(values[:, i]), i] for a in (values, variance))
         if len(x) < 2:
@@ -173,10 +176,11 @@ def difference(parts: Sequence[Values], whole: FloatArray) -> Difference:
         shift[i] = apart.max()
         percent[i] = 100 * np.ptp(x) / max(abs(whole[i]), 1e-300)
         weight = 1 / v / np.sum(1 / v)
+        own[i] = np.sqrt(1 / np.sum(1 / v))
         scatter[i] = np.sqrt(np.sum(weight * (x - weight @ x) ** 2) / (len(x) - 1))
     freedom = sum(part.freedom for part in parts)
     return Difference(
-        len(parts), shift, percent, scatter, square / max(degrees, 1), degrees, freedom
+        len(parts), shift, percent, scatter, own, square / max(degrees, 1), degrees, freedom
     )
 
 
@@ -190,8 +194,6 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 def compared(est: Estimate, found: Sequence[tuple[str, Sequence[Estimate | None]]]) -> pd.DataFrame:
     """A row for each kind of parts and each value; see ``Estimate.spread``."""
-    import pandas as pd
-
     grey = isinstance(est.model, GreyBox)
     if grey:
         names = [n for n in est.names if "[" not in n]
@@ -216,15 +218,16 @@ def compared(est: Estimate, found: Sequence[tuple[str, Sequence[Estimate | None]
     wide = std.copy()
     for _, d in differences:
         if d.p_value < LEVEL:
-            wide = np.fmax(wide, d.scatter)
+            # where a prior, which no part is told, knows more than the data these move little
+            told = np.minimum(std / d.own, 1) ** 4
+            more = np.nan_to_num(told * np.maximum(d.scatter**2 - d.own**2, 0))
+            wide = np.maximum(wide, np.sqrt(std**2 + more))
     rows = [
         (between, name, d.parts, values[i], d.shift[i], d.percent[i], d.p_value, std[i], wide[i])
         for between, d in differences
         for i, name in enumerate(names)
     ]
-    columns = ["between", "parameter", "parts", "value", "shift", "percent", "p_value", "std",
-               "widened"]  # fmt: skip
-    return pd.DataFrame(rows, columns=columns).set_index(["between", "parameter"])
+    return between_parts(rows)
 
 
 def modes_moved(model: Model, minimum: Minimum, readings: Sequence[Reading]) -> float:
