@@ -21,6 +21,16 @@ def test_every_fault_is_mostly_named_and_seldom_trusted(studies, tmp_path):
     assert (tmp_path / "faults.png").stat().st_size > 10_000
 
 
+def test_loops_under_several_controllers(benchmarks):
+    from trust import loops
+
+    table = pd.DataFrame([loops.one(case) for case in (0, 4, 9, 14, 19, 23)])
+    # six fits with two or three parameters: errors of one standard error, not of three
+    assert table["square"].mean() < 3
+    assert (table["grade"] == "trust").sum() >= 5
+    assert len(list(loops.rows(table))) == table.groupby(["plant", "noise"]).ngroups
+
+
 def test_every_cell_of_the_coverage_runs(studies):
     table = pd.DataFrame([studies.covered(case) for case in range(len(studies.CELLS))])
     assert set(table["cell"]) == set(studies.CELLS)
