@@ -17,6 +17,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError, whole
 from freqid.data import (
     FrequencyResponse,
+    LocalResponse,
     Record,
     Reference,
     as_band,
@@ -67,7 +68,7 @@ def local_polynomial(
     >>> import freqid as fq
     >>> record = fq.simulate(fq.first_order(), fq.white_noise(4000), 1e-3)
     >>> local_polynomial(record, band=(1, 100))
-    <FrequencyResponse 1x1: 397 lines, 1-100 Hz, dt=0.001 s>
+    <LocalResponse 1x1: 397 lines, 1-100 Hz, dt=0.001 s>
     """
     return _estimate(records, order, 0, band, width, reference)
 
@@ -117,7 +118,10 @@ def _estimate(
         spectrum = (np.abs(lines.U[..., lines.wanted]) ** 2).mean(axis=0)
     else:
         local = _through(local, sets[0].n_inputs)
-    return measured(sets[0], lines.frequency[lines.wanted], *local, spectrum, reach=form.width - 1)
+    frf = measured(
+        sets[0], lines.frequency[lines.wanted], *local[:3], spectrum, reach=form.width - 1
+    )
+    return LocalResponse(**frf.__dict__, line_noise=local.noise)
 
 
 def _told_apart(lines: Lines, first: Record) -> None:
@@ -215,10 +219,10 @@ def _lines(
 
 def _through(local: Local, m: int) -> Local:
     """From reference to [y; u] to the plant: G = G_yr G_ur⁻¹, and its variance to first order."""
-    Z, variance, share = local
+    Z, variance, share, _ = local
     p = Z.shape[1] - m
     back = np.linalg.inv(Z[:, p:])
     G = Z[:, :p] @ back
     # δG = (δG_yr − G δG_ur) G_ur⁻¹; output and input noise are taken as unrelated
     each = variance[:, :p] + np.abs(G) ** 2 @ variance[:, p:]
-    return Local(G, each @ np.abs(back) ** 2, share[:, :p, :1].repeat(m, axis=-1))
+    return Local(G, each @ np.abs(back) ** 2, share[:, :p, :1].repeat(m, axis=-1), None)

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from freqid.data import LineNoise
+from freqid.frf.local_fits import Solution, fitted
 
 # windows that are worked on at once
 _BLOCK = 256
@@ -19,6 +21,8 @@ _BLOCK = 256
 _LINES_A_WINDOW = 24
 # windows from which the noise that a width costs is judged
 _JUDGED = 24
+# numbers that are kept of how the noise of lines gets into a response, at the most
+_KEPT = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,14 @@ class Form(NamedTuple):
 
 
 class Local(NamedTuple):
-    """G (L, outputs, inputs), its variance, and the share of the output that is not noise."""
+    """G (L, outputs, inputs), its variance, the share of the output that is not noise, and how that
+    noise gets into G, None where it is too much to keep.
+    """
 
     response: ComplexArray
     variance: FloatArray
     share: FloatArray
+    noise: LineNoise | None
 
 
 class _Equations(NamedTuple):
@@ -52,7 +59,7 @@ class _Equations(NamedTuple):
 
     ``forced`` (W, n, inputs·(R + 1)) are U times powers of r, ``free`` (W, n, E·(R + 1)) those of
     the transients, ``bends`` (W, n, poles) the powers that multiply −Y; ``outputs`` is (W, n, p).
-    ``gain`` (p, W, inputs) undoes the scaling of a response.
+    ``gain`` (p, W, inputs) undoes the scaling of a response, ``size`` (W, p) that of an output.
     """
 
     forced: ComplexArray
@@ -60,26 +67,7 @@ class _Equations(NamedTuple):
     bends: FloatArray
     outputs: ComplexArray
     gain: FloatArray
-
-
-class _Solution(NamedTuple):
-    """Unknowns x (W, q) of one output: numerators, transients, denominator.
-
-    ``spread`` (W, q) is the variance of each for noise of variance 1, ``residual`` is (W, n),
-    ``freedom`` (W,) the equations less the unknowns that the window tells.
-    """
-
-    x: ComplexArray
-    spread: FloatArray
-    residual: ComplexArray
-    freedom: FloatArray
-
-
-class _Noise(NamedTuple):
-    """Noise (W,) of one output in its scaled equations, and the variance (W, inputs) of G(0)."""
-
-    power: FloatArray
-    variance: FloatArray
+    size: FloatArray
 
 
 def local_models(lines: Lines, form: Form) -> Local:
@@ -89,18 +77,26 @@ def local_models(lines: Lines, form: Form) -> Local:
     served = max(form.width // _LINES_A_WINDOW, 1)
     own = centres[np.minimum(np.arange(0, len(centres), served) + served // 2, len(centres) - 1)]
     members = np.minimum(np.arange(len(own) * served), len(centres) - 1).reshape(-1, served)
+    shape = lines.Y.shape[1], lines.U.shape[1], len(lines.U)
+    known = len(centres) * form.width * np.prod(shape) <= _KEPT
     parts = []
     for start in range(0, len(own), _BLOCK):
         run = slice(start, start + _BLOCK)
         near = (centres[members[run]] - own[run, None]) / (form.width / 2)
         equations = _laid_out(lines, own[run], form)
-        each = []
-        for output in range(lines.Y.shape[1]):
-            solution = _solved(equations, output)
-            noise = _noise(equations, output, solution)
-            each.append(_evaluated(equations, output, solution, noise, near, form))
+        each = [_evaluated(equations, output, near, form) for output in range(shape[0])]
         parts.append([np.stack(x, axis=1) for x in zip(*each, strict=True)])
-    return Local(*(np.concatenate(x)[: len(centres)] for x in zip(*parts, strict=True)))
+        if not known:
+            parts[-1][3] = parts[-1][3][:, :, :0]
+    G, variance, share, rows, power = (np.concatenate(x) for x in zip(*parts, strict=True))
+    shown = G[: len(centres)], variance[: len(centres)], share[: len(centres)]
+    if not known:
+        return Local(*shown, None)
+    K = len(lines.frequency)
+    first = _first(own, form, K).repeat(served)[: len(centres)]
+    nearest = np.searchsorted((own[1:] + own[:-1]) / 2, np.arange(K))
+    rows = rows[: len(centres)].reshape(len(centres), *shape, form.width)
+    return Local(*shown, LineNoise(first, rows, power[nearest].T))
 
 
 def inflation(lines: Lines, form: Form) -> float:
@@ -109,17 +105,21 @@ def inflation(lines: Lines, form: Form) -> float:
     centres = centres[np.unique(np.linspace(0, len(centres) - 1, _JUDGED).astype(int))]
     equations = _laid_out(lines, centres, form)
     worst = np.zeros(len(centres))
+    forced = slice(0, equations.forced.shape[-1], form.order + 1)
     for output in range(lines.Y.shape[1]):
-        forced = _solved(equations, output).spread[:, : equations.forced.shape[-1]]
-        worst = np.maximum(worst, forced[:, :: form.order + 1].max(axis=1))
+        rows = _fitted(equations, output).rows[:, forced]
+        worst = np.maximum(worst, (np.abs(rows) ** 2).sum(axis=2).max(axis=1))
     return float(np.quantile(worst * equations.outputs.shape[1], 0.9))
+
+
+def _first(centres: IntArray, form: Form, K: int) -> IntArray:
+    """First lines of windows around centres: at the ends of the data they are shifted inwards."""
+    return np.clip(centres - form.width // 2, 0, K - form.width)
 
 
 def _laid_out(lines: Lines, centres: IntArray, form: Form) -> _Equations:
     """Scale the signals of a window around each centre, and lay out its equations' columns."""
-    # at the ends of the data windows are shifted inwards
-    first = np.clip(centres - form.width // 2, 0, len(lines.frequency) - form.width)
-    at = first[:, None] + np.arange(form.width)
+    at = _first(centres, form, len(lines.frequency))[:, None] + np.arange(form.width)
     offsets = (at - centres[:, None]) / (form.width / 2)
     U, u_size = _scaled(lines.U[..., at])  # (E, m, W, w)
     Y, y_size = _scaled(lines.Y[..., at])  # (E, p, W, w)
@@ -135,6 +135,7 @@ def _laid_out(lines: Lines, centres: IntArray, form: Form) -> _Equations:
         np.tile(offsets[..., None] ** np.arange(1, form.poles + 1), (1, E, 1)),
         np.moveaxis(Y, (0, 1, 2, 3), (1, 3, 0, 2)).reshape(W, E * w, Y.shape[1]),
         (y_size[:, None] / u_size).swapaxes(1, 2),
+        y_size.T,
     )
 
 
@@ -146,50 +147,42 @@ def _scaled(X: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     return X / size[None, :, :, None], size
 
 
-def _solved(equations: _Equations, output: int) -> _Solution:
-    """Least squares by QR; directions that a window does not excite stay at zero."""
-    b = equations.outputs[..., output]
-    A = np.concatenate([equations.forced, equations.free, -b[..., None] * equations.bends], axis=-1)
-    Q, T = np.linalg.qr(A)
-    diagonal = np.abs(np.einsum("Wqq->Wq", T))
-    weak = diagonal <= 1e-13 * diagonal.max(axis=1, keepdims=True)
-    T = T + np.einsum("Wq,qr->Wqr", np.where(weak, 1e30, 0.0), np.eye(T.shape[-1]))
-    inverse = np.linalg.inv(T)
-    x = np.einsum("Wqr,Wr->Wq", inverse, np.einsum("Wnq,Wn->Wq", Q.conj(), b))
-    return _Solution(
-        x,
-        (np.abs(inverse) ** 2).sum(axis=-1),
-        b - np.einsum("Wnq,Wq->Wn", A, x),
-        A.shape[1] - A.shape[2] + weak.sum(axis=1),
-    )
-
-
-def _noise(equations: _Equations, output: int, solution: _Solution) -> _Noise:
-    """What the residuals tell of the noise, and that in the numerators' first coefficients."""
-    power = (np.abs(solution.residual) ** 2).sum(axis=1) / solution.freedom
-    gain, forced = equations.gain[output], equations.forced.shape[-1]
-    first = solution.spread[:, : forced : forced // gain.shape[1]]
-    return _Noise(power, power[:, None] * first * gain**2)
+def _fitted(equations: _Equations, output: int) -> Solution:
+    known = np.concatenate([equations.forced, equations.free], axis=-1)
+    return fitted(known, equations.bends, equations.outputs[..., output])
 
 
 def _evaluated(
-    equations: _Equations,
-    output: int,
-    solution: _Solution,
-    noise: _Noise,
-    near: FloatArray,
-    form: Form,
-) -> Local:
-    """One output's model at the lines (W, s) that each window serves, (W·s, inputs)."""
-    gain = equations.gain[output]
+    equations: _Equations, output: int, near: FloatArray, form: Form
+) -> tuple[ComplexArray, FloatArray, FloatArray, ComplexArray, FloatArray]:
+    """One output's model at the lines (W, s) that each window serves.
+
+    Response, variance and share are (W·s, inputs), what each line of the window adds to the
+    response is (W·s, inputs, n), and the noise of the output's lines is (W,).
+    """
+    solution, gain = _fitted(equations, output), equations.gain[output]
     (W, s), m = near.shape, gain.shape[1]
-    numerators = solution.x[:, : equations.forced.shape[-1]].reshape(W, m, form.order + 1)
-    above = np.einsum("Wsk,Wmk->Wsm", near[..., None] ** np.arange(form.order + 1), numerators)
-    below = np.ones((W, s), complex)
+    powers = near[..., None] ** np.arange(form.order + 1)
+    end = equations.forced.shape[-1]
+    above = np.einsum("Wsk,Wmk->Wsm", powers, solution.x[:, :end].reshape(W, m, -1))
+    rows = np.einsum(
+        "Wsk,Wmkn->Wsmn", powers, solution.rows[:, :end].reshape(W, m, *powers.shape[2:], -1)
+    )
+    below = np.ones((W, s, 1), complex)
     if form.poles:
         bends = near[..., None] ** np.arange(1, form.poles + 1)
-        below = below + np.einsum("Wsk,Wk->Ws", bends, solution.x[:, -form.poles :])
-    G = above / below[..., None] * gain[:, None]
-    variance = noise.variance[:, None] / np.abs(below[..., None]) ** 2
-    share = np.broadcast_to(np.clip(1 - noise.power, 0, 1)[:, None, None], G.shape)
-    return Local(*(x.reshape(W * s, m) for x in (G, variance, share)))
+        below = below + np.einsum("Wsk,Wk->Ws", bends, solution.x[:, -form.poles :])[..., None]
+        turned = np.einsum("Wsk,Wkn->Wsn", bends, solution.rows[:, -form.poles :])
+        rows = rows - (above / below)[..., None] * turned[:, :, None]
+    G = above / below * gain[:, None]
+    rows = rows / below[..., None] * gain[:, None, :, None]
+    power = (np.abs(solution.residual) ** 2).sum(axis=1) / solution.freedom
+    variance = power[:, None, None] * (np.abs(rows) ** 2).sum(axis=3)
+    share = np.broadcast_to(np.clip(1 - power, 0, 1)[:, None, None], G.shape)
+    size = equations.size[:, output]
+    rows = rows / size[:, None, None, None]
+    return (
+        *(x.reshape(W * s, m) for x in (G, variance, share)),
+        rows.reshape(W * s, m, -1),
+        power * size**2,
+    )

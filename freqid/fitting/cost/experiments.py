@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
-from freqid.data import FrequencyResponse
+from freqid.data import FrequencyResponse, LineNoise, LocalResponse
 from freqid.fitting.cost.evaluation import SpectralEvaluation, SumOfEvaluations
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf import Spectra
@@ -72,9 +72,10 @@ class SpectralExperiment:
     ``lift`` inputs of one slow period stand in turn for each input of the plant; a ``discrete``
     model's matrices are taken as they are. ``n_rows`` counts real values. The noise of a
     ``response`` need not be alike at lines that are neighbours, and may go together within the
-    ``reach`` of some lines. ``added`` (q, rows) are shapes of unknown size in the output, the
-    noise's past and offsets of the sensor, which are eliminated with the initial state. ``place``
-    is the number of the experiment where these differ in more than their data.
+    ``reach`` of some lines, as ``line_noise`` says where that is known. ``added`` (q, rows) are
+    shapes of unknown size in the output, the noise's past and offsets of the sensor, which are
+    eliminated with the initial state. ``place`` is the number of the experiment where these differ
+    in more than their data.
     """
 
     lines: Lines
@@ -86,6 +87,7 @@ class SpectralExperiment:
     discrete: bool = False
     response: bool = False
     reach: int = 0
+    line_noise: LineNoise | None = None
     added: FloatArray | None = None
     place: int = 0
 
@@ -143,7 +145,8 @@ class SpectralExperiment:
         scale = np.broadcast_to(np.sqrt(weights), frf.response.shape)
         lines = Lines.weighted(frf.omega, frf.omega[:, None], U, frf.response, scale)
         made = cls.of(lines, hold, None, plane=plane)
-        return dataclasses.replace(made, response=True, reach=frf.reach)
+        known = frf.line_noise if isinstance(frf, LocalResponse) else None
+        return dataclasses.replace(made, response=True, reach=frf.reach, line_noise=known)
 
     def with_offsets(self, n_samples: int) -> SpectralExperiment:
         """The same where a constant of unknown size is added to each output's samples."""
@@ -216,6 +219,7 @@ class SpectralExperiment:
             points=self.points.some(runs(kept, aliases), np.repeat(more, aliases)),
             transient=self.transient and self.transient.some(kept, more),
             added=self._some_added(kept, more),
+            line_noise=None,
         )
 
     def _some_added(self, kept: IntArray, more: FloatArray) -> FloatArray | None:

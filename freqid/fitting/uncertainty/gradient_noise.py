@@ -171,10 +171,18 @@ def _of_response(J: FloatArray, residual: FloatArray, e: SpectralExperiment) -> 
 
     Its size is each line's own, divided by what the fit leaves of it (MacKinnon and White's HC3, J.
     Econometrics 29, 1985): a resonance that few lines tell has noise like none of its neighbours.
-    Within the ``reach`` of a line noise goes together as it does on average.
+    Within the ``reach`` of a line noise goes together as it does on average, or, where that is
+    known, as the local models that made the response take it from the outputs' lines.
     """
     error = residual.view(complex)
     at = J[:, ::2] + 1j * J[:, 1::2]
+    if e.line_noise is not None:
+        p, m = e.n_channels
+        scale = e.lines.scale.reshape(p, m, -1)
+        # noise moves denominators, and what is left is larger than its first order says
+        told = float((scale**2 * e.line_noise.variance).sum())
+        wider = max(float(residual @ residual) / told, 1.0) if told > 0 else 1.0
+        return wider * e.line_noise.along(at.reshape(len(at), p, m, -1) * scale)
     gram = J @ J.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)

@@ -1,0 +1,83 @@
+"""LocalResponse: a response by local models, with what its lines share of the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+
+from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from freqid.data.band import Band, chosen
+from freqid.data.frequency_response import FrequencyResponse
+
+
+@dataclass(frozen=True, eq=False)
+class LineNoise:
+    """How the noise of the outputs' lines gets into a response that local models made of them.
+
+    The error of line k is Σ ``rows`` (K, outputs, inputs, E, w) times the noise of w lines of the
+    outputs' DFT from ``first`` (K,) on, in each of E experiments; ``power`` (outputs, n) is the
+    variance of that noise at the n lines.
+    """
+
+    first: IntArray
+    rows: ComplexArray
+    power: FloatArray
+
+    def some(self, kept: BoolArray) -> LineNoise:
+        """The same of some lines of the response."""
+        return LineNoise(self.first[kept], self.rows[kept], self.power)
+
+    @property
+    def variance(self) -> FloatArray:
+        """That of the response, (outputs, inputs, K), to first order."""
+        at = self.first[:, None] + np.arange(self.rows.shape[-1])
+        told: FloatArray = np.einsum("kpmew,pkw->pmk", np.abs(self.rows) ** 2, self.power[:, at])
+        return told
+
+    def along(self, at: ComplexArray) -> FloatArray:
+        """Covariance (P, P) of Re Σ conj(at)·error, ``at`` being (P, outputs, inputs, K)."""
+        K, p, m, E, w = self.rows.shape
+        n = self.power.shape[1]
+        reached = (self.first[:, None] + np.arange(w))[:, None] + n * np.arange(E)[:, None]
+        total = np.zeros((len(at), len(at)))
+        line = np.repeat(np.arange(K), E * w)
+        for output in range(p):
+            met = np.zeros((len(at), E * n), complex)
+            for i in range(m):
+                entries = self.rows[:, output, i].ravel(), (line, reached.ravel())
+                spread = scipy.sparse.csr_array(entries, shape=(K, E * n))
+                met += at[:, output, i].conj() @ spread
+            total += (met * np.tile(self.power[output], E) @ met.conj().T).real / 2
+        return total
+
+
+class LocalResponse(FrequencyResponse):
+    """A FrequencyResponse whose lines share their noise in a way that is known.
+
+    Attributes:
+        line_noise: how the noise of the outputs' lines gets into it; None where it is not known.
+
+    The other arguments are as in ``FrequencyResponse``. The error bars of a ``fit`` to it count
+    that neighbouring lines err together. Made by ``local_polynomial`` and ``local_rational``.
+    """
+
+    line_noise: LineNoise | None
+
+    def __init__(self, *given: Any, line_noise: LineNoise | None = None, **fields: Any) -> None:
+        super().__init__(*given, **fields)
+        self.__dict__["line_noise"] = line_noise
+
+    def with_conditions(self, **conditions: float) -> LocalResponse:
+        """The same with what was set for it, by name."""
+        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
+        return LocalResponse(**fields)
+
+    def select(self, limits: tuple[float, float]) -> LocalResponse:
+        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
+        kept = super().select(limits)
+        at = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
+        noise = None if self.line_noise is None else self.line_noise.some(at)
+        return LocalResponse(**{**kept.__dict__, "line_noise": noise})

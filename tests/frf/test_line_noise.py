@@ -1,0 +1,81 @@
+"""How the noise of lines gets into local models, and from there into error bars of a fit."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+DT = 0.01
+
+
+def resonance():
+    def mode(w, z, g):
+        return [[0, 1], [-w * w, -2 * z * w]], [[0], [1]], [[g * w * w, 0]], [[0]]
+
+    values = {"w": 40.0, "z": 0.05, "g": 1.0}
+    return fq.GreyBox(mode, [fq.Parameter(n, v) for n, v in values.items()])
+
+
+def noisy(seed, samples=600, level=0.1):
+    clean = fq.simulate(resonance(), fq.white_noise(samples, seed=seed), DT)
+    return clean, clean.with_noise(level * clean.y.std(), seed=seed + 1000)
+
+
+@pytest.mark.parametrize("band", [None, (3.0, 11.0)])
+def test_rows_carry_the_outputs_noise_into_the_response(band):
+    """Local polynomials are linear in the output: the error is the rows times the noise's DFT."""
+    clean, record = noisy(1)
+    exact, frf = (fq.local_polynomial(r, band=band) for r in (clean, record))
+    noise = np.fft.rfft(np.ravel(record.y - clean.y))[1:]
+    known = frf.line_noise
+    # the first of the lines that the windows saw, half a window below the band
+    start = 0 if band is None else np.searchsorted(np.arange(1, 300) / 6.0, 3.0) - known.first[0]
+    start -= 0 if band is None else known.rows.shape[-1] // 2
+    seen = known.first[:, None] + np.arange(known.rows.shape[-1]) + max(start, 0)
+    error = np.sum(known.rows[:, 0, 0, 0] * noise[seen], axis=1)
+    assert np.allclose(error, frf.response[0, 0] - exact.response[0, 0], atol=1e-12)
+    # each window's own noise, or that of the windows around each of its lines
+    assert known.variance.mean() == pytest.approx(frf.variance.mean(), rel=0.2)
+
+
+def test_a_sum_over_lines_has_the_variance_of_dense_algebra():
+    known = fq.local_rational(noisy(2)[1], band=(4.0, 9.0)).line_noise
+    K, n = len(known.first), known.power.shape[1]
+    dense = np.zeros((K, n), complex)
+    for k, (first, row) in enumerate(zip(known.first, known.rows[:, 0, 0, 0], strict=True)):
+        dense[k, first : first + len(row)] = row
+    covariance = dense * known.power[0] @ dense.conj().T
+    at = np.random.default_rng(0).standard_normal((3, K, 2)) @ [1, 1j]
+    direct = (at.conj() @ covariance @ at.T).real / 2
+    assert np.allclose(known.along(at[:, None, None]), direct, rtol=1e-10)
+
+
+def test_lines_that_are_left_keep_their_noise():
+    frf = fq.local_rational(noisy(3)[1])
+    part, asked = frf.select((4.9, 8.1)), frf.with_conditions(q=1.0).select((4.9, 8.1))
+    at = (frf.frequency > 4.9) & (frf.frequency < 8.1)
+    assert np.array_equal(part.line_noise.variance, frf.line_noise.variance[..., at])
+    assert asked.conditions == {"q": 1.0}
+    assert np.array_equal(asked.line_noise.rows, part.line_noise.rows)
+
+
+@pytest.mark.parametrize("estimate", [fq.local_rational, fq.local_polynomial])
+def test_error_bars_of_a_resonance_that_four_lines_tell(estimate):
+    """40 records of six seconds: 95 % intervals hold; with lines counted alone it was 70 %."""
+    model, held, size = resonance(), [], []
+    for seed in range(40):
+        est = fq.fit(model, estimate(noisy(seed)[1]), weights="noise")
+        table, truth = est.parameters, [model[n] for n in est.parameters.index]
+        held.append((table["lower"] <= truth) & (truth <= table["upper"]))
+        size.append((table["value"] - truth) / table["std"])
+    assert 0.89 <= np.mean(held) <= 1
+    assert 0.7 < np.sqrt(np.mean(np.square(size))) < 1.25
+
+
+def test_a_sharp_resonance_keeps_its_height_in_noise():
+    """Equations with noisy outputs in them flatten it: 2 % of damping on average, now below 0.6."""
+    model, found = resonance(), []
+    for seed in range(40):
+        frf = fq.local_rational(noisy(seed, level=0.2)[1])
+        found.append(fq.fit(model, frf, weights="noise")["z"] / 0.05 - 1)
+    assert abs(np.mean(found)) < 3 * np.std(found) / np.sqrt(len(found))
