@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import scipy.sparse
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
 from freqid.data.band import Band, chosen
@@ -39,6 +37,8 @@ class LineNoise:
 
     def along(self, at: ComplexArray) -> FloatArray:
         """Covariance (P, P) of Re Σ conj(at)·error, ``at`` being (P, outputs, inputs, K)."""
+        import scipy.sparse
+
         K, p, m, E, w = self.rows.shape
         n = self.power.shape[1]
         reached = (self.first[:, None] + np.arange(w))[:, None] + n * np.arange(E)[:, None]
@@ -66,8 +66,10 @@ class LocalResponse(FrequencyResponse):
 
     line_noise: LineNoise | None
 
-    def __init__(self, *given: Any, line_noise: LineNoise | None = None, **fields: Any) -> None:
-        super().__init__(*given, **fields)
+    def __init__(
+        self, *given: object, line_noise: LineNoise | None = None, **fields: object
+    ) -> None:
+        super().__init__(*given, **fields)  # type: ignore[arg-type]
         self.__dict__["line_noise"] = line_noise
 
     def with_conditions(self, **conditions: float) -> LocalResponse:
