@@ -28,12 +28,13 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("trust_results"))
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--count", type=int)
+    parser.add_argument("--first", type=int, default=0, help="other cases, as a second run")
     given = parser.parse_args()
     for name in given.parts or PARTS:
         one, summary, count = PARTS[name]
         if given.quick:
             count = max(count // 20, 20)
-        cases = range(min(given.count or count, count))
+        cases = range(given.first, given.first + min(given.count or count, count))
         table = store.resumed(given.out / f"{name}.csv", cases, one)
         for row in summary(table):
             show(*row)

@@ -237,3 +237,42 @@ def test_an_offset_is_not_asked_where_the_band_leaves_it_out():
     assert "drift" in inside.index
     whole = fq.fit(LAG, healthy(3), initial_state="steady").suspects
     assert abs(whole.loc["offset", "size"]) < 0.1
+
+
+def _changed(size, u, noise, seed):
+    """A lag whose gain changes in the middle of the record; its state goes on."""
+    first, last = fq.first_order(b=50.0, a=20.0), fq.first_order(b=50.0 * (1 + size), a=20.0)
+    half = len(u) // 2
+    early, late = np.where(np.arange(len(u)) < half, u, 0), np.where(np.arange(len(u)) < half, 0, u)
+    # what each half of the input does, under the gain of its time
+    y = fq.simulate(first, early, 0.01).y + fq.simulate(last, late, 0.01).y
+    return fq.Record(u, y, 0.01).with_noise(noise * y.std(), seed=seed)
+
+
+@pytest.mark.parametrize("u", [
+    fq.white_noise(1000, seed=3), fq.chirp(0.5, 30, 10, 0.01), np.resize(fq.prbs(9, 0.01), 1000),
+], ids=["white", "chirp", "prbs"])  # fmt: skip
+def test_a_plant_that_changes_midway_is_named(u):
+    """Trusted before: nothing compared the halves of a record, but est.spread when asked for."""
+    model = fq.first_order(b=50.0, a=20.0)
+    est = fq.fit(model, _changed(0.1, u, 0.03, 1))
+    assert est.warnings[0].kind == "unsteady"
+    assert est.verdict.grade == "doubt"
+    # the halves fitted apart say the same
+    halves = est.spread.loc["record halves"]
+    assert halves["p_value"].min() < 1e-3
+    told = est.suspects.loc["unsteady", "size"]
+    assert told == pytest.approx(0.1, rel=0.25)
+
+
+def test_halves_of_good_data_are_alike():
+    """200 records of a lag in white and slow noise: the test's p-values are those of chance."""
+    model, found = fq.first_order(b=50.0, a=20.0), []
+    for seed in range(200):
+        record = _changed(0.0, fq.white_noise(600, seed=seed), 0.0, 1)
+        rng = np.random.default_rng(seed)
+        pole = 0.9 * (seed % 2)
+        v = scipy.signal.lfilter([1], [1, -pole], rng.standard_normal(1100))[500:]
+        noisy = fq.Record(record.u, record.y + 0.1 * record.y.std() * v / v.std(), 0.01)
+        found.append(fq.fit(model, noisy).suspects.loc["unsteady", "p_value"])
+    assert scipy.stats.kstest(found, "uniform").pvalue > 0.01

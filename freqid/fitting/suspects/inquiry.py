@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 # tests that are answered by one fit with another hold
 _HOLDS = ("hold", "hold period")
+# what a loop may look like
+_LOOSELY = ("another mode", "feedback")
 # part of one more mode's gain at which something simpler is believed instead
 _AS_MUCH = 0.8
 # part of a gain that is as much, and which of two is the likelier then
@@ -148,13 +150,18 @@ class Inquiry:
         ranked = [*equal, *(a for a in ranked if a not in equal)]
         if ranked[0].name == "another mode":
             enough = _AS_MUCH * ranked[0].test.gain
-            simple = [a for a in ranked[1:] if a.test.gain >= enough]
+            simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name != "unsteady"]
             ranked = [*simple, *(a for a in ranked if a not in simple)]
+        if ranked[0].name == "unsteady":
+            # to a sweep whatever the model lacks is a change between its halves
+            first = ranked[0]
+            ranked.sort(key=lambda a: a is first or a.test.chi < first.test.chi)
+        ranked = [a for i, a in enumerate(ranked) if i == 0 or a.name != "unsteady"]
         # a fault that explains what is left leaves no room for a loop
         poles = self.model.poles
         runaway = bool((poles.real > 0).any()) and not self.model.dt
         alike = "unlike experiments" not in merged and self.share is None
-        if not alike or (ranked[0].name not in ("another mode", "feedback") and not runaway):
+        if not alike or (ranked[0].name not in _LOOSELY and not runaway):
             return ranked
         loop = looped(self, scene, LEVEL / max(len(self.asked), 1))
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
@@ -238,6 +245,9 @@ class Inquiry:
             what = words(a.name, a.test.size, a.unit, a.detail)
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
         small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS
+        if a.name == "unsteady":
+            # halves that differ leave the mean of both where it is
+            small = bool(a.unit) and abs(a.test.size) < _HOLDS_GOOD
         severity: Severity = "minor" if small else "serious"
         return Finding(a.name, text, severity, float(a.test.statistic))
 

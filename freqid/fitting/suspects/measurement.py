@@ -6,7 +6,8 @@ import numpy as np
 
 from freqid.checks import FloatArray
 from freqid.fitting.suspects.register import Columns, suspect
-from freqid.fitting.suspects.scene import Scene, Seen
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.seen import Seen
 from freqid.models import Model
 
 # samples at one extreme value that make it look like a limit, and the part of the range it is
@@ -77,15 +78,8 @@ def _whitened(scene: Scene, number: int, s: Seen) -> FloatArray:
     """What is left as signals (outputs, N), each line in units of the noise around it."""
     first = sum(len(t.left) for t in scene.seen[:number])
     noise = np.sqrt(np.maximum(scene.variance[first : first + len(s.left)], 1e-300))
-    record, lines = s.record, s.experiment.lines
-    assert record is not None
-    N = len(record.u) // record.factor
-    X = np.zeros((s.n_outputs, N // 2 + 1), complex)
-    at = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
     # a white signal stays itself: its lines have all one variance
-    X[:, at] = (s.left / noise).view(complex).reshape(s.n_outputs, -1)
-    signals: FloatArray = np.fft.irfft(X, N, axis=-1)
-    return signals
+    return s.signals((s.left / noise).view(complex).reshape(s.n_outputs, -1))
 
 
 @suspect("saturation")
@@ -124,6 +118,30 @@ def amplitude(scene: Scene, model: Model) -> Columns | None:
             for s, level in zip(scene.seen, levels, strict=True)
         ]
     )
+
+
+@suspect("unsteady")
+def unsteady(scene: Scene, model: Model) -> Columns | None:
+    """The parameters of the second half of each record differ from those of the first.
+
+    What a parameter does to the second half alone, as a part of it where it has a name: the little
+    that the first half's motion adds as it dies out is left aside.
+    """
+    if any(s.record is None for s in scene.seen):
+        return None
+    free = ~scene.held
+    size = np.abs(scene.x[free]) if hasattr(scene.structure, "names") else np.ones(free.sum())
+    drawn = [_second_half(s, s.jacobian[free] * size[:, None]) for s in scene.seen]
+    return Columns(drawn, "of it" if hasattr(scene.structure, "names") else "")
+
+
+def _second_half(s: Seen, rows: FloatArray) -> FloatArray:
+    """Rows (c, rows) of what outputs do, of their second half alone."""
+    scale = s.experiment.lines.scale[:, 0]
+    each = rows.view(complex).reshape(len(rows), *scale.shape)
+    signals = s.signals(np.divide(each, scale, out=np.zeros_like(each), where=scale > 0))
+    signals[..., : signals.shape[-1] // 2] = 0
+    return s.sampled(signals)
 
 
 def _level(s: Seen) -> float:

@@ -9,7 +9,8 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data import input_dt
 from freqid.fitting.suspects.register import Columns, suspect
-from freqid.fitting.suspects.scene import Scene, Seen
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.seen import Seen
 from freqid.lti import BandLimited, FirstOrderHold, Hold, PeriodicHold, StateSpace, ZeroOrderHold
 from freqid.models import GreyBox, Model, SystemModel
 

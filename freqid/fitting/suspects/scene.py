@@ -9,14 +9,15 @@ from functools import cached_property
 
 import numpy as np
 
-from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError
-from freqid.data import Record, StampedRecord
+from freqid.checks import BoolArray, FloatArray, InputError
+from freqid.data import StampedRecord
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
+from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.uncertainty.evenness import (
     alike,
     channel_power,
@@ -29,78 +30,10 @@ from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import local_power
 from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom
-from freqid.lti import Plane, directions, sum_runs
-from freqid.models import Model
+from freqid.lti import Plane, directions
 
 # singular values of the Jacobian below this part of the largest are directions left open
 _LOOSE = 1e-7
-# and parts of a signal that are but the rounding of its transform
-_ROUNDING = 1e-13
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """One experiment at the estimate: ``left`` (rows,) of it, orthonormal rows ``free`` (q, rows)
-    that an initial state explains, and the ``jacobian`` (P, rows) without these. ``met`` is the
-    plant where experiments met several.
-    """
-
-    reading: Reading
-    experiment: SpectralExperiment
-    left: FloatArray
-    free: FloatArray
-    jacobian: FloatArray
-    met: Model | None = None
-
-    def own(self, model: Model) -> Model:
-        """The model as this experiment met it."""
-        return self.met or model
-
-    @property
-    def at_rest(self) -> FloatArray:
-        """The data less what an initial state alone explains of them, (rows,)."""
-        lines = self.experiment.lines
-        rows = lines.rows(lines.Y)
-        return rows - (rows @ self.free.T) @ self.free
-
-    @property
-    def omega_input(self) -> FloatArray:
-        """Frequencies of the input in rad/s, (K·M,)."""
-        return self.experiment.lines.omega_input.ravel()
-
-    @property
-    def n_outputs(self) -> int:
-        """Number of outputs."""
-        return self.experiment.lines.Y.shape[0]
-
-    @property
-    def record(self) -> Record | None:
-        """The record, where it is one."""
-        data = self.reading.data
-        return data if isinstance(data, Record) else None
-
-    def answered(self, G: ComplexArray) -> FloatArray:
-        """Rows of what a response (outputs, inputs, K·M) makes of the input, (rows,)."""
-        lines = self.experiment.lines
-        y = np.einsum("pmk,mck->pck", G, lines.U)
-        rows: FloatArray = lines.rows(sum_runs(y, lines.aliases))
-        return rows
-
-    def sampled(self, signals: Array) -> FloatArray:
-        """Rows of signals of the outputs (…, outputs, N) in time, (…, rows)."""
-        lines, record = self.experiment.lines, self.record
-        assert record is not None
-        N = len(record.u) // record.factor
-        at = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
-        spectrum = np.fft.rfft(signals[..., :N], axis=-1)[..., at]
-        # a constant has no line but that at zero: what rounding leaves at others is nothing
-        most = np.abs(signals[..., :N]).sum(axis=-1, keepdims=True)
-        weighted = np.where(np.abs(spectrum) < _ROUNDING * most, 0, spectrum) * lines.scale[:, 0]
-        return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-2], -1)).view(float)
-
-    def without_free(self, columns: FloatArray) -> FloatArray:
-        """Columns (c, rows) less what an initial state explains of them."""
-        return columns - (columns @ self.free.T) @ self.free
 
 
 @dataclass(frozen=True, eq=False)

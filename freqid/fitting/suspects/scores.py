@@ -42,6 +42,11 @@ class Score:
     gain: float
     largest_change: float = float("nan")
 
+    @property
+    def chi(self) -> float:
+        """What it explains in units of the noise, on all its degrees of freedom together."""
+        return self.statistic * self.degrees
+
 
 @dataclass(frozen=True)
 class Asked:

@@ -19,6 +19,7 @@ _CURES = {
     "feedback": "the record is of a closed loop: give it its reference, or excite it by one",
     "unlike experiments": "fit them apart and compare; find out what has changed between them",
     "amplitude": "the plant is not linear: identify it at the level at which it will work",
+    "unsteady": "see est.spread, fit the halves apart, and find out what has changed",
     "another mode": "give the model one more mode, or narrow the band",
 }
 
@@ -35,6 +36,7 @@ def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
 def words(name: str, size: float, unit: str, detail: str) -> str:
     """What a suspect says of the data, in words."""
     number = f"{size:.3g}{unit}"
+    halves = f" by {100 * abs(size):.3g} % of a parameter" if unit else ""
     return {
         "delay": f"the input acts {size:.3g} s later than the model says",
         "feedthrough": f"the input reaches an output at once, by {number}",
@@ -45,5 +47,6 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
         "amplitude": "the parameters change with the level of the input",
+        "unsteady": f"the second half of the record differs from the first{halves}",
         "another mode": "a black box with one mode more explains the data better",
     }[name]
