@@ -23,7 +23,7 @@ PLANTS = {
 }  # fmt: skip
 INPUTS = ("white", "chirp", "prbs", "multisine")
 FAULTS = ("none", "delay", "feedthrough", "hold rejected", "offset", "drift", "spikes",
-          "saturation", "another mode", "unlike experiments", "feedback")  # fmt: skip
+          "saturation", "another mode", "unlike experiments", "unsteady", "feedback")  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,9 +103,25 @@ def measured(s, fault="none"):
         first = s.model.free_parameters[0].name if s.plant != "two-mass" else "k"
         other = fq.simulate(s.model.with_values(**{first: 1.1 * s.model[first]}), u, dt).y
         return [fq.Record(u, y, dt), fq.Record(u, other + level * s.noise(1), dt)]
+    elif fault == "unsteady":
+        y = _changed(s, u) + level * s.noise()
     elif fault == "feedback":
         u, y = _looped(s, u, clean.std())
     return fq.Record(u, y, dt)
+
+
+def _changed(s, u, size=0.1):
+    """The plant's first parameter, or its stiffness, changes midway; its state goes on."""
+    name = s.model.free_parameters[0].name if s.plant != "two-mass" else "k"
+    after = s.model.with_values(**{name: (1 + size) * s.model[name]})
+    middle, x, y = len(u) // 2, None, []
+    for model, part in ((s.model, u[:middle]), (after, u[middle:])):
+        A, B, C, D = model.state_space()
+        A, B, C, D, _ = scipy.signal.cont2discrete((A, B, C, D), s.dt)
+        _, y_part, states = scipy.signal.dlsim((A, B, C, D, 1), part, x0=x)
+        x = A @ states[-1] + B[:, 0] * part[-1]
+        y.append(y_part[:, 0])
+    return np.concatenate(y)
 
 
 def _looped(s, r, size):

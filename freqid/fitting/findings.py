@@ -71,6 +71,10 @@ class Inquired(Protocol):
         """Sentences on those that are no chance."""
         ...
 
+    def between_halves(self, est: Estimate) -> list[Finding]:
+        """Modes of a black box that differ between halves of its data."""
+        ...
+
     def spread(self, est: Estimate) -> pd.DataFrame:
         """How far the numbers of an estimate move between parts of its data."""
         ...

@@ -38,6 +38,8 @@ _STEPS = 80
 _FAR = 0.3
 # a chart is left for one around its own optimum this often at most
 _CHARTS = 5
+# how far inside of the unit circle a pole of a stable start lies at the least
+_EDGE = 1e-9
 
 
 @fits(OutputError, black_box=True)
@@ -87,6 +89,7 @@ def _nested(
     """The minimum of an order, not above that of the order below with one pole more."""
 
     def begun(start: StateSpace) -> Descent:
+        start = _within_circle(start) if spec.stable else start
         return _descend(Chart(start, spec.feedthrough, plane, dt, stable=spec.stable), lines)
 
     options = spec.feedthrough, spec.stable
@@ -112,6 +115,12 @@ def _nested(
         seen = np.column_stack([C, np.linalg.norm(C, axis=1)])
         tried.append(begun(inputs_of(lines, wider, seen, spec.feedthrough)))
     return min(tried, key=lambda t: t[1].cost)
+
+
+def _within_circle(start: StateSpace) -> StateSpace:
+    """The same where rounding has put a pole that may not leave the unit circle on it."""
+    radius = float(np.abs(np.linalg.eigvals(start.A)).max(initial=0.0))
+    return start if radius < 1 else start._replace(A=start.A * ((1 - _EDGE) / radius))
 
 
 def _enough_lines(

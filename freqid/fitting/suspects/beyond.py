@@ -15,10 +15,11 @@ from freqid.fitting.black_box.output_error import fit_output_error
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.suspects import plant
-from freqid.fitting.suspects.parts import fitted_apart, widths
+from freqid.fitting.suspects.parts import Parting, each, record_halves, widths
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, score
@@ -59,6 +60,10 @@ class Asking(Protocol):
     @property
     def share(self) -> Share | None:
         """What errors of inputs that a reference explained add."""
+        ...
+
+    def apart(self, parting: Parting) -> list[Estimate | None]:
+        """Fits to each part of the data alone."""
         ...
 
 
@@ -140,32 +145,48 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     change = float(np.max(np.abs(steps[most]) / np.maximum(np.abs(x), 1e-300)))
     test = Score(f, degrees, p, size, 1.0, largest, gain, change)
     stepped = [Asked("unlike experiments", test, "relative", p)]
-    return _fitted_apart(inquiry, scene) or stepped if p > _SURELY else stepped
+    if p <= _SURELY or len(scene.seen) > _APART:
+        return stepped
+    parted = _fitted_apart(inquiry, scene, each(inquiry.readings), "unlike experiments")
+    return stepped if parted is None else [parted]
 
 
-def _fitted_apart(inquiry: Asking, scene: Scene) -> list[Asked]:
-    """Experiments fitted apart, where more is left of them than their own noise.
+def midway(inquiry: Asking, scene: Scene, asked: Sequence[Asked]) -> list[Asked]:
+    """All that was asked, with halves of the records fitted apart where more is left than noise:
+    one step is too short for a resonance that has moved by more than its width.
+    """
+    told = min((a.p_value for a in asked if a.name == "unsteady"), default=1.0)
+    halves = record_halves(inquiry.readings, len(inquiry.minimum.x))
+    if told <= _SURELY or halves is None:
+        return [*asked]
+    moved = _fitted_apart(inquiry, scene, halves, "unsteady")
+    if moved is None or told <= moved.p_value:
+        return [*asked]
+    return [*(a for a in asked if a.name != moved.name), moved]
+
+
+def _fitted_apart(inquiry: Asking, scene: Scene, parting: Parting, name: str) -> Asked | None:
+    """Parts of the data fitted apart, where more is left of them than their own noise.
 
     One step from what lies between two sharp resonances tells nothing of either.
     """
-    structure, count = inquiry.minimum.structure, len(scene.seen)
+    structure = inquiry.minimum.structure
     if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
-        return []
-    if count > _APART or not isinstance(inquiry.model, GreyBox):
-        return []
+        return None
+    if not isinstance(inquiry.model, GreyBox):
+        return None
     floor = noise_floor([s.experiment for s in scene.seen])
     if scene.cost <= _NOISY * floor:
-        return []
-    found = fitted_apart(inquiry.model, inquiry.minimum, [[r] for r in inquiry.readings])
-    fits = [f for f in found if f is not None and f.converged]
-    if len(fits) < count:
-        return []
+        return None
+    fits = [f for f in inquiry.apart(parting) if f is not None and f.converged]
+    if len(fits) < len(parting.parts):
+        return None
     whole = inquiry.minimum.x * structure.scale
     wider = widths(inquiry.minimum)
     named = dict(zip(structure.names, whole, strict=True))
     apart = difference([told_by(f, named, wider) for f in fits], whole)
     if apart.degrees < 1:
-        return []
+        return None
     with np.errstate(all="ignore"):
         std = np.sqrt(np.diag(inquiry.minimum.covariance)) * np.abs(structure.scale)
         moved = np.abs(np.array([f.values for f in fits]) - whole) / std
@@ -175,7 +196,7 @@ def _fitted_apart(inquiry: Asking, scene: Scene) -> list[Asked]:
     shift = float(np.nanmax(np.where(np.isfinite(moved), moved, np.nan), initial=0.0))
     statistic, degrees, p = apart.statistic, apart.degrees, apart.p_value
     test = Score(statistic, degrees, p, size, 1.0, shift, gain, size)
-    return [Asked("unlike experiments", test, "relative", p)]
+    return Asked(name, test, "relative", p)
 
 
 def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:

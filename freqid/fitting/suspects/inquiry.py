@@ -15,14 +15,15 @@ from freqid.checks import InputError
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
-from freqid.fitting.suspects.beyond import looped, one_more_mode, unlike
-from freqid.fitting.suspects.parts import fitted_apart, partings
+from freqid.fitting.suspects.beyond import looped, midway, one_more_mode, unlike
+from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
+from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, score
 from freqid.fitting.suspects.sentences import sentence, words
-from freqid.fitting.suspects.spread import compared, modes_moved
+from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
@@ -48,8 +49,6 @@ _WORTH, _SAID = 0.5, 3
 _SMALL, _HARMLESS = 0.3, 1e-3
 # level at which an input is heard at all, and the part of the output left that means trouble
 _HEARD, _MOST_LEFT = 1e-3, 0.3
-# relative change of a black box's modes between halves of the data that is none
-_HOLDS_GOOD = 0.01
 # part of the data's energy that is nothing
 _NOTHING = 1e-5
 # the files whose suspects are known
@@ -67,6 +66,17 @@ class Inquiry:
     readings: Sequence[Reading]
     # what the inputs' own errors add, where a reference explained them
     share: Share | None = None
+
+    @cached_property
+    def _apart(self) -> dict[str, list[Estimate | None]]:
+        return {}
+
+    def apart(self, parting: Parting) -> list[Estimate | None]:
+        """Fits to each part of the data alone, made once."""
+        if parting.between not in self._apart:
+            found = fitted_apart(self.model, self.minimum, parting.parts)
+            self._apart[parting.between] = found
+        return self._apart[parting.between]
 
     @cached_property
     def scene(self) -> Scene | None:
@@ -97,6 +107,7 @@ class Inquiry:
                 p = 1 - (1 - t.p_value) ** c.trials if t.p_value > 1e-9 else t.p_value * c.trials
                 found.append(Asked(name, t, c.unit, min(p, 1.0), c.detail, c.trials))
         found += unlike(self, scene)
+        found = midway(self, scene, found)
         found += one_more_mode(self, scene)
         return sorted(found, key=lambda a: self._evidence(scene, a), reverse=True)
 
@@ -200,8 +211,9 @@ class Inquiry:
         if isinstance(self.model, GreyBox) or not said or said[0].name in _LIKELY:
             return found
         # the unknowns of a black box have no standard errors that mean anything: its modes have
-        moved = modes_moved(self.model, self.minimum, self.readings)
-        if not moved < _HOLDS_GOOD:
+        halves = confirming(self.readings)
+        moved = np.nan if halves is None else modes_moved(self.model, self.apart(halves))
+        if not moved < HOLDS_GOOD:
             return found
         text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
         return [
@@ -247,7 +259,7 @@ class Inquiry:
         small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS
         if a.name == "unsteady":
             # halves that differ leave the mean of both where it is
-            small = bool(a.unit) and abs(a.test.size) < _HOLDS_GOOD
+            small = bool(a.unit) and abs(a.test.size) < HOLDS_GOOD
         severity: Severity = "minor" if small else "serious"
         return Finding(a.name, text, severity, float(a.test.statistic))
 
@@ -257,8 +269,18 @@ class Inquiry:
         if est.problem is None or est.minimum.exact:
             return between_parts()
         parted = partings(self.readings, self.scene, len(est.values))
-        found = [(p.between, fitted_apart(self.model, self.minimum, p.parts)) for p in parted]
-        return compared(est, found)
+        return compared(est, [(p.between, self.apart(p)) for p in parted])
+
+    @in_one_blas_thread
+    def between_halves(self, est: Estimate) -> list[Finding]:
+        """Whether modes of a black box, which no witness watches, move between halves."""
+        if isinstance(self.model, GreyBox) or est.problem is None or est.minimum.exact:
+            return []
+        halves = confirming(self.readings, len(est.values))
+        if halves is None or not est.converged:
+            return []
+        found = modes_differ(est, halves, self.apart(halves))
+        return [] if found is None else [found]
 
     @in_one_blas_thread
     def table(self) -> pd.DataFrame:

@@ -8,7 +8,7 @@ from freqid.checks import FloatArray
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
-from freqid.models import Model
+from freqid.models import GreyBox, Model
 
 # samples at one extreme value that make it look like a limit, and the part of the range it is
 _AT_LIMIT, _NEAR = 4, 1e-9
@@ -130,9 +130,9 @@ def unsteady(scene: Scene, model: Model) -> Columns | None:
     if any(s.record is None for s in scene.seen):
         return None
     free = ~scene.held
-    size = np.abs(scene.x[free]) if hasattr(scene.structure, "names") else np.ones(free.sum())
+    size = np.abs(scene.x[free]) if isinstance(model, GreyBox) else np.ones(free.sum())
     drawn = [_second_half(s, s.jacobian[free] * size[:, None]) for s in scene.seen]
-    return Columns(drawn, "of it" if hasattr(scene.structure, "names") else "")
+    return Columns(drawn, "of it" if isinstance(model, GreyBox) else "")
 
 
 def _second_half(s: Seen, rows: FloatArray) -> FloatArray:

@@ -22,6 +22,7 @@ from freqid.models import GreyBox, Model
 
 # what parts of the data there are, by what lies between them
 EXPERIMENTS, HALVES, BANDS = "experiments", "record halves", "band halves"
+HALF_EACH = "halves of the experiments"
 # experiments of one fit that are fitted apart at the most
 _MOST = 40
 # samples, or lines, that a half has at the least for each unknown
@@ -39,11 +40,16 @@ class Parting:
 def partings(readings: Sequence[Reading], scene: Scene | None, unknowns: int) -> Iterator[Parting]:
     """Every way in which the data can be parted and are enough in each part."""
     if 1 < len(readings) <= _MOST:
-        yield Parting(EXPERIMENTS, [[r] for r in readings])
+        yield each(readings)
     if (halves := record_halves(readings, unknowns)) is not None:
         yield halves
     if (bands := _band_halves(readings, scene, unknowns)) is not None:
         yield bands
+
+
+def each(readings: Sequence[Reading]) -> Parting:
+    """Every experiment alone."""
+    return Parting(EXPERIMENTS, [[r] for r in readings])
 
 
 def record_halves(readings: Sequence[Reading], unknowns: int = 1) -> Parting | None:
@@ -52,6 +58,15 @@ def record_halves(readings: Sequence[Reading], unknowns: int = 1) -> Parting | N
         if not isinstance(r.data, Record) or r.data.n_samples < 2 * _ENOUGH * unknowns:
             return None
     return Parting(HALVES, [[_half(r, first) for r in readings] for first in (True, False)])
+
+
+def confirming(readings: Sequence[Reading], unknowns: int = 1) -> Parting | None:
+    """Two halves that see what the whole sees: of the experiments where there are several, each
+    repeat in turn, since a sweep shows other modes in its second half; else of the record.
+    """
+    if len(readings) > 1:
+        return Parting(HALF_EACH, [readings[::2], readings[1::2]])
+    return record_halves(readings, unknowns)
 
 
 def _half(reading: Reading, first: bool) -> Reading:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from freqid.fitting.suspects.scores import Score
 
 # the cure of each
-_CURES = {
+CURES = {
     "delay": "give the model an input_delay, a number or a free parameter",
     "hold rejected": "use hold='estimate', or the hold that the converter had",
     "feedthrough": (
@@ -30,7 +30,7 @@ def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
     moved = ""
     if 0 < test.largest_shift < float("inf"):
         moved = f"; it moves parameters by up to {test.largest_shift:.2g} standard errors"
-    return f"{what} ({certain}){moved}; {_CURES[kind]}"
+    return f"{what} ({certain}){moved}; {CURES[kind]}"
 
 
 def words(name: str, size: float, unit: str, detail: str) -> str:

@@ -18,13 +18,12 @@ from freqid.checks import FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import between_parts
-from freqid.fitting.reading import Reading
-from freqid.fitting.suspects.parts import fitted_apart, record_halves, widths
+from freqid.fitting.suspects.parts import widths
 from freqid.fitting.uncertainty.evenness import is_white
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import local_power
-from freqid.models import GreyBox, Model
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,9 +34,7 @@ _TOLD = 0.3
 LEVEL = 1e-3
 # a parabola this many times above the cost is none; level below which other values are no chance:
 # a mode that may lie anywhere explains some peak of the noise
-_STRAIGHT, _ELSEWHERE = 2.0, 1e-9
-# poles with more damping than this are no modes
-_DAMPED = 0.5
+_STRAIGHT, ELSEWHERE = 2.0, 1e-9
 # what a mode has
 _QUANTITIES = ("frequency", "damping")
 # digits to which two modes are the same
@@ -114,15 +111,15 @@ def _bent(est: Estimate, whole: Mapping[str, float]) -> float:
     if point is None:
         return 1.0
     true = max(point.cost - minimum.point.cost, 0.0)
-    noise, P = _loudest(minimum), len(there)
+    noise, P = loudest(minimum), len(there)
     level = float(scipy.stats.f.sf(true / noise / P, P, minimum.freedom))
-    if straight <= _STRAIGHT * true or level < _ELSEWHERE:
+    if straight <= _STRAIGHT * true or level < ELSEWHERE:
         return 1.0
     # what all values together are off by chance, as that of one
     return max(straight / noise / max(scipy.stats.chi2.isf(level, 1), 1.0), 1.0)
 
 
-def _loudest(minimum: Minimum) -> float:
+def loudest(minimum: Minimum) -> float:
     """Variance of the noise at the lines where that is largest: what a mode may be lost in."""
     realisation, most = minimum.structure.realise(minimum.x), minimum.noise_variance
     for e in minimum.experiments:
@@ -228,30 +225,3 @@ def compared(est: Estimate, found: Sequence[tuple[str, Sequence[Estimate | None]
         for i, name in enumerate(names)
     ]
     return between_parts(rows)
-
-
-def modes_moved(model: Model, minimum: Minimum, readings: Sequence[Reading]) -> float:
-    """Largest relative change of a black box's mode from one half of the records to the other.
-
-    Infinite where a mode is missed in a half; NaN where there are no halves, or no modes.
-    """
-    own, halves = _weakly_damped(model), record_halves(readings)
-    if not len(own) or halves is None or isinstance(model, GreyBox):
-        return float("nan")
-    found = fitted_apart(model, minimum, halves.parts)
-    modes = [None if f is None else _weakly_damped(f.model) for f in found]
-    if any(m is None or len(m) < len(own) for m in modes):
-        return float("inf")
-    near = [m[np.abs(m - w).argmin()] / w for w in own for m in modes if m is not None]
-    return float(np.abs(np.array(near) - 1).max())
-
-
-def _weakly_damped(model: Model) -> FloatArray:
-    """Natural frequencies (rad/s, or per sample time) of a model's weakly damped poles."""
-    poles = model.poles
-    if model.dt:
-        poles = np.log(np.where(poles == 0, 1e-300, poles))
-    upper = poles[poles.imag > 0]
-    size = np.abs(upper)
-    modes: FloatArray = size[-upper.real < _DAMPED * size]
-    return modes
