@@ -18,6 +18,7 @@ from . import loops, studies
 PARTS = {
     "coverage": (studies.covered, studies.coverage_rows, 2000 * len(studies.CELLS)),
     "loops": (loops.one, loops.rows, 40 * len(loops.CELLS)),
+    "forced": (studies.forced, studies.forced_rows, 2000),
     "good": (studies.good, studies.good_rows, 2000),
     "faults": (studies.named, studies.fault_rows, 200 * len(studies.FAULTS)),
 }

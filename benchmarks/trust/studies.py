@@ -174,6 +174,32 @@ def good_rows(table):
     yield what, f"{100 * said:.1f} %; {100 * trusted:.1f} %", "1 %; 97 %"
 
 
+def forced(case):
+    """A fit that must not be trusted: in a worse minimum, or of a structure that misses a mode."""
+    if case % 2:
+        s = Setting.drawn(case)
+        est = fq.fit(s.model, measured(s, "another mode"))
+        return {"what": "a mode is missed", "worse": True, "grade": est.verdict.grade}
+    rng = np.random.default_rng([19, case])
+    plant = fq.drivetrain(3) if case % 4 else fq.two_mass()
+    names = [p.name for p in plant.free_parameters]
+    u = fq.chirp(0.5, 80, 10, 2e-3) if case % 8 < 4 else fq.white_noise(5000, seed=case)
+    record = fq.simulate(plant, u, 2e-3)
+    record = record.with_noise(0.1 * np.std(record.y), seed=case)
+    best = fq.fit(plant, record)
+    far = {n: plant[n] * float(np.exp(rng.uniform(-2, 2))) for n in names}
+    est = fq.fit(plant.with_values(**far), record, n_starts=1)
+    worse = est.cost > 1.001 * best.cost
+    return {"what": "a worse minimum", "worse": worse, "grade": est.verdict.grade}
+
+
+def forced_rows(table):
+    """Rows for the printed table."""
+    for what, part in table[table["worse"].astype(bool)].groupby("what", sort=False):
+        trusted = int((part["grade"] == "trust").sum())
+        yield f"{what}, {len(part)} fits: verdict trust", f"{trusted}", "0"
+
+
 def matrix(table):
     """Faults against the first thing said, in per cent."""
     counts = table.groupby(["fault", "first"]).size().unstack(fill_value=0)

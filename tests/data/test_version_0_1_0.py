@@ -5,6 +5,7 @@ import pickle
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import freqid as fq
@@ -13,6 +14,8 @@ FOLDER = Path(__file__).parent / "version_0_1_0"
 
 
 def read(name):
+    if name not in ("record", "response", "plant") and int(pd.__version__.split(".")[0]) < 3:
+        pytest.skip("the tables in these pickles were written by pandas 3")
     return pickle.loads((FOLDER / f"{name}.pkl").read_bytes())
 
 

@@ -58,9 +58,9 @@ def test_an_axis_that_moves_never_stands_still(wave):
 def test_the_file_is_what_is_sent(tmp_path, wave):
     design = fq.Design(np.column_stack([wave, -wave]), DT, ["m1", "m2"], {"m1": "N m"})
     design.to_csv(tmp_path / "sequence.csv")
-    table = pd.read_csv(tmp_path / "sequence.csv")
+    table = pd.read_csv(tmp_path / "sequence.csv", dtype=str)
     assert list(table.columns) == ["time [s]", "m1 [N m]", "m2"]
-    assert np.array_equal(table[["m1 [N m]", "m2"]].to_numpy(), design.u)
+    assert np.array_equal(table[["m1 [N m]", "m2"]].to_numpy(str).astype(float), design.u)
     record = fq.read(tmp_path / "sequence.csv", inputs="m1", outputs="m2")
     assert record.dt == DT
     assert record.units == {"m1": "N m"}

@@ -8,7 +8,7 @@ import io
 import lzma
 import zlib
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from freqid.checks import InputError
 from freqid.data.readers.kinds import damaged, reads, writes
@@ -42,12 +42,14 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     check_size(path, 8 * rows * len(layout.names), "its columns")
     body = text[begin:].encode()
     del text
+    # before version 3 the last digit of numbers was lost unless asked for
+    exact: Any = {} if int(pd.__version__.split(".")[0]) > 2 else {"float_precision": "round_trip"}
     try:
         frame = pd.read_csv(
             io.BytesIO(body),
             sep=r"\s+" if layout.separator == " " else layout.separator,
             decimal=layout.decimal, header=None, comment="#", skipinitialspace=True,
-            index_col=False,
+            index_col=False, **exact,
         )  # fmt: skip
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise damaged("CSV", error) from None
