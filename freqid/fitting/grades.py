@@ -16,6 +16,8 @@ Grade = Literal["trust", "doubt", "do not use"]
 
 # starts after which one that is alone is a doubt
 _MANY = 10
+# relative standard error from which a value is not told
+_VAGUE = 0.5
 # what makes numbers useless where it is what explains most of what is wrong
 _USELESS = frozenset(
     {"not converged", "no signal", "feedback", "swapped", "wrong sign", "hold rejected"}
@@ -60,7 +62,7 @@ def verdict(est: Estimate) -> Verdict:
     if est.witness.verdict == "lacking":
         reasons.append(est.witness.sentence)
     reasons += _lonely(est)
-    reasons += _open(est, std)
+    reasons += _open(est, std) or _untold(est, std)
     if reasons:
         return Verdict("doubt", reasons)
     return Verdict("trust", [_supported(est, std)])
@@ -84,6 +86,24 @@ def _open(est: Estimate, std: np.ndarray) -> list[str]:
     if any(getattr(w, "kind", "") == "not identifiable" for w in est.warnings):
         return []
     return [f"not identifiable: the data do not determine {', '.join(names)}"]
+
+
+def _untold(est: Estimate, std: np.ndarray) -> list[str]:
+    """Values of which the data tell so little that the minimum may be one of several."""
+    if not isinstance(est.model, GreyBox):
+        return []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.abs(std / est.values)
+    vague = [n for n, r in zip(est.names, relative, strict=True) if r > _VAGUE]
+    outside = [w for w in est.warnings if getattr(w, "kind", "") == "not physical"]
+    most = np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2)
+    if not most and (not outside or len(vague) < 2):
+        return []
+    which = f", and {str(outside[0]).split(';')[0].split(': ')[-1]}" if outside else ""
+    return [
+        f"not told: the data leave {', '.join(vague)} uncertain by more than half of their values"
+        f"{which}; give what is known of them (with_prior, with_bounds), or excite more"
+    ]
 
 
 def _supported(est: Estimate, std: np.ndarray) -> str:
