@@ -5,6 +5,11 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.fitting.black_box.output_error import within_circle
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.reading import Reading
+from freqid.lti import Plane, StateSpace
 from freqid.paper import notch, numerator
 
 BAND = (10, 80)
@@ -167,3 +172,18 @@ def test_error_bars_of_black_boxes_in_white_noise_are_those_of_white_noise(rng):
     record = fq.Record(u, output(theta), dt=0.01).with_noise(0.1, seed=3)
     est = fq.fit(fq.OutputError(2), record)
     assert np.allclose(est.parameters["std"], expected, rtol=0.1)
+
+
+def test_a_stable_start_lies_inside_of_the_unit_circle():
+    """Rounding put a pole of a start on it, and fit said that the model cannot be computed."""
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    record = fq.simulate(fq.first_order(), fq.white_noise(300, seed=1), 1e-3).with_noise(
+        0.1, seed=1
+    )
+    on_it = StateSpace(turn * (1 + 1e-13), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+    inside = within_circle(on_it)
+    assert np.abs(np.linalg.eigvals(inside.A)).max() < 1
+    assert np.allclose(inside.A, on_it.A, atol=1e-8)
+    chart = Chart(inside, False, Plane(), 1e-3, stable=True)
+    lines = Reading.of(record).lines(Plane())
+    assert np.isfinite(Objective(chart, [lines]).point(np.zeros(chart.size)).cost)

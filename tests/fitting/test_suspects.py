@@ -276,3 +276,24 @@ def test_halves_of_good_data_are_alike():
         noisy = fq.Record(record.u, record.y + 0.1 * record.y.std() * v / v.std(), 0.01)
         found.append(fq.fit(model, noisy).suspects.loc["unsteady", "p_value"])
     assert scipy.stats.kstest(found, "uniform").pvalue > 0.01
+
+
+def test_a_worse_minimum_with_values_that_are_not_told_is_a_doubt():
+    """0.3 % above the best cost, with a negative stiffness inside wide error bars: trusted once.
+
+    No black box can tell the two minima apart in this noise.
+    """
+    case, plant = 90, fq.drivetrain(3)
+    names = [p.name for p in plant.free_parameters]
+    record = fq.simulate(plant, fq.chirp(0.5, 80, 10, 2e-3), 2e-3)
+    record = record.with_noise(0.1 * np.std(record.y), seed=case)
+    far = np.exp(np.random.default_rng([19, case]).uniform(-2, 2, len(names)))
+    start = {n: plant[n] * float(f) for n, f in zip(names, far, strict=True)}
+    est = fq.fit(plant.with_values(**start), record, n_starts=1)
+    assert est["k2"] < 0
+    assert est.verdict.grade == "doubt"
+    assert "not told" in est.verdict.reasons[-1]
+    # the whole search finds the other minimum, and has nothing to say against it
+    whole = fq.fit(plant, record)
+    assert whole.cost < est.cost / 1.003
+    assert whole.verdict.grade == "trust"

@@ -89,7 +89,7 @@ def _nested(
     """The minimum of an order, not above that of the order below with one pole more."""
 
     def begun(start: StateSpace) -> Descent:
-        start = _within_circle(start) if spec.stable else start
+        start = within_circle(start) if spec.stable else start
         return _descend(Chart(start, spec.feedthrough, plane, dt, stable=spec.stable), lines)
 
     options = spec.feedthrough, spec.stable
@@ -117,7 +117,7 @@ def _nested(
     return min(tried, key=lambda t: t[1].cost)
 
 
-def _within_circle(start: StateSpace) -> StateSpace:
+def within_circle(start: StateSpace) -> StateSpace:
     """The same where rounding has put a pole that may not leave the unit circle on it."""
     radius = float(np.abs(np.linalg.eigvals(start.A)).max(initial=0.0))
     return start if radius < 1 else start._replace(A=start.A * ((1 - _EDGE) / radius))
