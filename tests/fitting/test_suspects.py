@@ -265,6 +265,17 @@ def test_a_plant_that_changes_midway_is_named(u):
     assert told == pytest.approx(0.1, rel=0.25)
 
 
+def test_a_spike_does_not_hide_a_plant_that_changes():
+    """What moves no parameter may be stronger, and is minor: the change was left out beside it."""
+    record = _changed(0.05, fq.white_noise(1000, seed=3), 0.05, 1)
+    y = record.y.copy()
+    y[300] += 40 * 0.05 * y.std()
+    est = fq.fit(fq.first_order(b=50.0, a=20.0), fq.Record(record.u, y, 0.01))
+    assert est.warnings[0].kind == "spikes"
+    assert "unsteady" in {w.kind for w in est.warnings if w.severity == "serious"}
+    assert est.verdict.grade == "doubt"
+
+
 def test_halves_of_good_data_are_alike():
     """200 records of a lag in white and slow noise: the test's p-values are those of chance."""
     model, found = fq.first_order(b=50.0, a=20.0), []

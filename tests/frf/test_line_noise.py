@@ -61,19 +61,19 @@ def test_lines_that_are_left_keep_their_noise():
 
 @pytest.mark.parametrize("estimate", [fq.local_rational, fq.local_polynomial])
 def test_error_bars_of_a_resonance_that_four_lines_tell(estimate):
-    """40 records of six seconds: 95 % intervals hold; with lines counted alone it was 70 %."""
+    """40 records of six seconds: 95 % intervals hold; they held in 91 %."""
     model, held, size = resonance(), [], []
     for seed in range(40):
         est = fq.fit(model, estimate(noisy(seed)[1]), weights="noise")
         table, truth = est.parameters, [model[n] for n in est.parameters.index]
         held.append((table["lower"] <= truth) & (truth <= table["upper"]))
         size.append((table["value"] - truth) / table["std"])
-    assert 0.89 <= np.mean(held) <= 1
+    assert 0.92 <= np.mean(held) <= 1
     assert 0.7 < np.sqrt(np.mean(np.square(size))) < 1.25
 
 
 def test_a_sharp_resonance_keeps_its_height_in_noise():
-    """Equations with noisy outputs in them flatten it: 2 % of damping on average, now below 0.6."""
+    """Equations with noisy outputs in them flatten it: 1.4 % of damping on average of these 40."""
     model, found = resonance(), []
     for seed in range(40):
         frf = fq.local_rational(noisy(seed, level=0.2)[1])

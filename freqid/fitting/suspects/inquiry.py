@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 # tests that are answered by one fit with another hold
 _HOLDS = ("hold", "hold period")
-# what a loop may look like
-_LOOSELY = ("another mode", "feedback")
+# faults of a sensor leave room for a plant that changes
+_BESIDE = ("unsteady", "offset", "drift", "spikes", "saturation")
 # part of one more mode's gain at which something simpler is believed instead
 _AS_MUCH = 0.8
 # part of a gain that is as much, and which of two is the likelier then
@@ -167,12 +167,12 @@ class Inquiry:
             # to a sweep whatever the model lacks is a change between its halves
             first = ranked[0]
             ranked.sort(key=lambda a: a is first or a.test.chi < first.test.chi)
-        ranked = [a for i, a in enumerate(ranked) if i == 0 or a.name != "unsteady"]
+        if ranked[0].name not in _BESIDE:
+            ranked = [a for a in ranked if a.name != "unsteady"]
         # a fault that explains what is left leaves no room for a loop
-        poles = self.model.poles
-        runaway = bool((poles.real > 0).any()) and not self.model.dt
+        runaway = bool((self.model.poles.real > 0).any()) and not self.model.dt
         alike = "unlike experiments" not in merged and self.share is None
-        if not alike or (ranked[0].name not in _LOOSELY and not runaway):
+        if not alike or (ranked[0].name not in ("another mode", "feedback") and not runaway):
             return ranked
         loop = looped(self, scene, LEVEL / max(len(self.asked), 1))
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
@@ -195,17 +195,17 @@ class Inquiry:
         scene, named = self.scene, self.named
         if scene is None:
             return []
-        silent = self._silent(scene)
-        if silent:
+        if silent := self._silent(scene):
             return silent
-        if self._in_trouble(scene):
-            round_about = turned(self.minimum, self.model, self.readings)
-            if round_about:
-                return round_about
+        turn = turned(self.minimum, self.model, self.readings) if self._in_trouble(scene) else []
+        if turn:
+            return turn
         if not named:
             return []
-        strongest = self._evidence(scene, named[0])
-        near = [a for a in named if self._evidence(scene, a) >= min(_WORTH * strongest, strongest)]
+        # a change beside a fault of a sensor is another thing, however weak
+        least = self._evidence(scene, named[0])
+        least *= _WORTH if least > 0 else 1
+        near = [a for a in named if a.name == "unsteady" or self._evidence(scene, a) >= least]
         said = [a for a in near if not self._negligible(scene, a)][:_SAID]
         found = [self._finding(scene, a) for a in said]
         if isinstance(self.model, GreyBox) or not said or said[0].name in _LIKELY:
