@@ -13,13 +13,14 @@ from pathlib import Path
 from search import store
 from table import show
 
-from . import loops, studies
+from . import loops, strengths, studies
 
 PARTS = {
     "coverage": (studies.covered, studies.coverage_rows, 2000 * len(studies.CELLS)),
     "loops": (loops.one, loops.rows, 40 * len(loops.CELLS)),
     "forced": (studies.forced, studies.forced_rows, 2000),
     "good": (studies.good, studies.good_rows, 2000),
+    "threshold": (strengths.threshold, strengths.rows, 60 * len(strengths.LARGEST)),
     "faults": (studies.named, studies.fault_rows, 200 * len(studies.FAULTS)),
 }
 

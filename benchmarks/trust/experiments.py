@@ -24,6 +24,8 @@ PLANTS = {
 INPUTS = ("white", "chirp", "prbs", "multisine")
 FAULTS = ("none", "delay", "feedthrough", "hold rejected", "offset", "drift", "spikes",
           "saturation", "another mode", "unlike experiments", "unsteady", "feedback")  # fmt: skip
+# pole of a loop's slow noise
+SLOW = 0.95
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,57 +67,84 @@ class Setting:
             return np.resize(u, N)
         return fq.white_noise(N, seed=seed)
 
+    def clean(self):
+        """The output without noise."""
+        return fq.simulate(self.model, self.u(), self.dt).y
+
+    def moved(self, size):
+        """The plant with its first parameter, or its stiffness, off by that part."""
+        name = "k" if self.plant == "two-mass" else self.model.free_parameters[0].name
+        return self.model.with_values(**{name: (1 + size) * self.model[name]})
+
     def noise(self, number=0):
         e = np.random.default_rng([self.seed, number]).standard_normal(self.samples + 500)
         return scipy.signal.lfilter([np.sqrt(1 - self.pole**2)], [1, -self.pole], e)[500:]
 
 
-def measured(s, fault="none"):
-    """A record, or several, with a fault in it."""
-    u, dt, rng = s.u(), s.dt, np.random.default_rng([11, s.seed])
-    clean = fq.simulate(s.model, u, dt).y
+# sizes where none is given: parts of the output, levels of the noise, parts of a parameter
+SIZES = {"feedthrough": 0.3, "offset": 0.5, "drift": 1.0, "spikes": 12.0,
+         "saturation": 0.03, "another mode": 0.4, "unlike experiments": 0.1,
+         "unsteady": 0.1, "feedback": 0.3}  # fmt: skip
+
+
+def measured(s, fault="none", size=None):
+    """A record, or several, with a fault of that size in it."""
+    u, clean = s.u(), s.clean()
     level = clean.std() / s.ratio
-    y = clean + level * s.noise()
+    size = SIZES.get(fault) if size is None else size
+    if fault == "feedback":
+        return fq.Record(*looped(s, u, size)[:2], s.dt)
+    y = clean + added(s, fault, size) + level * s.noise()
+    if fault == "saturation":
+        y = clipped(clean + level * s.noise(), size)
+    first = fq.Record(u, y, s.dt)
+    if fault == "unlike experiments":
+        other = fq.simulate(s.moved(size), u, s.dt).y + level * s.noise(1)
+        return [first, fq.Record(u, other, s.dt)]
+    return first
+
+
+def added(s, fault, size):
+    """What a fault of that size adds to the output (N,)."""
+    u, dt, rng, clean = s.u(), s.dt, np.random.default_rng([11, s.seed]), s.clean()
+    scale = clean.std()
     if fault == "delay":
-        late = dataclasses.replace(s.model, input_delay=rng.uniform(0.3, 3) * dt)
-        y = fq.simulate(late, u, dt).y + level * s.noise()
-    elif fault == "feedthrough":
-        y = y + 0.3 * clean.std() / u.std() * u
-    elif fault == "hold rejected":
+        size = rng.uniform(0.3, 3) if size is None else size
+        late = dataclasses.replace(s.model, input_delay=size * dt)
+        return fq.simulate(late, u, dt).y - clean
+    if fault == "hold rejected":
         fast = np.interp(np.arange(5 * s.samples) / 5, np.arange(s.samples), u)
-        slow = fq.simulate(s.model, fast, dt / 5).decimate(5)
-        return fq.Record(slow.u, slow.y + level * s.noise(), dt)
-    elif fault == "offset":
-        y = y + 0.5 * clean.std()
-    elif fault == "drift":
-        y = y + clean.std() * np.linspace(-0.5, 0.5, s.samples)
-    elif fault == "spikes":
-        y[int(rng.integers(s.samples))] += 12 * level
-    elif fault == "saturation":
-        limit = np.quantile(np.abs(y), 0.97)
-        y = np.clip(y, -limit, limit)
-    elif fault == "another mode":
-        w = 0.56 / dt
-        mode = fq.simulate(fq.GreyBox(_mode, [fq.Parameter("w", w), fq.Parameter("z", 0.02),
-                                              fq.Parameter("g", 1.0)]), u, dt).y  # fmt: skip
-        y = y + 0.4 * clean.std() / mode.std() * mode
-    elif fault == "unlike experiments":
-        first = s.model.free_parameters[0].name if s.plant != "two-mass" else "k"
-        other = fq.simulate(s.model.with_values(**{first: 1.1 * s.model[first]}), u, dt).y
-        return [fq.Record(u, y, dt), fq.Record(u, other + level * s.noise(1), dt)]
-    elif fault == "unsteady":
-        y = _changed(s, u) + level * s.noise()
-    elif fault == "feedback":
-        u, y = _looped(s, u, clean.std())
-    return fq.Record(u, y, dt)
+        return fq.simulate(s.model, fast, dt / 5).decimate(5).y - clean
+    if fault == "feedthrough":
+        return size * scale / u.std() * u
+    if fault == "offset":
+        return np.full(len(u), size * scale)
+    if fault == "drift":
+        return size * scale * np.linspace(-0.5, 0.5, len(u))
+    if fault == "spikes":
+        spike = np.zeros(len(u))
+        spike[int(rng.integers(len(u)))] = size * scale / s.ratio
+        return spike
+    if fault == "another mode":
+        values = {"w": 0.56 / dt, "z": 0.02, "g": 1.0}
+        mode = fq.GreyBox(_mode, [fq.Parameter(n, v) for n, v in values.items()])
+        y = fq.simulate(mode, u, dt).y
+        return size * scale / y.std() * y
+    if fault == "unsteady":
+        return _changed(s, u, size) - clean
+    return np.zeros(len(u))
 
 
-def _changed(s, u, size=0.1):
-    """The plant's first parameter, or its stiffness, changes midway; its state goes on."""
-    name = s.model.free_parameters[0].name if s.plant != "two-mass" else "k"
-    after = s.model.with_values(**{name: (1 + size) * s.model[name]})
+def clipped(y, part):
+    """An output (N,) of which that part lies beyond a limit."""
+    limit = np.quantile(np.abs(y), 1 - part)
+    return np.clip(y, -limit, limit)
+
+
+def _changed(s, u, size):
+    """The plant changes midway; its state goes on."""
     middle, x, y = len(u) // 2, None, []
-    for model, part in ((s.model, u[:middle]), (after, u[middle:])):
+    for model, part in ((s.model, u[:middle]), (s.moved(size), u[middle:])):
         A, B, C, D = model.state_space()
         A, B, C, D, _ = scipy.signal.cont2discrete((A, B, C, D), s.dt)
         _, y_part, states = scipy.signal.dlsim((A, B, C, D, 1), part, x0=x)
@@ -124,9 +153,12 @@ def _changed(s, u, size=0.1):
     return np.concatenate(y)
 
 
-def _looped(s, r, size):
-    """The lag under u = r − y with slow noise as large as a third of the signal."""
-    v = 0.3 * size * dataclasses.replace(s, pole=0.95).noise()
+def looped(s, r, size, number=0):
+    """Input, output and noise of the lag under u = r − y, with slow noise as large as that part of
+    the signal.
+    """
+    e = dataclasses.replace(s, pole=SLOW).noise(number)
+    v = size * s.clean().std() * e
     phi = np.exp(-20 * s.dt)
     gamma = 2.5 * (1 - phi)
     x, u, y = 0.0, np.zeros(len(r)), np.zeros(len(r))
@@ -134,4 +166,4 @@ def _looped(s, r, size):
         y[k] = x + v[k]
         u[k] = r[k] - y[k]
         x = phi * x + gamma * u[k]
-    return u, y
+    return u, y, v

@@ -18,6 +18,8 @@ Grade = Literal["trust", "doubt", "do not use"]
 _MANY = 10
 # relative standard error from which a value is not told
 _VAGUE = 0.5
+# how often chance makes a gap to a black box as large that is next to none
+_BESIDE = 0.3
 # what makes numbers useless where it is what explains most of what is wrong
 _USELESS = frozenset(
     {"not converged", "no signal", "feedback", "swapped", "wrong sign", "hold rejected"}
@@ -62,7 +64,7 @@ def verdict(est: Estimate) -> Verdict:
     if est.witness.verdict == "lacking":
         reasons.append(est.witness.sentence)
     reasons += _lonely(est)
-    reasons += _open(est, std) or _untold(est, std)
+    reasons += _open(est, std) or _untold(est, std) or _once(est, std)
     if reasons:
         return Verdict("doubt", reasons)
     return Verdict("trust", [_supported(est, std)])
@@ -92,8 +94,7 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
     """Values of which the data tell so little that the minimum may be one of several."""
     if not isinstance(est.model, GreyBox):
         return []
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.abs(std / est.values)
+    relative = _relative(est, std)
     vague = [n for n, r in zip(est.names, relative, strict=True) if r > _VAGUE]
     outside = [w for w in est.warnings if getattr(w, "kind", "") == "not physical"]
     most = np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2)
@@ -106,12 +107,32 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
     ]
 
 
+def _once(est: Estimate, std: np.ndarray) -> list[str]:
+    """One start along a valley that the data leave open, at no black box's own cost."""
+    chance = est.witness.p_value if est.witness.verdict == "complete" else 0.0
+    if not isinstance(est.model, GreyBox) or est.n_starts > 1 or chance > _BESIDE:
+        return []
+    vague = [n for n, r in zip(est.names, _relative(est, std), strict=True) if r > _VAGUE]
+    if not vague or est.minimum.exact:
+        return []
+    return [
+        f"not settled: one start was made, and the data leave {', '.join(vague)} uncertain by more "
+        "than half of their values: another may end better; leave n_starts at 'auto'"
+    ]
+
+
+def _relative(est: Estimate, std: np.ndarray) -> np.ndarray:
+    """Standard errors as parts of their values."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative: np.ndarray = np.abs(std / est.values)
+    return relative
+
+
 def _supported(est: Estimate, std: np.ndarray) -> str:
     """What speaks for it."""
     text = f"{est.fit_percent:.2f} % of what was fitted is explained and the search converged"
     if isinstance(est.model, GreyBox):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            relative = np.abs(std / est.values)
+        relative = _relative(est, std)
         if np.isfinite(relative).any():
             worst = int(np.nanargmax(np.where(np.isfinite(relative), relative, np.nan)))
             name, size = est.names[worst], f"{100 * relative[worst]:.2g} %"

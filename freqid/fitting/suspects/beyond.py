@@ -87,11 +87,7 @@ def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
         assert drawn is None or isinstance(drawn, Columns)
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return None
-    test = (
-        None
-        if drawn is None
-        else score(beside, drawn.columns, np.ones(len(beside.x)), drawn.beside)
-    )
+    test = None if drawn is None else score(beside, drawn, np.ones(len(beside.x)))
     if test is None or test.p_value > limit:
         return None
     test = dataclasses.replace(test, largest_shift=np.inf, largest_change=np.nan)

@@ -12,11 +12,13 @@ import numpy as np
 import scipy
 
 from freqid.checks import InputError
+from freqid.data import input_dt
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
 from freqid.fitting.suspects.beyond import looped, midway, one_more_mode, unlike
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
+from freqid.fitting.suspects.order import LIKELY, evidence, ordered
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.register import SUSPECTS, Columns
@@ -27,7 +29,7 @@ from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
-from freqid.lti import in_one_blas_thread
+from freqid.lti import PeriodicHold, in_one_blas_thread
 from freqid.models import GreyBox, Model
 
 if TYPE_CHECKING:
@@ -37,20 +39,16 @@ if TYPE_CHECKING:
 
 # tests that are answered by one fit with another hold
 _HOLDS = ("hold", "hold period")
-# faults of a sensor leave room for a plant that changes
-_BESIDE = ("unsteady", "offset", "drift", "spikes", "saturation")
-# part of one more mode's gain at which something simpler is believed instead
-_AS_MUCH = 0.8
-# part of a gain that is as much, and which of two is the likelier then
-_EQUAL, _LIKELY = 0.98, ("hold rejected", "delay", "feedthrough")
+# part of a hold's gain that one that is possible has to reach
+_REACHED = 0.5
 # part of the strongest one's evidence from which another is said, and how many are
 _WORTH, _SAID = 0.5, 3
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
 # level at which an input is heard at all, and the part of the output left that means trouble
 _HEARD, _MOST_LEFT = 1e-3, 0.3
-# part of the data's energy that is nothing
-_NOTHING = 1e-5
+# part of the data's energy that is nothing, and what is left of data without noise to speak of
+_NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
 _KNOWN = (measurement, plant)
 # level at which all suspects together speak of good data
@@ -100,32 +98,22 @@ class Inquiry:
         for name, draw in SUSPECTS.items():
             drawn = draw(scene, self.model)
             several = [] if drawn is None else [drawn] if isinstance(drawn, Columns) else [*drawn]
-            tried = [(c, score(scene, c.columns, std, c.beside)) for c in several]
+            tried = [(c, score(scene, c, std)) for c in several]
             told = [(c, t) for c, t in tried if t is not None]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
                 p = 1 - (1 - t.p_value) ** c.trials if t.p_value > 1e-9 else t.p_value * c.trials
-                found.append(Asked(name, t, c.unit, min(p, 1.0), c.detail, c.trials))
+                found.append(Asked(name, t, c.unit, min(p, 1.0), c.detail, c.trials, c.certain))
         found += unlike(self, scene)
         found = midway(self, scene, found)
         found += one_more_mode(self, scene)
-        return sorted(found, key=lambda a: self._evidence(scene, a), reverse=True)
-
-    def _evidence(self, scene: Scene, a: Asked) -> float:
-        """How much better the data are explained, less what as many unknowns do by chance."""
-        left = max(scene.cost - a.test.gain, 1e-12 * scene.cost)
-        n = max(scene.freedom, 2)
-        better = np.log(scene.cost / left)
-        if not scene.even:
-            # where the noise differs a quiet experiment says much that costs little
-            better = max(better, np.log1p(a.test.statistic * a.test.degrees / n))
-        return float(n * better - a.test.degrees * np.log(n) - 2 * np.log(a.trials))
+        return sorted(found, key=lambda a: evidence(scene, a), reverse=True)
 
     @cached_property
     def speaking(self) -> list[Asked]:
         """Those that are no chance, the strongest first."""
         limit = LEVEL / max(len(self.asked), 1)
-        return [a for a in self.asked if a.p_value < limit]
+        return [a for a in self.asked if a.p_value < limit or a.certain]
 
     @cached_property
     def named(self) -> list[Asked]:
@@ -138,7 +126,9 @@ class Inquiry:
         if scene is None or not self.speaking:
             return []
         merged: dict[str, Asked] = {}
-        for a in self.speaking:
+        # a step towards no hold at all is something else, where something else speaks
+        possible = [a for a in self.speaking if a.name not in _HOLDS or self._possible(a)]
+        for a in possible or self.speaking:
             kind = "hold rejected" if a.name in _HOLDS else a.name
             other = merged.get(kind)
             if other is None or a.test.gain > other.test.gain:
@@ -153,22 +143,7 @@ class Inquiry:
             del merged["delay"]
         if not merged:
             return []
-        ranked = sorted(merged.values(), key=lambda a: self._evidence(scene, a), reverse=True)
-        # what explains as much is as likely: the order of _LIKELY decides
-        equal = [a for a in ranked if a.test.gain >= _EQUAL * ranked[0].test.gain]
-        equal = [a for a in equal if a.name in _LIKELY and ranked[0].name in _LIKELY]
-        equal.sort(key=lambda a: _LIKELY.index(a.name))
-        ranked = [*equal, *(a for a in ranked if a not in equal)]
-        if ranked[0].name == "another mode":
-            enough = _AS_MUCH * ranked[0].test.gain
-            simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name != "unsteady"]
-            ranked = [*simple, *(a for a in ranked if a not in simple)]
-        if ranked[0].name == "unsteady":
-            # to a sweep whatever the model lacks is a change between its halves
-            first = ranked[0]
-            ranked.sort(key=lambda a: a is first or a.test.chi < first.test.chi)
-        if ranked[0].name not in _BESIDE:
-            ranked = [a for a in ranked if a.name != "unsteady"]
+        ranked = ordered(list(merged.values()), scene)
         # a fault that explains what is left leaves no room for a loop
         runaway = bool((self.model.poles.real > 0).any()) and not self.model.dt
         alike = "unlike experiments" not in merged and self.share is None
@@ -177,6 +152,14 @@ class Inquiry:
         loop = looped(self, scene, LEVEL / max(len(self.asked), 1))
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
 
+    def _possible(self, a: Asked) -> bool:
+        """Whether a score's step leads towards another hold, or to a period that can be."""
+        if a.name == "hold":
+            return a.test.size > 0
+        hold, dt = self.readings[0].hold, input_dt(self.readings[0].data)
+        own = hold.period if isinstance(hold, PeriodicHold) else dt
+        return a.test.size < 0 or own + a.test.size <= dt
+
     def _again(self, scene: Scene, a: Asked) -> Asked:
         """The suspect after a fit with it free, where that is worth one."""
         again = None
@@ -184,10 +167,15 @@ class Inquiry:
             again = late(self.minimum, self.readings, a.test.size)
         elif a.name == "hold rejected":
             again = held(self.minimum, self.readings)
-        if again is None or again.cost >= scene.cost - a.test.gain:
+        # a hold that is possible may reach much less than a change of the response by as much
+        reached = -np.inf if again is None else scene.cost - again.cost
+        possible = a.name != "hold rejected" or reached > _REACHED * a.test.gain
+        if again is None:
             return a
-        test = dataclasses.replace(a.test, gain=scene.cost - again.cost, size=again.size)
-        return dataclasses.replace(a, test=test, detail=again.sentence)
+        if possible and reached <= a.test.gain:
+            return dataclasses.replace(a, odd=again.odd, detail=again.sentence)
+        test = dataclasses.replace(a.test, gain=reached, size=again.size)
+        return dataclasses.replace(a, test=test, detail=again.sentence, odd=again.odd)
 
     @in_one_blas_thread
     def findings(self) -> list[Finding]:
@@ -203,12 +191,13 @@ class Inquiry:
         if not named:
             return []
         # a change beside a fault of a sensor is another thing, however weak
-        least = self._evidence(scene, named[0])
+        apart = [a for a in named if a.certain or a.name == "unsteady"]
+        least = evidence(scene, named[0])
         least *= _WORTH if least > 0 else 1
-        near = [a for a in named if a.name == "unsteady" or self._evidence(scene, a) >= least]
+        near = [a for a in named if a in apart or evidence(scene, a) >= least]
         said = [a for a in near if not self._negligible(scene, a)][:_SAID]
         found = [self._finding(scene, a) for a in said]
-        if isinstance(self.model, GreyBox) or not said or said[0].name in _LIKELY:
+        if isinstance(self.model, GreyBox) or not said or said[0].name in LIKELY:
             return found
         # the unknowns of a black box have no standard errors that mean anything: its modes have
         halves = confirming(self.readings)
@@ -244,7 +233,8 @@ class Inquiry:
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""
         moves = a.test.largest_change > _HARMLESS
-        return bool(a.test.gain < _NOTHING * scene.energy and not moves)
+        little = a.test.gain < _NOTHING * scene.energy and scene.cost < _QUIET * scene.energy
+        return bool(little and not moves)
 
     def _finding(self, scene: Scene, a: Asked) -> Finding:
         if a.name == "hold rejected":

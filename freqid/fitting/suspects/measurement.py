@@ -12,6 +12,10 @@ from freqid.models import GreyBox, Model
 
 # samples at one extreme value that make it look like a limit, and the part of the range it is
 _AT_LIMIT, _NEAR = 4, 1e-9
+# by the part of other samples that are all different, where values are no steps of a converter: how
+# many that share an extreme do so by no chance; and part of the range below an extreme in which a
+# signal that comes to rest has more samples than at it
+_SHARED, _REST = ((1.0, 2), (0.99, 3), (0.9, 4)), 0.01
 # relative difference of two levels that is one
 _LEVELS = 0.05
 
@@ -85,7 +89,7 @@ def _whitened(scene: Scene, number: int, s: Seen) -> FloatArray:
 @suspect("saturation")
 def saturation(scene: Scene, model: Model) -> Columns | None:
     """An output stays at one extreme value for several samples, as at a limit."""
-    drawn, found = [], False
+    drawn, found, certain = [], False, False
     for s in scene.seen:
         if s.record is None:
             return None
@@ -96,12 +100,28 @@ def saturation(scene: Scene, model: Model) -> Columns | None:
             for extreme, sign in ((signal.max(), 1.0), (signal.min(), -1.0)):
                 at = np.abs(signal - extreme) <= near
                 pulse = np.zeros((1, *y.shape))
-                if at.sum() >= _AT_LIMIT:
-                    found = True
+                clipped = _clipped(sign * signal)
+                if clipped or at.sum() >= _AT_LIMIT:
+                    found, certain = True, certain or clipped
                     pulse[0, o] = sign * at
                 rows.append(s.sampled(pulse)[0])
         drawn.append(np.array(rows))
-    return Columns(drawn) if found else None
+    return Columns(drawn, certain=certain) if found else None
+
+
+def _clipped(signal: FloatArray) -> bool:
+    """Whether samples share the largest value by no chance: hardly two others are alike."""
+    moves = np.flatnonzero(np.diff(signal))
+    if not len(moves):
+        return False
+    # what stands still before or after an experiment is at rest
+    signal = signal[moves[0] : moves[-1] + 2]
+    rest = signal[signal < signal.max()]
+    at = len(signal) - len(rest)
+    near = (rest > signal.max() - _REST * np.ptp(signal)).sum()
+    distinct = len(np.unique(rest)) / max(len(rest), 1)
+    wanted = next((count for part, count in _SHARED if distinct >= part), np.inf)
+    return bool(at >= wanted and near <= at)
 
 
 @suspect("amplitude")

@@ -24,17 +24,24 @@ _DELAYS = (0.3, 1.5, 3.5, 8.0)
 _PERIODS = (1.0, 0.3)
 # holds shorter than this part of the sample time are none, and longer ones no converter's
 _LEAST, _MOST = 0.02, 1.02
+# converters hold for the sample time or a whole part of it: so far from all of those is odd, above
+# a part so small that another is never far
+_ODD, _ANY = 0.1, 0.22
 # evaluations of each, of the first look from every start, and the gain that ends one
 _LIMIT, _LOOK, _TOLERANCE = 40, 12, 1e-6
 
 
 @dataclass(frozen=True)
 class Refit:
-    """A fit with the suspect free: its ``cost``, the suspect's ``size`` (s) and its own words."""
+    """A fit with the suspect free: its ``cost``, the suspect's ``size`` (s) and its own words.
+
+    A hold is ``odd`` where no converter has it: it is no whole part of the sample time.
+    """
 
     cost: float
     size: float
     sentence: str
+    odd: bool = False
 
 
 def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit | None:
@@ -109,7 +116,14 @@ def _of_any_length(
             best = found.cost, float(found.x[-1])
     if best is None:
         return None
-    return Refit(best[0], best[1] * dt, f"a zero-order hold of about {best[1] * dt:.3g} s")
+    words = f"a zero-order hold of about {best[1] * dt:.3g} s"
+    return Refit(best[0], best[1] * dt, words, _odd(best[1]))
+
+
+def _odd(part: float) -> bool:
+    """Whether a hold of this part of the sample time is no whole part of it."""
+    off = min(abs(part * k - 1) for k in (2, 3, 4))
+    return part > _ANY and off > _ODD
 
 
 def _through(

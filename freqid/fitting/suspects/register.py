@@ -15,7 +15,9 @@ class Columns:
     """Derivatives of the rows by a suspect: one array (c, rows) for each experiment.
 
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
-    ``beside`` are columns that are free, too, and explain nothing of it.
+    ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
+    data themselves show, however little it explains. What acts at ``many_lines`` can be weighed by
+    the noise at each: that of the few lines at which a drift acts is not known well enough.
     """
 
     columns: Sequence[FloatArray]
@@ -23,6 +25,8 @@ class Columns:
     trials: int = 1
     detail: str = ""
     beside: Sequence[FloatArray] | None = None
+    certain: bool = False
+    many_lines: bool = False
 
 
 Drawn = Columns | Sequence[Columns] | None

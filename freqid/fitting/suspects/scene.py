@@ -211,6 +211,29 @@ class Scene:
         count = len(columns[0])
         return np.concatenate([*columns, np.zeros((count, len(self.known)))], axis=1)
 
+    def weighed(
+        self, columns: Sequence[FloatArray], variance: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Columns and what is left in units of the noise (R,), less what is absorbed of them there.
+
+        Parameters that were fitted without these weights are off by what their directions take
+        out of both (Neyman's C(alpha), 1959).
+        """
+        w = 1 / np.sqrt(np.maximum(variance, 1e-300))
+        rows = np.concatenate([self.stacked(columns), self.left[None], self.jacobian]) * w
+        at = 0
+        for s in self.seen:
+            part = slice(at, at := at + len(s.left))
+            Q = directions(s.free * w[part], _LOOSE)[2]
+            rows[:, part] -= (rows[:, part] @ Q.T) @ Q
+        ends = [len(columns[0]), len(columns[0]) + 1]
+        drawn, left, J = np.split(rows, ends)
+        if self.more is not None:
+            J = np.concatenate([J, self.more * w])
+        size = np.linalg.norm(J, axis=1)
+        B = directions(J[size > 0] / size[size > 0, None], _LOOSE)[2]
+        return drawn - (drawn @ B.T) @ B, (left - (left @ B.T) @ B)[0]
+
     def clear(self, columns: Sequence[FloatArray]) -> FloatArray:
         """Columns of each experiment less what initial states and parameters absorb, stacked."""
         alone = self.stacked([s.without_free(c) for s, c in zip(self.seen, columns, strict=True)])

@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
+from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.lti import directions
 
@@ -50,7 +51,11 @@ class Score:
 
 @dataclass(frozen=True)
 class Asked:
-    """A suspect with its test, its unit, what it was found at, and its corrected p."""
+    """A suspect with its test, its unit, what it was found at, and its corrected p.
+
+    What is ``certain`` the data themselves show, however little it explains; ``odd`` is a hold that
+    no converter has.
+    """
 
     name: str
     test: Score
@@ -58,20 +63,18 @@ class Asked:
     p_value: float
     detail: str = ""
     trials: int = 1
+    certain: bool = False
+    odd: bool = False
 
 
-def score(
-    scene: Scene,
-    columns: Sequence[FloatArray],
-    std: FloatArray,
-    beside: Sequence[FloatArray] | None = None,
-) -> Score | None:
-    """The test of columns (c, rows) of each experiment; None where the parameters absorb them.
+def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
+    """The test of what was drawn; None where the parameters absorb it.
 
-    ``std`` (P,) are the standard errors of the unknowns; ``beside`` are columns that are free, too.
+    ``std`` (P,) are the standard errors of the unknowns.
     """
-    if beside is not None:
-        scene = scene.with_free(beside)
+    columns = drawn.columns
+    if drawn.beside is not None:
+        scene = scene.with_free(drawn.beside)
     raw = scene.stacked(columns)
     size = np.linalg.norm(raw, axis=1)
     if not np.isfinite(size).all() or not (size > 0).any():
@@ -92,6 +95,8 @@ def score(
     rest = scene.left - along @ Vt
     if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
+    elif drawn.many_lines:
+        chi = _weighed(scene, columns, scene.variance_of(rest), freedom)
     else:
         spread = (Vt * scene.variance_of(rest)) @ Vt.T
         chi = float(along @ np.linalg.solve(spread, along))
@@ -106,3 +111,13 @@ def score(
     biggest = float(sizes[np.argmax(np.abs(delta))])
     change = scene.relative(moved)
     return Score(chi / q, q, p, biggest, power, largest, gain, change)
+
+
+def _weighed(
+    scene: Scene, columns: Sequence[FloatArray], variance: FloatArray, freedom: int
+) -> float:
+    """What columns explain in units of the noise where lines count by its variance (R,) at each."""
+    seen, left = scene.weighed(columns, variance)
+    ways = directions(seen / np.linalg.norm(seen, axis=1)[:, None], _SAME, _ABSORBED)[2]
+    told = float(np.sum((ways @ left) ** 2))
+    return told / (float(left @ left - told) / freedom)

@@ -1,0 +1,57 @@
+"""Which of several suspects that speak is said first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked
+
+# which of two that explain as much is the likelier, and which where no converter has such a hold
+LIKELY = ("hold rejected", "delay", "feedthrough")
+_UNLIKELY = ("delay", "feedthrough", "hold rejected")
+# part of a gain that is as much, and the difference that is chance in units of the noise
+_EQUAL, _CHANCE = 0.98, 6.0
+# part of one more mode's gain at which something simpler is believed instead
+_AS_MUCH = 0.8
+# faults of a sensor leave room for a plant that changes
+_BESIDE = ("unsteady", "offset", "drift", "spikes", "saturation")
+
+
+def evidence(scene: Scene, a: Asked) -> float:
+    """How much better the data are explained, less what as many unknowns do by chance."""
+    left = max(scene.cost - a.test.gain, 1e-12 * scene.cost)
+    n = max(scene.freedom, 2)
+    better = np.log(scene.cost / left)
+    if not scene.even:
+        # where the noise differs a quiet experiment says much that costs little
+        better = max(better, np.log1p(a.test.statistic * a.test.degrees / n))
+    return float(n * better - a.test.degrees * np.log(n) - 2 * np.log(a.trials))
+
+
+def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
+    """The likeliest first, without a change midway that something else explains."""
+    ranked = sorted(asked, key=lambda a: evidence(scene, a), reverse=True)
+    # what explains as much is as likely: which is likelier decides
+    most = ranked[0].test.gain
+    noise = max(scene.cost - most, 0.0) / max(scene.freedom, 1)
+    least = min(_EQUAL * most, most - _CHANCE * noise)
+    odd = any(a.name == "hold rejected" and a.odd for a in ranked)
+    likely = _UNLIKELY if odd else LIKELY
+    equal = [a for a in ranked if a.test.gain >= least and a.name in likely]
+    if ranked[0].name in likely:
+        equal.sort(key=lambda a: likely.index(a.name))
+        ranked = [*equal, *(a for a in ranked if a not in equal)]
+    if ranked[0].name == "another mode":
+        enough = _AS_MUCH * ranked[0].test.gain
+        simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name != "unsteady"]
+        ranked = [*simple, *(a for a in ranked if a not in simple)]
+    if ranked[0].name == "unsteady":
+        # to a sweep whatever the model lacks is a change between its halves
+        first = ranked[0]
+        ranked.sort(key=lambda a: a is first or a.test.chi < first.test.chi)
+    if ranked[0].name not in _BESIDE:
+        ranked = [a for a in ranked if a.name != "unsteady"]
+    return ranked

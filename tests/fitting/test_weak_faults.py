@@ -1,0 +1,94 @@
+"""Faults that only just show: as weak as a test that knows them could find."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+DT = 0.01
+LAG = fq.first_order(b=50.0, a=20.0)
+
+
+def coloured(seed, size, pole=0.9):
+    e = np.random.default_rng(seed).standard_normal(size + 300)
+    return scipy.signal.lfilter([np.sqrt(1 - pole**2)], [1, -pole], e)[300:]
+
+
+def first_said(record, model=LAG):
+    warnings = fq.fit(model, record).warnings
+    return warnings[0].kind if warnings else "none"
+
+
+def test_a_delay_where_the_noise_is_weak_is_found_among_lines_where_it_is_strong():
+    """Lines count by their noise: those at high frequency tell a delay, the low ones hide it."""
+    said = []
+    for seed in range(12):
+        u = fq.white_noise(1500, seed=seed)
+        y = fq.simulate(dataclasses.replace(LAG, input_delay=0.05 * DT), u, DT).y
+        said.append(first_said(fq.Record(u, y + 0.1 * y.std() * coloured(seed, 1500), DT)))
+    assert said.count("delay") >= 11, said
+
+
+@pytest.mark.parametrize("samples", [3, 5])
+def test_a_limit_that_few_samples_touch_is_said(samples):
+    """Values that else never repeat share an extreme: no chance, however little it explains."""
+    said = []
+    for seed in range(8):
+        u = fq.white_noise(800, seed=seed)
+        y = fq.simulate(LAG, u, DT).y
+        y = y + 0.05 * y.std() * coloured(seed, 800, 0.0)
+        limit = np.sort(y)[-samples]
+        est = fq.fit(LAG, fq.Record(u, np.minimum(y, limit), DT))
+        said.append([w.kind for w in est.warnings])
+    assert sum("saturation" in kinds for kinds in said) == 8, said
+
+
+def test_a_converter_and_a_signal_at_rest_are_no_limit():
+    """Steps of a converter share values; so do samples before an experiment begins."""
+    u = fq.white_noise(800, seed=1)
+    y = fq.simulate(LAG, u, DT).y
+    noisy = y + 0.02 * y.std() * coloured(1, 800, 0.0)
+    step = np.ptp(noisy) / 60
+    assert first_said(fq.Record(u, np.round(noisy / step) * step, DT)) == "none"
+    begun = np.concatenate([np.zeros(50), 1 + np.abs(u)])
+    rises = np.array(fq.simulate(LAG, begun, DT).y)
+    rises[50:] += 0.2 * rises.std() * np.abs(coloured(2, 800, 0.0))
+    assert "saturation" not in [w.kind for w in fq.fit(LAG, fq.Record(begun, rises, DT)).warnings]
+
+
+def test_a_direct_term_is_said_before_a_hold_that_no_converter_has():
+    """In a resonance; a lag takes a direct term and a shorter hold for the same."""
+
+    def mode(w, z, g):
+        return [[0, 1], [-w * w, -2 * z * w]], [[0], [1]], [[g * w * w, 0]], [[0]]
+
+    values = {"w": 40.0, "z": 0.05, "g": 1.0}
+    plant = fq.GreyBox(mode, [fq.Parameter(n, v) for n, v in values.items()])
+    said = []
+    for seed in range(8):
+        u = fq.white_noise(1200, seed=seed)
+        y = fq.simulate(plant, u, DT).y
+        level = y.std() / 20
+        direct = 0.5 * level * u / u.std()
+        record = fq.Record(u, y + direct + level * coloured(seed, 1200), DT)
+        said.append(first_said(record, plant))
+    assert said.count("feedthrough") >= 7, said
+
+
+def test_one_start_along_a_valley_is_no_trust():
+    """Three masses seen from one end: one start may end a little above the best, unseen."""
+    plant = fq.drivetrain(3)
+    names = [p.name for p in plant.free_parameters]
+    grades = []
+    for case in (378, 570):
+        rng = np.random.default_rng([19, case])
+        u = fq.chirp(0.5, 80, 10, 2e-3) if case % 8 < 4 else fq.white_noise(5000, seed=case)
+        record = fq.simulate(plant, u, 2e-3)
+        record = record.with_noise(0.1 * np.std(record.y), seed=case)
+        far = {n: plant[n] * float(np.exp(rng.uniform(-2, 2))) for n in names}
+        est = fq.fit(plant.with_values(**far), record, n_starts=1)
+        grades.append(est.verdict.grade)
+    assert "trust" not in grades
