@@ -91,9 +91,10 @@ def measured(s, fault="none", size=None):
     """A record, or several, with a fault of that size in it."""
     u, clean = s.u(), s.clean()
     level = clean.std() / s.ratio
-    size = SIZES.get(fault) if size is None else size
     if fault == "feedback":
-        return fq.Record(*looped(s, u, size)[:2], s.dt)
+        # a controller that answers within the sample looks like a direct term where it is weak
+        return fq.Record(*looped(s, u, size or SIZES[fault], late=int(size is not None))[:2], s.dt)
+    size = SIZES.get(fault) if size is None else size
     y = clean + added(s, fault, size) + level * s.noise()
     if fault == "saturation":
         y = clipped(clean + level * s.noise(), size)
@@ -153,9 +154,9 @@ def _changed(s, u, size):
     return np.concatenate(y)
 
 
-def looped(s, r, size, number=0):
-    """Input, output and noise of the lag under u = r − y, with slow noise as large as that part of
-    the signal.
+def looped(s, r, size, number=0, late=0):
+    """Input, output and noise of the lag under u = r − y, so many samples late, with slow noise as
+    large as that part of the signal.
     """
     e = dataclasses.replace(s, pole=SLOW).noise(number)
     v = size * s.clean().std() * e
@@ -164,6 +165,6 @@ def looped(s, r, size, number=0):
     x, u, y = 0.0, np.zeros(len(r)), np.zeros(len(r))
     for k in range(len(r)):
         y[k] = x + v[k]
-        u[k] = r[k] - y[k]
+        u[k] = r[k] - (y[k - late] if k >= late else 0.0)
         x = phi * x + gamma * u[k]
     return u, y, v
