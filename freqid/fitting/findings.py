@@ -96,7 +96,8 @@ class Evidence:
     ``values`` and ``std`` (P,) of ``parameters``; ``loose`` are sentences on what the data leave
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
     ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
-    a black box whose motions grow, ``out_of_sight`` modes (Hz) above the Nyquist frequency;
+    a black box whose motions grow, the surest by ``growth`` standard errors; ``out_of_sight`` modes
+    (Hz) above the Nyquist frequency;
     ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
     rounding of the matrices moves the response, with the sentence on it.
     """
@@ -111,6 +112,7 @@ class Evidence:
     n_rows: int = 0
     n_unknowns: int = 0
     growing: Sequence[complex] = ()
+    growth: float = np.inf
     out_of_sight: Sequence[float] = ()
     aliased: float = 0.0
     rounding: tuple[float, str] = (0.0, "")
@@ -182,12 +184,15 @@ def unstable(e: Evidence) -> Iterator[Finding]:
         count = len(e.growing)
         worst = max(e.growing, key=abs)
         which = "a pole" if count == 1 else f"{count} poles"
-        yield Finding(
-            "unstable",
+        sentence = (
             f"the model has {which} whose motion grows (one at {worst:.5g}): on other data it may "
-            "go anywhere; fit a lower order, or OutputError(order, stable=True)",
-            number=float(count),
+            "go anywhere; fit a lower order, or OutputError(order, stable=True)"
         )
+        severity: Severity = "serious"
+        if e.growth < _CERTAIN:
+            sentence += "; it grows by less than two standard errors, as an integrator may"
+            severity = "minor"
+        yield Finding("unstable", sentence, severity, float(count))
 
 
 @sign

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import freqid as fq
 
@@ -165,3 +166,21 @@ def test_a_free_double_integrator_is_recognised():
     est = fq.fit(model, record, start={"k": 40.0, "J1": 1.2e-4})
     assert est["k"] == pytest.approx(50, rel=1e-6)
     assert est.fit_percent > 99.99
+
+
+def test_an_integrator_that_may_grow_is_no_reason_for_doubt():
+    """A pole at one, within its error bar of the unit circle, and one that is truly beyond it."""
+
+    def severities(rate):
+        said = []
+        for seed in range(8):
+            u = fq.white_noise(600, seed=seed)
+            y = scipy.signal.lfilter([0, 0.1], [1, -np.exp(rate * 0.01)], u)
+            y = y + 0.2 * y.std() * np.random.default_rng(seed).standard_normal(600)
+            est = fq.fit(fq.OutputError(1), fq.Record(u, y, 0.01))
+            said += [w.severity for w in est.warnings if w.kind == "unstable"]
+        return said
+
+    assert set(severities(0.0)) <= {"minor"}
+    assert "minor" in severities(0.0)
+    assert severities(0.5) == ["serious"] * 8

@@ -22,6 +22,7 @@ from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.sufficiency import enough_rows, told_apart
+from freqid.fitting.uncertainty.error_bars import pole_scatter
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.lti import Hold, Plane, StateSpace
 from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
@@ -198,10 +199,11 @@ def coefficient_estimate(
     x, step = minimum.x, 1e-7
     values, *others = coefficients(x + np.vstack([np.zeros(len(x)), step * np.eye(len(x))]))
     change = (np.array(others) - values).T / step
-    none = np.zeros(0)
+    none, spread = np.zeros(0), Spread(change, minimum)
     solution = minimum.solution
     failure = "" if solution.converged else solution.message
     rows = minimum.objective.n_rows
+    growing = _growing(model)
     evidence = Evidence(
         [],
         none,
@@ -209,7 +211,8 @@ def coefficient_estimate(
         failure,
         n_rows=rows,
         n_unknowns=len(values),
-        growing=_growing(model).tolist(),
+        growing=growing.tolist(),
+        growth=_growth(minimum, spread) if len(growing) else np.inf,
         out_of_sight=[] if model.dt else out_of_sight(model.poles, hold),
     )
     return Estimate(
@@ -218,7 +221,7 @@ def coefficient_estimate(
         values=values,
         nominal=np.full(len(values), np.nan),
         units=[""] * len(values),
-        uncertainty=Spread(change, minimum),
+        uncertainty=spread,
         problem=minimum,
         hold=hold,
         dt=dt,
@@ -231,3 +234,12 @@ def _growing(model: Model) -> ComplexArray:
     """Poles of motions that grow."""
     poles = model.poles
     return poles[np.abs(poles) > 1] if model.dt else poles[poles.real > 0]
+
+
+def _growth(minimum: Minimum, spread: Spread) -> float:
+    """Standard errors by which the surest of the motions that grow does."""
+    poles, scatter = pole_scatter(minimum.structure, minimum.x, spread)
+    std = np.sqrt(np.maximum(scatter[:, 0, 0], 0))
+    grows = poles.real > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.max((poles.real / std)[grows], initial=0.0)) if grows.any() else np.inf
