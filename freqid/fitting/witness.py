@@ -35,7 +35,7 @@ from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom, shared
 from freqid.lti import in_one_blas_thread
-from freqid.models import DiscreteModel, Model, observed_order
+from freqid.models import Model, observed_order
 
 # level below which the black box explains the data so much better that it is no chance
 _LEVEL = 0.01
@@ -207,34 +207,37 @@ def _beside(
     return min(found, found.beside(model, own), key=lambda r: r.cost)
 
 
-def excess(
-    structure: GreyStructure,
-    readings: Sequence[Reading],
-    boxes: Sequence[Reference],
-    grey: Solution,
-    by_grey: bool = False,
-) -> float:
-    """(V − V_bb)/V_bb, weighted by what the black boxes leave where nothing else is known.
-
-    There is one of these for each group of experiments that meet the same plant. ``by_grey``
-    weights by what the grey box leaves: a black box of a higher order has taken part of the noise
-    itself.
-    """
-    groups = _groups(structure, readings)
+def weighted_by(
+    models: Sequence[Model], groups: Sequence[Sequence[int]], readings: Sequence[Reading]
+) -> list[Reading]:
+    """Readings weighted by what the model of each group leaves of them, where that is uneven."""
     weighted = list(readings)
-    for box, group in zip(boxes, groups, strict=True):
-        model: Model = DiscreteModel(
-            box.chart.in_z(box.solution.x), box.chart.dt, readings[group[0]].hold,
-            structure.model.inputs or (), structure.model.outputs or (),
-        )  # fmt: skip
-        if by_grey:
-            model = structure.at(grey.x, group[0])
+    for model, group in zip(models, groups, strict=True):
         for i in group:
             r = readings[i]
             left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
             # weights that are not needed would add their own scatter
             if left is not None and not evenly_spread(left.error):
                 weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))
+    return weighted
+
+
+def excess(
+    structure: GreyStructure,
+    readings: Sequence[Reading],
+    boxes: Sequence[Reference],
+    grey: Solution,
+) -> float:
+    """(V − V_bb)/V_bb, weighted by what the black boxes leave where nothing else is known.
+
+    There is one of these for each group of experiments that meet the same plant.
+    """
+    groups = _groups(structure, readings)
+    models = [
+        box.model(structure.model, readings[group[0]].hold)
+        for box, group in zip(boxes, groups, strict=True)
+    ]
+    weighted = weighted_by(models, groups, readings)
     cost = sum(b.cost for b in boxes)
     if all(new is old for new, old in zip(weighted, readings, strict=True)):
         return max(grey.cost / cost - 1, 0.0)

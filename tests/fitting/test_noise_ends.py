@@ -19,4 +19,6 @@ def test_an_autoregression_has_one_term_for_each_of_its_poles(size):
 
 
 def test_white_noise_has_no_past():
-    assert noise_ends(np.arange(51), 100, np.full((2, 51), 3.0)).shape == (0, 2, 51)
+    shapes = noise_ends(np.arange(51), 100, np.full((2, 51), 3.0))
+    assert shapes.shape == (0, 2, 51)
+    assert np.iscomplexobj(shapes)

@@ -92,3 +92,50 @@ def test_one_start_along_a_valley_is_no_trust():
         est = fq.fit(plant.with_values(**far), record, n_starts=1)
         grades.append(est.verdict.grade)
     assert "trust" not in grades
+
+
+def test_a_hum_is_called_a_tone():
+    """A sine that the input does not have is no mode, and its frequency is told."""
+    said, off = [], []
+    for seed in range(8):
+        u = fq.white_noise(1000, seed=seed)
+        y = fq.simulate(LAG, u, DT).y
+        hum = np.sqrt(2) * np.sin(2 * np.pi * 16.7 * DT * np.arange(1000) + seed)
+        level = 0.05 * y.std()
+        noise = coloured(seed, 1000, 0.9 * (seed % 2))
+        est = fq.fit(LAG, fq.Record(u, y + level * (noise + hum), DT))
+        said.append(est.warnings[0].kind)
+        off.append(float(est.warnings[0].split(" at ")[1].split(" Hz")[0]) - 16.7)
+    assert said == ["tone"] * 8
+    assert np.abs(off).max() < 0.1 / (1000 * DT)
+
+
+def test_a_spike_and_a_weak_mode_stick_out_of_coloured_noise():
+    """Where the noise is weak: at high frequency, and against its own prediction."""
+    found = []
+    for seed in range(8):
+        u = fq.white_noise(800, seed=seed)
+        y = fq.simulate(LAG, u, DT).y
+        noise = 0.1 * y.std() * coloured(seed, 800)
+        spiked = y + noise
+        spiked[317] += 2.6 * noise.std()
+        b, a = scipy.signal.butter(1, [0.6, 0.62], "bandpass")
+        mode = scipy.signal.lfilter(b, a, u)
+        resonant = y + noise + 0.1 * (1 + 9 * (seed % 2)) * noise.std() * mode / mode.std()
+        found.append((first_said(fq.Record(u, spiked, DT)), first_said(fq.Record(u, resonant, DT))))
+    assert [s for s, _ in found].count("spikes") >= 7, found
+    assert [m for _, m in found].count("another mode") >= 7, found
+
+
+def test_experiments_that_differ_where_their_noise_is_weak_are_told_apart():
+    """By a fiftieth of a gain, which a fit that weighs all lines alike knows to a fiftieth, too."""
+    said = []
+    for seed in range(8):
+        data = []
+        for k, gain in enumerate((50.0, 51.0)):
+            u = fq.white_noise(800, seed=10 * seed + k)
+            y = fq.simulate(LAG.with_values(b=gain), u, DT).y
+            noise = 0.1 * y.std() * coloured(100 * seed + k, 800)
+            data.append(fq.Record(u, y + noise, DT))
+        said.append(first_said(data))
+    assert said.count("unlike experiments") >= 7, said

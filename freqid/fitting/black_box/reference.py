@@ -12,6 +12,7 @@ from functools import partial
 from typing import cast
 
 import numpy as np
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.black_box.refinement import exchanged_model, first_model
@@ -23,7 +24,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
 from freqid.lti import Hold, PeriodicHold, Plane, StateSpace, observed, reduced
-from freqid.models import GreyBox, late_sampled, observed_order
+from freqid.models import DiscreteModel, GreyBox, Model, late_sampled, observed_order
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
@@ -180,6 +181,23 @@ class Reference:
         """One that begins from a model: it leaves no more than the model does."""
         chart = self.chart
         centre = self._around(model, readings)
+        return self._from(Chart(centre, chart.feedthrough, chart.plane, chart.dt), readings)
+
+    def model(self, like: Model, hold: Hold) -> DiscreteModel:
+        """It as a sampled model behind a hold, with the channels of another."""
+        in_z = self.chart.in_z(self.solution.x)
+        return DiscreteModel(in_z, self.chart.dt, hold, like.inputs or (), like.outputs or ())
+
+    def with_mode(self, model: GreyBox, readings: Sequence[Reading], mode: StateSpace) -> Reference:
+        """One that begins from a model of an order less and a sampled mode beside it."""
+        chart, own = self.chart, _held(model, readings[0].hold)
+        W, X = observed(model.state_space(), len(chart.centre.A) - len(mode.A))
+        own = reduced(own, W, X)
+        both = StateSpace(
+            scipy.linalg.block_diag(own.A, mode.A), np.concatenate([own.B, mode.B]),
+            np.concatenate([own.C, mode.C], axis=1), own.D + mode.D,
+        )  # fmt: skip
+        centre = to_plane(both, chart.plane)
         return self._from(Chart(centre, chart.feedthrough, chart.plane, chart.dt), readings)
 
     def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:

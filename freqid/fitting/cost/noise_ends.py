@@ -31,7 +31,7 @@ def noise_ends(number: IntArray, n_samples: int, weights: FloatArray) -> Complex
             shape = np.zeros((len(weights), len(number)), complex)
             shape[output] = np.exp(-1j * j * angle) / A
             shapes.append(shape)
-    return np.array(shapes).reshape(-1, len(weights), len(number))
+    return np.array(shapes, complex).reshape(-1, len(weights), len(number))
 
 
 def _whitening(number: IntArray, n_samples: int, w: FloatArray) -> tuple[ComplexArray, int]:

@@ -16,8 +16,9 @@ from freqid.data import input_dt
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
-from freqid.fitting.suspects.beyond import looped, midway, one_more_mode, unlike
+from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
+from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LIKELY, evidence, ordered
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.refits import held, late

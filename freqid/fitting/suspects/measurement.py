@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from freqid.checks import FloatArray
 from freqid.fitting.suspects.register import Columns, suspect
@@ -16,8 +17,10 @@ _AT_LIMIT, _NEAR = 4, 1e-9
 # many that share an extreme do so by no chance; and part of the range below an extreme in which a
 # signal that comes to rest has more samples than at it
 _SHARED, _REST = ((1.0, 2), (0.99, 3), (0.9, 4)), 0.01
+# periods that a tone has in a record at least, and rows of all tones together at the most
+_PERIODS, _MOST_ROWS = 4, 2e7
 # relative difference of two levels that is one
-_LEVELS = 0.05
+_LEVELS = 0.2
 
 
 @suspect("offset")
@@ -86,6 +89,55 @@ def _whitened(scene: Scene, number: int, s: Seen) -> FloatArray:
     return s.signals((s.left / noise).view(complex).reshape(s.n_outputs, -1))
 
 
+@suspect("tone")
+def tone(scene: Scene, model: Model) -> Columns | None:
+    """A sine that the input does not have is added to the outputs, as the mains hum."""
+    if any(s.record is None for s in scene.seen):
+        return None
+    rows = sum(len(s.left) for s in scene.seen)
+    candidates = [c for s in scene.seen for c in _sticking_out(s)]
+    outputs = sum(s.n_outputs for s in scene.seen)
+    if not candidates or 2 * outputs * rows > _MOST_ROWS:
+        return None
+    omega = max(candidates)[1]
+    drawn, at = [], 0
+    for s in scene.seen:
+        signals = np.zeros((2 * outputs, s.n_outputs, len(s.record.time)))  # type: ignore[union-attr]
+        wave = np.exp(1j * omega * s.record.time)  # type: ignore[union-attr]
+        for o in range(s.n_outputs):
+            signals[at, o], signals[at + 1, o] = wave.real, wave.imag
+            at += 2
+        drawn.append(s.sampled(signals))
+    # between the lines there are as many places again
+    return Columns(drawn, "", rows, f"at {omega / (2 * np.pi):.4g} Hz")
+
+
+def _sticking_out(s: Seen) -> list[tuple[float, float]]:
+    """The line of each output that is farthest above those around it: how far, and its ω (rad/s).
+
+    Between the lines by the three largest (Jacobsen and Kootsookos, IEEE Signal Processing
+    Magazine 24(3), 2007).
+    """
+    N, at = s.grid
+    found = []
+    for X in s.left.view(complex).reshape(s.n_outputs, -1):
+        power = np.abs(X) ** 2
+        width = min(2 * int(np.sqrt(len(X))) + 1, len(X))
+        around = scipy.ndimage.median_filter(power, width, mode="reflect")
+        above = power / np.maximum(around, 1e-300)
+        # a tone of few periods is a drift, and one at an end of the lines has no neighbour
+        inside = (at >= _PERIODS) & (np.arange(len(at)) > 0) & (np.arange(len(at)) < len(at) - 1)
+        if not inside.any():
+            continue
+        k = int(np.argmax(np.where(inside, above, 0)))
+        below, middle, over = X[k - 1 : k + 2]
+        off = float(np.real((below - over) / (2 * middle - below - over)))
+        off = off if abs(off) < 1 else 0.0
+        line = (at[k] + off) * 2 * np.pi / (N * s.record.dt)  # type: ignore[union-attr]
+        found.append((float(above[k]), float(line)))
+    return found
+
+
 @suspect("saturation")
 def saturation(scene: Scene, model: Model) -> Columns | None:
     """An output stays at one extreme value for several samples, as at a limit."""
@@ -100,7 +152,8 @@ def saturation(scene: Scene, model: Model) -> Columns | None:
             for extreme, sign in ((signal.max(), 1.0), (signal.min(), -1.0)):
                 at = np.abs(signal - extreme) <= near
                 pulse = np.zeros((1, *y.shape))
-                clipped = _clipped(sign * signal)
+                # the same limit either way, too, is one
+                clipped = _clipped(sign * signal) or _clipped(np.abs(signal))
                 if clipped or at.sum() >= _AT_LIMIT:
                     found, certain = True, certain or clipped
                     pulse[0, o] = sign * at

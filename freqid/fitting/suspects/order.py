@@ -16,8 +16,10 @@ _UNLIKELY = ("delay", "feedthrough", "hold rejected")
 _EQUAL, _CHANCE = 0.98, 6.0
 # part of one more mode's gain at which something simpler is believed instead
 _AS_MUCH = 0.8
-# faults of a sensor leave room for a plant that changes
-_BESIDE = ("unsteady", "offset", "drift", "spikes", "saturation")
+# what a sharp mode looks like from near: it has to explain more
+_NARROW = ("unsteady", "tone")
+# faults of a sensor leave room for a plant that changes, and a mode that moves looks like two
+_BESIDE = ("unsteady", "another mode", "offset", "drift", "spikes", "saturation", "tone")
 
 
 def evidence(scene: Scene, a: Asked) -> float:
@@ -46,12 +48,12 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         ranked = [*equal, *(a for a in ranked if a not in equal)]
     if ranked[0].name == "another mode":
         enough = _AS_MUCH * ranked[0].test.gain
-        simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name != "unsteady"]
+        simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name not in _NARROW]
         ranked = [*simple, *(a for a in ranked if a not in simple)]
     if ranked[0].name == "unsteady":
         # to a sweep whatever the model lacks is a change between its halves
         first = ranked[0]
-        ranked.sort(key=lambda a: a is first or a.test.chi < first.test.chi)
+        ranked.sort(key=lambda a: a is first or a.test.chi - 2 * np.log(a.trials) < first.test.chi)
     if ranked[0].name not in _BESIDE:
         ranked = [a for a in ranked if a.name != "unsteady"]
     return ranked

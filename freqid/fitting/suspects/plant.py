@@ -48,7 +48,7 @@ def delay(scene: Scene, model: Model) -> list[Columns]:
             late[q].append(s.answered(moved * G)[None] / (q * step))
     drawn = [smooth, *late.values()]
     whole = [d for d in drawn if len(d) == len(scene.seen)]
-    return [Columns(d, "s", len(whole), many_lines=True) for d in whole]
+    return [Columns(d, "s", len(whole)) for d in whole]
 
 
 def _slope(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
@@ -74,7 +74,7 @@ def feedthrough(scene: Scene, model: Model) -> Columns | None:
         unit = np.zeros((len(pairs), *D.shape, len(s.omega_input)), complex)
         unit[np.arange(len(pairs)), pairs[:, 0], pairs[:, 1]] = 1
         drawn.append(np.array([s.answered(G) for G in unit]))
-    return Columns(drawn, many_lines=True)
+    return Columns(drawn)
 
 
 def _direct(scene: Scene) -> bool:
@@ -101,7 +101,7 @@ def hold_period(scene: Scene, model: Model) -> Columns | None:
             drawn.append(s.answered((up - down) / (2 * step))[None])
         else:
             drawn.append(np.zeros((1, len(s.left))))
-    return Columns(drawn, "s", many_lines=True)
+    return Columns(drawn, "s")
 
 
 @suspect("hold")
@@ -120,7 +120,7 @@ def hold(scene: Scene, model: Model) -> list[Columns]:
             drawn.append(s.answered(_responses(s.own(model), other, s.omega_input) - own)[None])
         if len(drawn) == len(scene.seen):
             kinds[name] = drawn
-    return [Columns(d, "", len(kinds), name, many_lines=True) for name, d in kinds.items()]
+    return [Columns(d, "", len(kinds), name) for name, d in kinds.items()]
 
 
 def _alternative(name: str, s: Seen, late: bool) -> Hold | None:
@@ -156,7 +156,7 @@ def feedback(scene: Scene, model: Model) -> Columns | None:
         return None
     ahead = [_shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
     past = [_shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
-    return Columns(ahead, beside=past, many_lines=True)
+    return Columns(ahead, beside=past)
 
 
 def _shifted(s: Seen, model: Model, samples: range) -> FloatArray:

@@ -16,8 +16,7 @@ class Columns:
 
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
     ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
-    data themselves show, however little it explains. What acts at ``many_lines`` can be weighed by
-    the noise at each: that of the few lines at which a drift acts is not known well enough.
+    data themselves show, however little it explains.
     """
 
     columns: Sequence[FloatArray]
@@ -26,7 +25,6 @@ class Columns:
     detail: str = ""
     beside: Sequence[FloatArray] | None = None
     certain: bool = False
-    many_lines: bool = False
 
 
 Drawn = Columns | Sequence[Columns] | None

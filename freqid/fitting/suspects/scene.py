@@ -28,7 +28,7 @@ from freqid.fitting.uncertainty.evenness import (
 )
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.uncertainty.noise_spectrum import local_power
+from freqid.fitting.uncertainty.noise_spectrum import shaped_power
 from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom
 from freqid.lti import Plane, directions
 
@@ -213,26 +213,29 @@ class Scene:
 
     def weighed(
         self, columns: Sequence[FloatArray], variance: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Columns and what is left in units of the noise (R,), less what is absorbed of them there.
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Columns, what is left, and the part of each row's noise that is (R,), in units of the
+        noise, less what is absorbed of them there.
 
         Parameters that were fitted without these weights are off by what their directions take
         out of both (Neyman's C(alpha), 1959).
         """
         w = 1 / np.sqrt(np.maximum(variance, 1e-300))
-        rows = np.concatenate([self.stacked(columns), self.left[None], self.jacobian]) * w
-        at = 0
+        own = [self.jacobian] if self.more is None else [self.jacobian, self.more]
+        rows, at = np.concatenate([self.stacked(columns), self.left[None], *own]), 0
+        kept = np.ones(len(variance))
         for s in self.seen:
             part = slice(at, at := at + len(s.left))
-            Q = directions(s.free * w[part], _LOOSE)[2]
+            Q = s.taken(variance[part])
+            rows[:, part] *= w[part]
             rows[:, part] -= (rows[:, part] @ Q.T) @ Q
-        ends = [len(columns[0]), len(columns[0]) + 1]
-        drawn, left, J = np.split(rows, ends)
-        if self.more is not None:
-            J = np.concatenate([J, self.more * w])
+            kept[part] -= (Q**2).sum(axis=0)
+        rows[:, at:] *= w[at:]
+        drawn, left, J = np.split(rows, [len(columns[0]), len(columns[0]) + 1])
         size = np.linalg.norm(J, axis=1)
         B = directions(J[size > 0] / size[size > 0, None], _LOOSE)[2]
-        return drawn - (drawn @ B.T) @ B, (left - (left @ B.T) @ B)[0]
+        kept -= (B**2).sum(axis=0)
+        return drawn - (drawn @ B.T) @ B, (left - (left @ B.T) @ B)[0], kept
 
     def clear(self, columns: Sequence[FloatArray]) -> FloatArray:
         """Columns of each experiment less what initial states and parameters absorb, stacked."""
@@ -244,6 +247,6 @@ class Scene:
 def _power_at(rows: FloatArray, e: SpectralExperiment) -> FloatArray:
     """Variance of each real value (rows,): its channel's where that is white, else around it."""
     if not is_white(rows, e):
-        return local_power(rows, e)
+        return shaped_power(rows, e)
     powers, _ = channel_power(rows, e)
     return np.repeat(powers, 2 * e.n_lines)

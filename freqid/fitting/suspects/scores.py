@@ -22,6 +22,8 @@ from freqid.lti import directions
 _ABSORBED = 1e-5
 # directions of several columns together below this part of the largest are none
 _SAME = 1e-9
+# part of a line's noise that is left at least
+_LEAST = 0.1
 
 
 @dataclass(frozen=True)
@@ -95,11 +97,8 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     rest = scene.left - along @ Vt
     if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
-    elif drawn.many_lines:
-        chi = _weighed(scene, columns, scene.variance_of(rest), freedom)
     else:
-        spread = (Vt * scene.variance_of(rest)) @ Vt.T
-        chi = float(along @ np.linalg.solve(spread, along))
+        chi = _weighed(scene, columns, scene.variance_of(rest), freedom)
     wider = scene.together(rest) * scene.tied(rest, scene.parted(Vt))
     chi, freedom = chi / wider, max(int(min(freedom / wider, scene.noise_freedom)), 1)
     delta = -(U / s) @ along
@@ -116,8 +115,22 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
 def _weighed(
     scene: Scene, columns: Sequence[FloatArray], variance: FloatArray, freedom: int
 ) -> float:
-    """What columns explain in units of the noise where lines count by its variance (R,) at each."""
-    seen, left = scene.weighed(columns, variance)
-    ways = directions(seen / np.linalg.norm(seen, axis=1)[:, None], _SAME, _ABSORBED)[2]
-    told = float(np.sum((ways @ left) ** 2))
-    return told / (float(left @ left - told) / freedom)
+    """What columns explain in units of the noise where lines count by its variance at each, of
+    which ``variance`` (R,) is the first guess.
+    """
+    _, rest, kept = _told(scene, columns, variance)
+    # lines of which more was absorbed have shown less of their noise
+    variance = scene.variance_of(rest * np.sqrt(variance / np.maximum(kept, _LEAST)))
+    told, rest, _ = _told(scene, columns, variance)
+    return told / (float(rest @ rest) / freedom)
+
+
+def _told(
+    scene: Scene, columns: Sequence[FloatArray], variance: FloatArray
+) -> tuple[float, FloatArray, FloatArray]:
+    """What columns explain, what they leave (R,), and the part of each row's noise in that."""
+    seen, left, kept = scene.weighed(columns, variance)
+    size = np.linalg.norm(seen, axis=1)
+    ways = directions(seen[size > 0] / size[size > 0, None], _SAME, _ABSORBED)[2]
+    along = ways @ left
+    return float(along @ along), left - along @ ways, kept - (ways**2).sum(axis=0)

@@ -9,12 +9,15 @@ import numpy as np
 from freqid.checks import Array, ComplexArray, FloatArray, IntArray
 from freqid.data import Record
 from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.noise_ends import noise_ends
 from freqid.fitting.reading import Reading
-from freqid.lti import sum_runs
+from freqid.lti import directions, sum_runs
 from freqid.models import Model
 
 # parts of a signal that are but the rounding of its transform
 _ROUNDING = 1e-13
+# directions below this part of the largest are none
+_SAME = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,24 @@ class Seen:
         N = len(record.u) // record.factor
         at = np.round(self.experiment.lines.omega * N * record.dt / (2 * np.pi))
         return N, at.astype(int)
+
+    def taken(self, variance: FloatArray) -> FloatArray:
+        """Orthonormal rows (q, rows), in units of the noise of this variance (rows,), of what an
+        initial state or the noise's own past may have left.
+        """
+        w = 1 / np.sqrt(np.maximum(variance, 1e-300))
+        taken = np.concatenate([self.free, self._ends(variance)]) * w
+        size = np.linalg.norm(taken, axis=1)
+        return directions(taken[size > 0] / size[size > 0, None], _SAME)[2]
+
+    def _ends(self, variance: FloatArray) -> FloatArray:
+        """Rows (q, rows) of what the past of the noise may have left."""
+        if self.record is None or self.reading.band is not None:
+            return np.zeros((0, len(variance)))
+        scale, (N, at) = self.experiment.lines.scale[:, 0], self.grid
+        power = variance.reshape(self.n_outputs, -1, 2).sum(axis=-1)
+        shapes = noise_ends(at, N, scale**2 / np.maximum(power, 1e-300)) * scale
+        return np.ascontiguousarray(shapes.reshape(len(shapes), len(variance) // 2)).view(float)
 
     def signals(self, each: ComplexArray) -> FloatArray:
         """Signals (…, outputs, N) whose DFTs have these lines (…, outputs, K), and no others."""

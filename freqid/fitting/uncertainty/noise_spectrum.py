@@ -94,6 +94,18 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
 
 
+def shaped_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """Noise power at each of the residual's real values: an autoregression's, where that will do.
+
+    Where few lines tell a suspect their own mean would hide what it does there.
+    """
+    each = residual.view(complex).reshape(-1, e.n_lines)
+    if not (e.lines.scale > 0).all():
+        return local_power(residual, e)
+    power: FloatArray = np.repeat(_spectrum(each).ravel() / 2, 2)
+    return power
+
+
 def local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
     """Local mean of the squared residual, for each of its real values."""
     each = residual.view(complex).reshape(-1, e.n_lines)

@@ -1,0 +1,41 @@
+"""What is asked about: a fit, as far as suspects need to know it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from freqid.fitting.estimate import Estimate
+from freqid.fitting.reading import Reading
+from freqid.fitting.suspects.parts import Parting
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.witness import Share
+from freqid.models import Model
+
+
+class Asking(Protocol):
+    """A fit that is asked about."""
+
+    @property
+    def minimum(self) -> Minimum:
+        """Where its cost is least."""
+        ...
+
+    @property
+    def model(self) -> Model:
+        """The model there."""
+        ...
+
+    @property
+    def readings(self) -> Sequence[Reading]:
+        """The data."""
+        ...
+
+    @property
+    def share(self) -> Share | None:
+        """What errors of inputs that a reference explained add."""
+        ...
+
+    def apart(self, parting: Parting) -> list[Estimate | None]:
+        """Fits to each part of the data alone."""
+        ...
