@@ -24,6 +24,10 @@ class LineNoise:
     rows: ComplexArray
     power: FloatArray
 
+    def __post_init__(self) -> None:
+        for array in (self.first, self.rows, self.power):
+            array.flags.writeable = False
+
     def some(self, kept: BoolArray) -> LineNoise:
         """The same of some lines of the response."""
         return LineNoise(self.first[kept], self.rows[kept], self.power)

@@ -28,6 +28,7 @@ def test_rows_carry_the_outputs_noise_into_the_response(band):
     exact, frf = (fq.local_polynomial(r, band=band) for r in (clean, record))
     noise = np.fft.rfft(np.ravel(record.y - clean.y))[1:]
     known = frf.line_noise
+    assert not any(a.flags.writeable for a in (known.first, known.rows, known.power))
     # the first of the lines that the windows saw, half a window below the band
     start = 0 if band is None else np.searchsorted(np.arange(1, 300) / 6.0, 3.0) - known.first[0]
     start -= 0 if band is None else known.rows.shape[-1] // 2

@@ -31,7 +31,9 @@ from freqid.models import GreyBox, observed_order
 # distances of a mode's poles from the unit circle that are tried, in half lines
 _DISTANCES = (1.0, 4.0, 16.0)
 # lines at which a mode is looked for; lines around one that tell it, and how many at least
-_PLACES, _REACH, _LEAST = 200, 16.0, 6
+_PLACES, _REACH, _LEAST = 80, 16.0, 6
+# lines from which a black box begins: what they miss begins where the model is lacking
+_LINES = 3000
 # part of a line's noise that is left at least
 _KEPT = 0.1
 
@@ -52,7 +54,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         return []
     grey = inquiry.minimum.solution
     weighted = weighted_by([structure.at(grey.x, 0)], [range(len(readings))], readings)
-    boxes = _boxes(inquiry.model, scene, readings, weighted, means)
+    boxes = _boxes(inquiry.model, scene, weighted)
     if not boxes:
         return []
     box = min(boxes, key=lambda b: b.cost)
@@ -119,29 +121,19 @@ def _weighed_again(
     return again
 
 
-def _boxes(
-    model: GreyBox,
-    scene: Scene,
-    readings: Sequence[Reading],
-    weighted: Sequence[Reading],
-    means: bool,
-) -> list[Reference]:
-    """Black boxes in their minima on weighted lines: begun from the data as they are and as they
-    are weighed, and from the model with a mode where that explains most.
+def _boxes(model: GreyBox, scene: Scene, readings: Sequence[Reading]) -> list[Reference]:
+    """Black boxes in their minima: begun from the data, and from the model with a mode where that
+    explains most.
     """
-    order = observed_order(model) + 2
-    plain = all(new is old for new, old in zip(weighted, readings, strict=True))
-    found: list[Reference] = []
-    for begun in [readings] if plain else [readings, weighted]:
-        try:
-            box = Reference.of(model, begun, order=order)
-            found.append(box.on(weighted) if means or begun is not weighted else box)
-        except (InputError, np.linalg.LinAlgError):
-            continue
-    mode = None if not found or found[0].bilinear else _lacking(scene, found[0].chart.dt)
+    try:
+        own = Reference.of(model, readings, _LINES, order=observed_order(model) + 2)
+        found = [own.on(readings)]
+    except (InputError, np.linalg.LinAlgError):
+        return []
+    mode = None if own.bilinear else _lacking(scene, own.chart.dt)
     if mode is not None:
         with contextlib.suppress(InputError, np.linalg.LinAlgError, ArithmeticError):
-            found.append(found[0].with_mode(model, weighted, mode))
+            found.append(own.with_mode(model, readings, mode))
     return found
 
 
