@@ -208,16 +208,21 @@ def _beside(
 
 
 def weighted_by(
-    models: Sequence[Model], groups: Sequence[Sequence[int]], readings: Sequence[Reading]
+    models: Sequence[Model],
+    groups: Sequence[Sequence[int]],
+    readings: Sequence[Reading],
+    every: bool = False,
 ) -> list[Reading]:
-    """Readings weighted by what the model of each group leaves of them, where that is uneven."""
+    """Readings weighted by what the model of each group leaves of them, where that is uneven, or
+    ``every`` one.
+    """
     weighted = list(readings)
     for model, group in zip(models, groups, strict=True):
         for i in group:
             r = readings[i]
             left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
             # weights that are not needed would add their own scatter
-            if left is not None and not evenly_spread(left.error):
+            if left is not None and (every or not evenly_spread(left.error)):
                 weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))
     return weighted
 

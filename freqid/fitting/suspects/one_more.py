@@ -53,7 +53,8 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     if any(r.own_cost != means for r in asked):
         return []
     grey = inquiry.minimum.solution
-    weighted = weighted_by([structure.at(grey.x, 0)], [range(len(readings))], readings)
+    model, group = structure.at(grey.x, 0), range(len(readings))
+    weighted = weighted_by([model], [group], readings, every=not scene.even)
     boxes = _boxes(inquiry.model, scene, weighted)
     if not boxes:
         return []
@@ -75,8 +76,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         told = [(costs[0] / box.cost - 1, places), (costs[1] / box.on(again).cost - 1, places**2)]
     wider = shared([(box.objective, box.solution.x)])
     if inquiry.share is not None:
-        every = [range(len(readings))]
-        wider = max(inquiry.share(structure, grey, [box], every, readings) or wider, 1.0)
+        wider = max(inquiry.share(structure, grey, [box], [group], readings) or wider, 1.0)
     below = int(min(freedom / wider, scene.noise_freedom))
     found = [
         (min(float(scipy.stats.f.sf(f, degrees, below)) * trials, 1.0), f, more)
