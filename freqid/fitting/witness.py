@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import InputError
-from freqid.data import Record, StampedRecord
+from freqid.data import FrequencyResponse, Record, StampedRecord
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
@@ -220,7 +220,12 @@ def weighted_by(
     for model, group in zip(models, groups, strict=True):
         for i in group:
             r = readings[i]
-            left = errors_of(model, r) if isinstance(r.data, Record) and r.noise.plain else None
+            if not r.noise.plain:
+                continue
+            known = isinstance(r.data, FrequencyResponse) and r.data.variance is not None
+            if every and known:
+                weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
+            left = errors_of(model, r) if isinstance(r.data, Record) else None
             # weights that are not needed would add their own scatter
             if left is not None and (every or not evenly_spread(left.error)):
                 weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))

@@ -139,3 +139,17 @@ def test_experiments_that_differ_where_their_noise_is_weak_are_told_apart():
             data.append(fq.Record(u, y + noise, DT))
         said.append(first_said(data))
     assert said.count("unlike experiments") >= 7, said
+
+
+@pytest.mark.parametrize("weights", ["bias", "noise"])
+def test_a_response_measured_in_coloured_noise_lacks_no_mode(weights):
+    """A fit that weighs all lines alike is asked with the variance that the response knows."""
+    said = []
+    for seed in range(8):
+        u = fq.white_noise(4000, seed=seed)
+        y = fq.simulate(LAG, u, DT).y
+        frf = fq.h1(fq.Record(u, y + 0.05 * y.std() * coloured(seed, 4000), DT))
+        options = {} if weights == "bias" else {"weights": weights}
+        est = fq.fit(LAG, frf, **options)
+        said += [w.kind for w in est.warnings]
+    assert said == []

@@ -67,7 +67,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         return []
     places = float(sum(s.experiment.n_lines for s in scene.seen))
     if all(new is old for new, old in zip(weighted, readings, strict=True)):
-        told = [(grey.cost / box.cost - 1, places)]
+        told = [(grey.cost / box.cost - 1, places if scene.even else places**2)]
     else:
         again = _weighed_again(box, readings, weighted)
         seen = (Objective(structure, [r.lines() for r in of]) for of in (weighted, again))
