@@ -220,7 +220,7 @@ def weighted_by(
     for model, group in zip(models, groups, strict=True):
         for i in group:
             r = readings[i]
-            if not r.noise.plain:
+            if not r.noise.plain or r.both_ends:
                 continue
             known = isinstance(r.data, FrequencyResponse) and r.data.variance is not None
             if every and known:

@@ -153,3 +153,13 @@ def test_a_response_measured_in_coloured_noise_lacks_no_mode(weights):
         est = fq.fit(LAG, frf, **options)
         said += [w.kind for w in est.warnings]
     assert said == []
+
+
+def test_an_output_that_no_input_moves_tells_no_plant():
+    """A constant, or a motion that dies out, is explained to its rounding by an initial state."""
+    u, dying = fq.white_noise(400, seed=1), np.exp(-0.2 * np.arange(400))
+    for model, y in ((LAG, np.ones(400)), (LAG, dying), (fq.OutputError(1), dying)):
+        est = fq.fit(model, fq.Record(u, y, DT))
+        assert [w.kind for w in est.warnings] == ["no signal"]
+        assert est.verdict.grade == "do not use"
+    assert fq.fit(LAG, fq.simulate(LAG, u, DT)).verdict.trusted

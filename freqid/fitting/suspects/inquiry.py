@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
 from freqid.checks import InputError
 from freqid.data import input_dt
@@ -26,6 +25,7 @@ from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, score
 from freqid.fitting.suspects.sentences import sentence, words
+from freqid.fitting.suspects.silence import silent, unheard
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
@@ -46,8 +46,8 @@ _REACHED = 0.5
 _WORTH, _SAID = 0.5, 3
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
-# level at which an input is heard at all, and the part of the output left that means trouble
-_HEARD, _MOST_LEFT = 1e-3, 0.3
+# part of the output left that means trouble
+_MOST_LEFT = 0.3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
@@ -183,9 +183,9 @@ class Inquiry:
         """Sentences on the strongest suspects."""
         scene, named = self.scene, self.named
         if scene is None:
-            return []
-        if silent := self._silent(scene):
-            return silent
+            return unheard(self.minimum, self.model, self.readings)
+        if found := silent(scene):
+            return found
         turn = turned(self.minimum, self.model, self.readings) if self._in_trouble(scene) else []
         if turn:
             return turn
@@ -209,20 +209,6 @@ class Inquiry:
         return [
             Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number) for f in found
         ]
-
-    def _silent(self, scene: Scene) -> list[Finding]:
-        """Whether the input explains no more of the output than chance."""
-        told = len(scene.absorbed)
-        rest = sum(float(s.at_rest @ s.at_rest) for s in scene.seen)
-        f = (rest - scene.cost) / max(told, 1) / (scene.cost / max(scene.freedom, 1))
-        p = float(scipy.stats.f.sf(max(f, 0.0), max(told, 1), max(scene.freedom, 1)))
-        if p < _HEARD or len(scene.known):
-            return []
-        text = (
-            f"the input explains no more of the output than chance (F = {f:.3g} on {told} and "
-            f"{scene.freedom}, p = {p:.2g}): check that the channels belong together"
-        )
-        return [Finding("no signal", text, number=float(f))]
 
     def _in_trouble(self, scene: Scene) -> bool:
         """Whether values make no sense, or most of the output is left."""

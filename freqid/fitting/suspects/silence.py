@@ -1,0 +1,57 @@
+"""Whether the input is heard in the output at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+
+from freqid.checks import InputError
+from freqid.fitting.findings import Finding
+from freqid.fitting.reading import Reading
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.models import Model
+
+# level at which it is, and the part of an output that is but rounding
+_HEARD, _ROUNDING = 1e-3, 1e-16
+
+
+def silent(scene: Scene) -> list[Finding]:
+    """Whether the input explains no more of the output than chance."""
+    told = len(scene.absorbed)
+    rest = sum(float(s.at_rest @ s.at_rest) for s in scene.seen)
+    f = (rest - scene.cost) / max(told, 1) / (scene.cost / max(scene.freedom, 1))
+    p = float(scipy.stats.f.sf(max(f, 0.0), max(told, 1), max(scene.freedom, 1)))
+    if p < _HEARD or len(scene.known):
+        return []
+    text = (
+        f"the input explains no more of the output than chance (F = {f:.3g} on {told} and "
+        f"{scene.freedom}, p = {p:.2g}): check that the channels belong together"
+    )
+    return [Finding("no signal", text, number=float(f))]
+
+
+def unheard(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[Finding]:
+    """Whether of data that are explained to their rounding the input explains nothing."""
+    if not minimum.exact or not minimum.solution.converged:
+        return []
+    try:
+        scene = Scene.of(minimum, readings)
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return []
+    heard = 0.0
+    for s in scene.seen:
+        own, hold = s.own(model), s.reading.hold
+        rows = s.answered(own.responses_at(s.omega_input, None if own.dt else hold))
+        # a constant is a motion of an integrator as much as its answer to the input's mean
+        rows = s.without_free(rows[None])[0]
+        heard += float(rows @ rows)
+    if not heard <= _ROUNDING * scene.energy:
+        return []
+    text = (
+        "the input explains nothing of the output, a free motion or a constant all of it: check "
+        "that the channels belong together"
+    )
+    return [Finding("no signal", text, number=0.0)]
