@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+import scipy.stats
 
 
 @pytest.fixture(scope="module")
@@ -35,3 +36,16 @@ def test_every_cell_of_the_coverage_runs(studies):
     table = pd.DataFrame([studies.covered(case) for case in range(len(studies.CELLS))])
     assert set(table["cell"]) == set(studies.CELLS)
     assert table["held"].mean() > 0.6
+
+
+def test_faults_as_weak_as_may_be_are_mostly_named(benchmarks):
+    from trust import strengths
+
+    # a test of one number, from both ends of the normal distribution
+    ends = scipy.stats.norm.isf(strengths.LEVEL / 2) + scipy.stats.norm.isf(1 - strengths.POWER)
+    assert strengths.needed(1) == pytest.approx(ends**2, rel=1e-3)
+    assert strengths.needed(1, places=100) > strengths.needed(1)
+    table = pd.DataFrame([strengths.threshold(case) for case in (0, 1, 4, 6, 7)])
+    assert (table["grade"] != "absorbed").all()
+    assert table["named"].sum() >= 4
+    assert len(list(strengths.rows(table))) == 5
