@@ -156,7 +156,7 @@ def feedback(scene: Scene, model: Model) -> Columns | None:
         return None
     ahead = [_shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
     past = [_shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
-    return Columns(ahead, beside=past)
+    return Columns(ahead, beside=past, comes_of_noise=True)
 
 
 def _shifted(s: Seen, model: Model, samples: range) -> FloatArray:

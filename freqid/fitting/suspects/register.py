@@ -16,7 +16,8 @@ class Columns:
 
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
     ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
-    data themselves show, however little it explains.
+    data themselves show, however little it explains. What ``comes_of_noise`` shows where that is
+    strong, too, and is asked with lines counted alike as well.
     """
 
     columns: Sequence[FloatArray]
@@ -25,6 +26,7 @@ class Columns:
     detail: str = ""
     beside: Sequence[FloatArray] | None = None
     certain: bool = False
+    comes_of_noise: bool = False
 
 
 Drawn = Columns | Sequence[Columns] | None

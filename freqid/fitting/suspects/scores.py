@@ -95,10 +95,15 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     gain = float(along @ along)
     # the noise is what the suspect leaves: with it inside a strong one would hide itself
     rest = scene.left - along @ Vt
+    throws = 1
     if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
     else:
-        chi = _weighed(scene, columns, scene.variance_of(rest), freedom)
+        variance = scene.variance_of(rest)
+        chi = _weighed(scene, columns, variance, freedom)
+        if drawn.comes_of_noise:
+            spread = (Vt * variance) @ Vt.T
+            chi, throws = max(chi, float(along @ np.linalg.solve(spread, along))), 2
     wider = scene.together(rest) * scene.tied(rest, scene.parted(Vt))
     chi, freedom = chi / wider, max(int(min(freedom / wider, scene.noise_freedom)), 1)
     delta = -(U / s) @ along
@@ -106,7 +111,7 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     shift = moved / np.where(std > 0, std, np.inf)
     largest = float(np.nanmax(shift[np.isfinite(shift)], initial=0.0))
     sizes = delta / size
-    p = float(scipy.stats.f.sf(chi / q, q, freedom))
+    p = min(throws * float(scipy.stats.f.sf(chi / q, q, freedom)), 1.0)
     biggest = float(sizes[np.argmax(np.abs(delta))])
     change = scene.relative(moved)
     return Score(chi / q, q, p, biggest, power, largest, gain, change)
