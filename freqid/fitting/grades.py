@@ -63,11 +63,22 @@ def verdict(est: Estimate) -> Verdict:
         return Verdict("do not use", reasons)
     if est.witness.verdict == "lacking":
         reasons.append(est.witness.sentence)
-    reasons += _lonely(est)
+    reasons += _lonely(est) + _spent(est)
     reasons += _open(est, std) or _untold(est, std) or _once(est, std)
     if reasons:
         return Verdict("doubt", reasons)
     return Verdict("trust", [_supported(est, std)])
+
+
+def _spent(est: Estimate) -> list[str]:
+    """As many unknowns as values: they take up any noise whole, and nothing tells their errors."""
+    if est.problem is None or est.problem.prior is not None or est.problem.spare > 0:
+        return []
+    rows = est.problem.objective.n_rows
+    return [
+        f"not told: {rows} values of the data are explained by as many unknowns, those of initial "
+        "states included, so that nothing tells their errors; use a longer record"
+    ]
 
 
 def _lonely(est: Estimate) -> list[str]:

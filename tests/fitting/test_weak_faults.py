@@ -163,3 +163,14 @@ def test_an_output_that_no_input_moves_tells_no_plant():
         assert [w.kind for w in est.warnings] == ["no signal"]
         assert est.verdict.grade == "do not use"
     assert fq.fit(LAG, fq.simulate(LAG, u, DT)).verdict.trusted
+
+
+def test_as_many_unknowns_as_values_tell_no_errors():
+    """Three samples, two parameters and an initial state: explained exactly, and wrong."""
+    for seed in range(5):
+        u = fq.white_noise(3, seed=seed)
+        y = fq.simulate(LAG, u, DT).y + 0.3 * coloured(seed, 3, 0.0)
+        est = fq.fit(LAG, fq.Record(u, y, DT))
+        assert est.verdict.grade != "trust"
+    enough = fq.simulate(LAG, fq.white_noise(8, seed=1), DT)
+    assert fq.fit(LAG, enough).verdict.grade == "trust"

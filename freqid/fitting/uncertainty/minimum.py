@@ -81,7 +81,12 @@ class Minimum:
     @property
     def freedom(self) -> int:
         """Real values of the data less unknowns, those of initial states included."""
-        return max(self.objective.n_rows - len(self.x) - self.point.n_initial, 1)
+        return max(self.spare, 1)
+
+    @property
+    def spare(self) -> int:
+        """The same, zero or less where unknowns can take up any noise whole."""
+        return self.objective.n_rows - len(self.x) - self.point.n_initial
 
     @property
     def noise_variance(self) -> float:
