@@ -167,7 +167,8 @@ def show_file(
     print(f"{record!r}".strip("<>"))
     for note in record.notes:
         print(f"note: {note}")
-    for row in fq.check_record(record).itertuples(index=False):
+    found = fq.check_record(record)
+    for row in found[found["finding"] != "note"].itertuples(index=False):
         print(f"{row.channel}: {row.finding} {row.value:g}")
     if plot is not None:
         write_picture(plot, fq.plot_record(record))

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -27,6 +28,19 @@ def chirp(tmp_path_factory, fast, slow):
     fq.write(fast, folder / "fast.csv")
     fq.write(slow, folder / "slow.csv")
     return folder
+
+
+def test_the_package_runs_as_a_module_and_shows_notes_once(tmp_path):
+    page = subprocess.run(
+        [sys.executable, "-m", "freqid", "--help"], capture_output=True, text=True, check=False
+    )
+    assert page.returncode == 0
+    assert "COMMAND" in page.stdout
+    log = pd.DataFrame({"time [ms]": 2.0 * np.arange(50), "u": np.ones(50), "y": np.arange(50.0)})
+    log.to_csv(tmp_path / "log.csv", index=False)
+    shown = run("show", tmp_path / "log.csv").stdout
+    assert shown.count("note") == 1
+    assert "nan" not in shown
 
 
 def test_reproduce(tmp_path):

@@ -174,3 +174,13 @@ def test_as_many_unknowns_as_values_tell_no_errors():
         assert est.verdict.grade != "trust"
     enough = fq.simulate(LAG, fq.white_noise(8, seed=1), DT)
     assert fq.fit(LAG, enough).verdict.grade == "trust"
+
+
+def test_a_limit_of_a_swept_output_is_said_first():
+    """To a sweep a limit looks like a direct term and a delay, which were all that was said."""
+    u = fq.chirp(1, 50, 6, 2e-3)
+    y = fq.simulate(LAG, u, 2e-3).y
+    for seed, limit in enumerate((0.8, 1.0, 1.2, 1.35)):
+        noisy = y + 0.03 * y.std() * coloured(seed, len(y), 0.0)
+        record = fq.Record(u, np.clip(noisy, -limit * y.std(), limit * y.std()), 2e-3)
+        assert first_said(record) == "saturation"

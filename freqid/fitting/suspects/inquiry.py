@@ -104,7 +104,8 @@ class Inquiry:
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
                 p = 1 - (1 - t.p_value) ** c.trials if t.p_value > 1e-9 else t.p_value * c.trials
-                found.append(Asked(name, t, c.unit, min(p, 1.0), c.detail, c.trials, c.certain))
+                p = max(min(p, 1.0), c.chance)
+                found.append(Asked(name, t, c.unit, p, c.detail, c.trials, c.certain))
         found += unlike(self, scene)
         found = midway(self, scene, found)
         found += one_more_mode(self, scene)
@@ -196,7 +197,8 @@ class Inquiry:
         least = evidence(scene, named[0])
         least *= _WORTH if least > 0 else 1
         near = [a for a in named if a in apart or evidence(scene, a) >= least]
-        said = [a for a in near if not self._negligible(scene, a)][:_SAID]
+        said = [a for a in near if not self._negligible(scene, a)]
+        said = [a for i, a in enumerate(said) if i < _SAID or a.certain]
         found = [self._finding(scene, a) for a in said]
         if isinstance(self.model, GreyBox) or not said or said[0].name in LIKELY:
             return found

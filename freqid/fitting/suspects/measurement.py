@@ -19,6 +19,8 @@ _AT_LIMIT, _NEAR = 4, 1e-9
 _SHARED, _REST = ((1.0, 2), (0.99, 3), (0.9, 4)), 0.01
 # periods that a tone has in a record at least, and rows of all tones together at the most
 _PERIODS, _MOST_ROWS = 4, 2e7
+# lines next to a tone that tell the noise there
+_NEIGHBOURS = 14
 # relative difference of two levels that is one
 _LEVELS = 0.2
 
@@ -99,7 +101,7 @@ def tone(scene: Scene, model: Model) -> Columns | None:
     outputs = sum(s.n_outputs for s in scene.seen)
     if not candidates or 2 * outputs * rows > _MOST_ROWS:
         return None
-    omega = max(candidates)[1]
+    above, omega = max(candidates)
     drawn, at = [], 0
     for s in scene.seen:
         signals = np.zeros((2 * outputs, s.n_outputs, len(s.record.time)))  # type: ignore[union-attr]
@@ -108,22 +110,24 @@ def tone(scene: Scene, model: Model) -> Columns | None:
             signals[at, o], signals[at + 1, o] = wave.real, wave.imag
             at += 2
         drawn.append(s.sampled(signals))
-    # between the lines there are as many places again
-    return Columns(drawn, "", rows, f"at {omega / (2 * np.pi):.4g} Hz")
+    # between the lines there are as many places again; beside its neighbours it is but this one
+    chance = float(scipy.stats.f.sf(above, 2, 2 * _NEIGHBOURS))
+    return Columns(drawn, "", rows, f"at {omega / (2 * np.pi):.4g} Hz", chance=chance)
 
 
 def _sticking_out(s: Seen) -> list[tuple[float, float]]:
-    """The line of each output that is farthest above those around it: how far, and its ω (rad/s).
+    """The line of each output that is farthest above those next to it: how far, and its ω (rad/s).
 
-    Between the lines by the three largest (Jacobsen and Kootsookos, IEEE Signal Processing
-    Magazine 24(3), 2007).
+    A peak of the noise, as a loop has it, lifts its neighbours, too; a tone does not. Between the
+    lines by the three largest (Jacobsen and Kootsookos, IEEE Signal Proc. Magazine 24(3), 2007).
     """
     N, at = s.grid
     found = []
     for X in s.left.view(complex).reshape(s.n_outputs, -1):
         power = np.abs(X) ** 2
-        width = min(2 * int(np.sqrt(len(X))) + 1, len(X))
-        around = scipy.ndimage.median_filter(power, width, mode="reflect")
+        half = np.ones(_NEIGHBOURS // 2)
+        kernel = np.concatenate([half, np.zeros(3), half]) / _NEIGHBOURS
+        around = scipy.ndimage.convolve1d(power, kernel, mode="reflect")
         above = power / np.maximum(around, 1e-300)
         # a tone of few periods is a drift, and one at an end of the lines has no neighbour
         inside = (at >= _PERIODS) & (np.arange(len(at)) > 0) & (np.arange(len(at)) < len(at) - 1)

@@ -56,4 +56,6 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         ranked.sort(key=lambda a: a is first or a.test.chi - 2 * np.log(a.trials) < first.test.chi)
     if ranked[0].name not in _BESIDE:
         ranked = [a for a in ranked if a.name != "unsteady"]
-    return ranked
+    # what the data themselves show, and what explains much besides, needs no weighing
+    shown = [a for a in ranked if a.certain and evidence(scene, a) > 0]
+    return [*shown, *(a for a in ranked if a not in shown)]

@@ -17,7 +17,8 @@ class Columns:
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
     ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
     data themselves show, however little it explains. What ``comes_of_noise`` shows where that is
-    strong, too, and is asked with lines counted alike as well.
+    strong, too, and is asked with lines counted alike as well. ``chance`` is what the
+    data themselves allow at least.
     """
 
     columns: Sequence[FloatArray]
@@ -27,6 +28,7 @@ class Columns:
     beside: Sequence[FloatArray] | None = None
     certain: bool = False
     comes_of_noise: bool = False
+    chance: float = 0.0
 
 
 Drawn = Columns | Sequence[Columns] | None
