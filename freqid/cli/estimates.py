@@ -138,7 +138,12 @@ def fit(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
     )
-    print(f"verdict: {estimate.verdict.grade}: {estimate.verdict.reasons[0]}")
+    found = estimate.verdict
+    if other is not None:
+        from freqid.pages.report.sentences import validated
+
+        found = validated(estimate, other)
+    print(f"verdict: {found.grade}: {found.reasons[0]}")
     print(f"witness {estimate.witness.verdict}: {estimate.witness.sentence}")
     for warning in estimate.warnings:
         print(f"warning: {warning}")

@@ -160,3 +160,16 @@ def test_bias_refuses_bad_input(tmp_path):
         assert done.returncode == 2
         assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "bias.png").exists()
+
+
+def test_a_record_that_contradicts_has_its_say_in_the_verdict_that_is_printed(tmp_path):
+    plant = fq.first_order(b=40.0, a=40.0)
+    u = fq.chirp(1, 50, 4, 2e-3)
+    good = fq.simulate(plant, u, 2e-3).with_noise(0.01)
+    other = fq.Record(good.u, good.y + 0.5 * good.y.std(), 2e-3)
+    fq.write(good, tmp_path / "good.csv")
+    fq.write(other, tmp_path / "other.csv")
+    words = ["fit", tmp_path / "good.csv", "--model", "first-order"]
+    assert "verdict: trust" in run(*words).stdout
+    beside = run(*words, "--validate", tmp_path / "other.csv")
+    assert "verdict: doubt: validation: another record" in beside.stdout

@@ -32,14 +32,15 @@ def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
     """Whether an estimate may be trusted, in plain words; another record has its say."""
     found = est.verdict
     if validation is not None:
-        found = _validated(est, found, validation)
+        found = validated(est, validation)
     said = found.reasons[:1] if validation is None else [found.reasons[0], found.reasons[-1]]
     text = " ".join(f"{reason[0].upper()}{reason[1:]}." for reason in said)
     return Verdict(found.head, text, found.trusted)
 
 
-def _validated(est: Estimate, found: Graded, record: Record) -> Graded:
+def validated(est: Estimate, record: Record) -> Graded:
     """The verdict with what another record says of the model."""
+    found = est.verdict
     worst = float(compare(est, record, band=est.band).fit_percent.min())
     known = records(est)
     own = float(compare(est, known[0], band=est.band).fit_percent.min()) if known else 100.0
@@ -50,7 +51,8 @@ def _validated(est: Estimate, found: Graded, record: Record) -> Graded:
         f"validation: another record is explained to {worst:.4g} % where what was fitted is to "
         f"{own:.4g} %; the model does not hold there"
     )
-    return Graded("do not use" if worst < 0 else "doubt", [said, *found.reasons])
+    useless = worst < 0 or found.grade == "do not use"
+    return Graded("do not use" if useless else "doubt", [said, *found.reasons])
 
 
 def bias(est: Estimate) -> dict[str, float]:
