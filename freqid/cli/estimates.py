@@ -140,7 +140,7 @@ def fit(
     )
     found = estimate.verdict
     if other is not None:
-        from freqid.pages.report.sentences import validated
+        from freqid.pages import validated
 
         found = validated(estimate, other)
     print(f"verdict: {found.grade}: {found.reasons[0]}")

@@ -5,3 +5,4 @@ They may import all packages but ``paper`` and ``cli``.
 
 from freqid.pages.explorer.page import explore
 from freqid.pages.report.page import write_report
+from freqid.pages.report.sentences import validated

@@ -32,7 +32,7 @@ def chirp(tmp_path_factory, fast, slow):
 
 def test_the_package_runs_as_a_module_and_shows_notes_once(tmp_path):
     page = subprocess.run(
-        [sys.executable, "-m", "freqid", "--help"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "freqid.cli", "--help"], capture_output=True, text=True, check=False
     )
     assert page.returncode == 0
     assert "COMMAND" in page.stdout
