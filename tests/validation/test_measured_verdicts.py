@@ -38,7 +38,7 @@ def test_flutter_is_not_trusted(measured, order):
     """One order explained 77 % and was trusted; its mode moves by 32 % between halves."""
     est = fq.fit(fq.OutputError(order), daisy(measured, "flutter"))
     assert est.verdict.grade != "trust"
-    assert kinds(est) & {"unsteady", "unstable", "feedback", "feedthrough"}
+    assert kinds(est) & {"unsteady", "unstable", "feedback"}
 
 
 def test_the_ruler_robot_is_trusted_for_the_mode_that_repeats_confirm(measured):

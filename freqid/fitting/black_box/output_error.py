@@ -37,6 +37,8 @@ _PLACES = (0.9, 0.3, -0.5)
 _STEPS = 80
 # unknowns of a chart, which are of order one, that have moved so far want a chart of their own
 _FAR = 0.3
+# a motion that grows e-fold this often within the data is no integrator's, whose pole noise moved
+_STILL = 3.0
 # a chart is left for one around its own optimum this often at most
 _CHARTS = 5
 # how far inside of the unit circle a pole of a stable start lies at the least
@@ -212,7 +214,7 @@ def coefficient_estimate(
         n_rows=rows,
         n_unknowns=len(values),
         growing=growing.tolist(),
-        growth=_growth(minimum, spread) if len(growing) else np.inf,
+        growth=_growth(minimum, spread, rows * dt) if len(growing) else np.inf,
         out_of_sight=[] if model.dt else out_of_sight(model.poles, hold),
     )
     return Estimate(
@@ -236,10 +238,14 @@ def _growing(model: Model) -> ComplexArray:
     return poles[np.abs(poles) > 1] if model.dt else poles[poles.real > 0]
 
 
-def _growth(minimum: Minimum, spread: Spread) -> float:
-    """Standard errors by which the surest of the motions that grow does."""
+def _growth(minimum: Minimum, spread: Spread, duration: float) -> float:
+    """Standard errors by which the surest of the motions that grow does; infinite where one grows
+    by so much within the data (s) that it is no integrator's, however badly it is known.
+    """
     poles, scatter = pole_scatter(minimum.structure, minimum.x, spread)
-    std = np.sqrt(np.maximum(scatter[:, 0, 0], 0))
     grows = poles.real > 0
+    rate, std = poles.real[grows], np.sqrt(np.maximum(scatter[grows, 0, 0], 0))
+    if not len(rate) or not duration or rate.max() * duration > _STILL:
+        return np.inf
     with np.errstate(divide="ignore", invalid="ignore"):
-        return float(np.max((poles.real / std)[grows], initial=0.0)) if grows.any() else np.inf
+        return float(np.max(rate / std))
