@@ -17,9 +17,8 @@ from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.suspects import plant
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.parts import Parting, each, record_halves, widths
-from freqid.fitting.suspects.register import Columns
-from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import Asked, Score, score
+from freqid.fitting.suspects.scene import LOOSE, Scene
+from freqid.fitting.suspects.scores import Asked, Score, of_several, score
 from freqid.fitting.suspects.spread import difference, told_by
 from freqid.lti import directions
 from freqid.models import GreyBox, OutputError, observed_order
@@ -51,15 +50,18 @@ def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
         spec = OutputError(order, True, stable=True)
         box = fit_output_error(spec, [r.at_lines() for r in inquiry.readings])
         beside = Scene.of(box.minimum, inquiry.readings)
-        drawn = plant.feedback(beside, box.model)
-        assert drawn is None or isinstance(drawn, Columns)
+        ways = plant.feedback(beside, box.model)
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return None
-    test = None if drawn is None else score(beside, drawn, np.ones(len(beside.x)))
-    if test is None or test.p_value > limit:
+    tests = [t for w in ways if (t := score(beside, w, np.ones(len(beside.x)))) is not None]
+    if not tests:
+        return None
+    test = min(tests, key=lambda t: t.p_value)
+    p = of_several(test.p_value, len(tests))
+    if p > limit:
         return None
     test = dataclasses.replace(test, largest_shift=np.inf, largest_change=np.nan)
-    return Asked("feedback", test, "", test.p_value)
+    return Asked("feedback", test, "", p)
 
 
 def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
@@ -77,12 +79,12 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
         first += len(s.left)
         J = s.jacobian[free]
         length = _lengths(J)
-        U, sv, Vt = directions(J / length, 1e-7)
+        U, sv, Vt = directions(J / length, LOOSE)
         ways.append(Vt)
         along = Vt @ s.left
         Q, seen = s.taken(variance), np.concatenate([s.left[None], J]) / np.sqrt(variance)
         seen -= (seen @ Q.T) @ Q
-        W = directions(seen[1:] / _lengths(seen[1:]), 1e-7)[2]
+        W = directions(seen[1:] / _lengths(seen[1:]), LOOSE)[2]
         counted.append(np.column_stack([W @ seen[0], (W @ seen[1:].T) / unit]))
         gain, rank = gain + float(along @ along), rank + len(Vt)
         steps.append(-((U / sv) @ along) / length[:, 0])

@@ -23,7 +23,7 @@ from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, par
 from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import Asked, score
+from freqid.fitting.suspects.scores import Asked, of_several, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import silent, unheard
 from freqid.fitting.suspects.spread import compared
@@ -103,7 +103,7 @@ class Inquiry:
             told = [(c, t) for c, t in tried if t is not None]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
-                p = 1 - (1 - t.p_value) ** c.trials if t.p_value > 1e-9 else t.p_value * c.trials
+                p = of_several(t.p_value, c.trials)
                 p = max(min(p, 1.0), c.chance)
                 found.append(Asked(name, t, c.unit, p, c.detail, c.trials, c.certain))
         found += unlike(self, scene)

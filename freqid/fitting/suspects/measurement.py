@@ -129,8 +129,9 @@ def _sticking_out(s: Seen) -> list[tuple[float, float]]:
         kernel = np.concatenate([half, np.zeros(3), half]) / _NEIGHBOURS
         around = scipy.ndimage.convolve1d(power, kernel, mode="reflect")
         above = power / np.maximum(around, 1e-300)
-        # a tone of few periods is a drift, and one at an end of the lines has no neighbour
-        inside = (at >= _PERIODS) & (np.arange(len(at)) > 0) & (np.arange(len(at)) < len(at) - 1)
+        # a tone of few periods is a drift, and one beside a line left out has no neighbour
+        beside = np.diff(at, prepend=-1) == 1
+        inside = (at >= _PERIODS) & beside & np.append(beside[1:], False)
         if not inside.any():
             continue
         k = int(np.argmax(np.where(inside, above, 0)))

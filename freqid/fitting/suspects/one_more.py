@@ -19,7 +19,7 @@ from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scene import LOOSE, Scene
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.uncertainty.gradient_noise import projected
@@ -108,7 +108,7 @@ def _weighed_again(
         left, Q, delta = projected(evaluation)
         J = evaluation.jacobian(delta)
         parts.append((e, left, Q, J - (J @ Q.T) @ Q))
-    B = directions(np.concatenate([J for *_, J in parts], axis=1), 1e-7)[2]
+    B = directions(np.concatenate([J for *_, J in parts], axis=1), LOOSE)[2]
     ends = np.cumsum([len(left) for _, left, _, _ in parts])[:-1]
     for i, ((e, left, Q, _), own) in enumerate(zip(parts, np.split(B, ends, axis=1), strict=True)):
         record = weighted[i].data

@@ -143,20 +143,22 @@ def _one_rate(s: Seen) -> bool:
 
 
 @suspect("feedback")
-def feedback(scene: Scene, model: Model) -> Columns | None:
+def feedback(scene: Scene, model: Model) -> list[Columns]:
     """The input answers to the output: the residual goes together with inputs still to come.
 
     Past inputs are free beside them: to a predictable input, a sweep or a multisine, what the plant
-    lacks would else look like the future.
+    lacks would else look like the future. What comes of the noise shows where that is strong as
+    well: in coloured noise it is asked both ways.
     """
     if any(s.record is None for s in scene.seen) or (isinstance(model, GreyBox) and model.late):
-        return None
+        return []
     if scene.share is not None:
         # what a reference explains of an input answers to nothing else
-        return None
+        return []
     ahead = [_shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
     past = [_shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
-    return Columns(ahead, beside=past, comes_of_noise=True)
+    ways = (False,) if scene.even else (False, True)
+    return [Columns(ahead, beside=past, trials=len(ways), alike=alike) for alike in ways]
 
 
 def _shifted(s: Seen, model: Model, samples: range) -> FloatArray:

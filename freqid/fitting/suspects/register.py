@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from freqid.checks import FloatArray
 from freqid.fitting.suspects.scene import Scene
@@ -16,9 +17,8 @@ class Columns:
 
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
     ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
-    data themselves show, however little it explains. What ``comes_of_noise`` shows where that is
-    strong, too, and is asked with lines counted alike as well. ``chance`` is what the
-    data themselves allow at least.
+    data themselves show, however little it explains. Lines are weighed by the noise unless
+    ``alike``. ``chance`` is what the data themselves allow at least.
     """
 
     columns: Sequence[FloatArray]
@@ -27,21 +27,22 @@ class Columns:
     detail: str = ""
     beside: Sequence[FloatArray] | None = None
     certain: bool = False
-    comes_of_noise: bool = False
+    alike: bool = False
     chance: float = 0.0
 
 
 Drawn = Columns | Sequence[Columns] | None
 Suspect = Callable[[Scene, Model], Drawn]
+Kind = TypeVar("Kind", bound=Suspect)
 SUSPECTS: dict[str, Suspect] = {}
 
 
-def suspect(name: str) -> Callable[[Suspect], Suspect]:
+def suspect(name: str) -> Callable[[Kind], Kind]:
     """Mark a function as one that draws a suspect's columns: several where it has alternatives,
     None where the data cannot show it.
     """
 
-    def mark(function: Suspect) -> Suspect:
+    def mark(function: Kind) -> Kind:
         SUSPECTS[name] = function
         return function
 

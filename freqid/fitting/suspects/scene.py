@@ -33,7 +33,7 @@ from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom
 from freqid.lti import Plane, directions
 
 # singular values of the Jacobian below this part of the largest are directions left open
-_LOOSE = 1e-7
+LOOSE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Scene:
         clear = self.clear(columns)
         size = np.linalg.norm(clear, axis=1)
         kept = clear[size > 0] / size[size > 0, None]
-        return dataclasses.replace(self, more=directions(kept, _LOOSE)[2])
+        return dataclasses.replace(self, more=directions(kept, LOOSE)[2])
 
     @cached_property
     def left(self) -> FloatArray:
@@ -115,7 +115,7 @@ class Scene:
         J = self.jacobian
         size = np.linalg.norm(J, axis=1)
         size[size == 0] = 1
-        U, s, Vt = directions(J / size[:, None], _LOOSE)
+        U, s, Vt = directions(J / size[:, None], LOOSE)
         return U / s / size[:, None], s, Vt
 
     @property
@@ -233,7 +233,7 @@ class Scene:
         rows[:, at:] *= w[at:]
         drawn, left, J = np.split(rows, [len(columns[0]), len(columns[0]) + 1])
         size = np.linalg.norm(J, axis=1)
-        B = directions(J[size > 0] / size[size > 0, None], _LOOSE)[2]
+        B = directions(J[size > 0] / size[size > 0, None], LOOSE)[2]
         kept -= (B**2).sum(axis=0)
         return drawn - (drawn @ B.T) @ B, (left - (left @ B.T) @ B)[0], kept
 

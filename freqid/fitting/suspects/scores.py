@@ -22,6 +22,8 @@ from freqid.lti import directions
 _ABSORBED = 1e-5
 # directions of several columns together below this part of the largest are none
 _SAME = 1e-9
+# a p of which rounding would leave little in 1 - p
+_ROUNDED = 1e-9
 # part of a line's noise that is left at least
 _LEAST = 0.1
 
@@ -69,6 +71,11 @@ class Asked:
     odd: bool = False
 
 
+def of_several(p: float, trials: int) -> float:
+    """The p of the least of so many (Šidák, 1967)."""
+    return 1 - (1 - p) ** trials if p > _ROUNDED else p * trials
+
+
 def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     """The test of what was drawn; None where the parameters absorb it.
 
@@ -95,15 +102,13 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     gain = float(along @ along)
     # the noise is what the suspect leaves: with it inside a strong one would hide itself
     rest = scene.left - along @ Vt
-    throws = 1
     if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
+    elif drawn.alike:
+        spread = (Vt * scene.variance_of(rest)) @ Vt.T
+        chi = float(along @ np.linalg.solve(spread, along))
     else:
-        variance = scene.variance_of(rest)
-        chi = _weighed(scene, columns, variance, freedom)
-        if drawn.comes_of_noise:
-            spread = (Vt * variance) @ Vt.T
-            chi, throws = max(chi, float(along @ np.linalg.solve(spread, along))), 2
+        chi = _weighed(scene, columns, scene.variance_of(rest), freedom)
     wider = scene.together(rest) * scene.tied(rest, scene.parted(Vt))
     chi, freedom = chi / wider, max(int(min(freedom / wider, scene.noise_freedom)), 1)
     delta = -(U / s) @ along
@@ -111,7 +116,7 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     shift = moved / np.where(std > 0, std, np.inf)
     largest = float(np.nanmax(shift[np.isfinite(shift)], initial=0.0))
     sizes = delta / size
-    p = min(throws * float(scipy.stats.f.sf(chi / q, q, freedom)), 1.0)
+    p = float(scipy.stats.f.sf(chi / q, q, freedom))
     biggest = float(sizes[np.argmax(np.abs(delta))])
     change = scene.relative(moved)
     return Score(chi / q, q, p, biggest, power, largest, gain, change)
