@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import (
+    AveragedResponse,
     FrequencyResponse,
     Record,
     Reference,
@@ -25,12 +25,11 @@ from freqid.frf.segments import (
     Detrend,
     Window,
     independent,
+    memory,
+    pieces,
     products,
     shared_lines,
 )
-
-# samples whose segments are transformed at once
-_PIECE = 1 << 19
 
 
 def h1(
@@ -145,7 +144,8 @@ def _scaled(
         return frf
     H1 = np.abs(s.yu @ np.linalg.inv(s.uu)) ** 2
     factor = share * np.abs(G) ** 2 / np.maximum(H1, 1e-300)
-    return dataclasses.replace(frf, variance=frf.variance * np.moveaxis(factor, 0, -1))
+    variance = frf.variance * np.moveaxis(factor, 0, -1)
+    return AveragedResponse(**{**frf.__dict__, "variance": variance})
 
 
 @dataclass(frozen=True)
@@ -159,6 +159,7 @@ class _Spectral:
     averages: float
     first: Record | Stream
     reach: int
+    memory: FloatArray | None
     reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
 
 
@@ -180,7 +181,7 @@ def _spectral(
     total: dict[str, ComplexArray] = {}
     count = 0
     for i, record in enumerate(sets):
-        for n, channels in _pieces(record, length, step, None if signals is None else signals[i]):
+        for n, channels in pieces(record, length, step, None if signals is None else signals[i]):
             for spectra in averaging.transforms(channels, length, step):
                 for pair in pairs:
                     S = products(spectra[pair[0]], spectra[pair[1]])
@@ -202,25 +203,11 @@ def _spectral(
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
         _related(mean["uu"], mean["ur"], mean["rr"], averages)
-    return _Spectral(f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, reach, joint)
-
-
-def _pieces(
-    r: Record | Stream, length: int, step: int, reference: FloatArray | None
-) -> Iterator[tuple[int, dict[str, FloatArray]]]:
-    """Whole segments, as many at a time as fit a block: their number, and channels (c, n)."""
-    if isinstance(r, Stream):
-        for n, u, y in r.pieces(length, step):
-            yield n, {"u": u.T, "y": y.T}
-        return
-    every = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}
-    if reference is not None:
-        every["r"] = reference.T
-    left, per = (r.n_samples - length) // step + 1, max(_PIECE // step, 1)
-    for first in range(0, left, per):
-        n = min(per, left - first)
-        part = slice(first * step, (first + n - 1) * step + length)
-        yield n, {name: x[:, part] for name, x in every.items()}
+    inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
+    told = memory(averaging.window, length, step, inputs)
+    return _Spectral(
+        f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, reach, told, joint
+    )
 
 
 def _related(uu: ComplexArray, ur: ComplexArray, rr: ComplexArray, averages: float) -> None:
@@ -294,4 +281,5 @@ def _packed(
     coherence = np.clip(explained / np.where(output > 0, output, 1), 0, 1)
     shown = np.broadcast_to(coherence[:, :, None], G.shape)
     power = _powers(s.uu).T
-    return measured(s.first, s.frequency, G, variance, shown, power, reach=s.reach)
+    frf = measured(s.first, s.frequency, G, variance, shown, power, reach=s.reach)
+    return AveragedResponse(**frf.__dict__, memory=s.memory)

@@ -19,8 +19,13 @@ _WHOLE = ("boxcar", "rectangular")
 
 # correlation of noise over input at two lines that is none, of independent segments
 _TIED = 0.01
+# samples whose segments are taken at once
+_PIECE = 1 << 19
 # samples that are transformed at once: more leave the processor's cache
 _NEAR = 1 << 18
+
+# segments that show where in one the input acts; relative difference of some that are the same
+_SHOWN, _SAME = 16, 1e-6
 
 # what scipy.signal.csd takes under these names
 Window = str | tuple[str | float, ...] | ArrayLike
@@ -102,6 +107,24 @@ class Averaging:
         return np.asarray(scipy.signal.detrend(segments, type=self.detrend))
 
 
+def pieces(
+    r: Record | Stream, length: int, step: int, reference: FloatArray | None
+) -> Iterator[tuple[int, dict[str, FloatArray]]]:
+    """Whole segments, as many at a time as fit a block: their number, and channels (c, n)."""
+    if isinstance(r, Stream):
+        for n, u, y in r.pieces(length, step):
+            yield n, {"u": u.T, "y": y.T}
+        return
+    every = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}
+    if reference is not None:
+        every["r"] = reference.T
+    left, per = (r.n_samples - length) // step + 1, max(_PIECE // step, 1)
+    for first in range(0, left, per):
+        n = min(per, left - first)
+        part = slice(first * step, (first + n - 1) * step + length)
+        yield n, {name: x[:, part] for name, x in every.items()}
+
+
 def products(a: ComplexArray, b: ComplexArray) -> ComplexArray:
     """Sums over segments of a bᴴ, (lines, channels of a, channels of b)."""
     found = np.empty((a.shape[-1], len(a), len(b)), complex)
@@ -129,6 +152,35 @@ def taper(window: Window, length: int) -> FloatArray:
     if w.shape != (length,):
         raise InputError(f"window has shape {w.shape}; expected ({length},), one for each sample")
     return w
+
+
+def memory(
+    window: Window, length: int, step: int, inputs: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Part of the answer n samples after the input that its own segment shows, (length,).
+
+    Of n samples' memory a segment shows w(t) w(t + n), where the input acts (Bendat and Piersol,
+    Random Data, 2010, section 8.5.1). None for inputs (m, N) of records that are the same in all
+    segments, as periods are: what those lose is no mean. Without any the input acts evenly.
+    """
+    w, acts = taper(window, length), np.ones(length)
+    if inputs:
+        each = max(_SHOWN // len(inputs), 2)
+        shown = np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
+        if np.abs(shown - shown[:, :1]).max() <= _SAME * np.abs(shown).max():
+            return None
+        acts = ((shown - shown.mean(axis=-1, keepdims=True)) ** 2).mean(axis=(0, 1))
+    padded = scipy.fft.next_fast_len(2 * length, real=True)
+    early, late = scipy.fft.rfft(w * acts, padded), scipy.fft.rfft(w, padded)
+    told: FloatArray = scipy.fft.irfft(early.conj() * late, padded)[:length]
+    return told / told[0]
+
+
+def _some(u: FloatArray, length: int, step: int, count: int) -> FloatArray:
+    """A few segments of u (m, N) from one end to the other, (m, segments, length)."""
+    views = np.lib.stride_tricks.sliding_window_view(u, length, axis=1)[:, ::step]
+    some: FloatArray = views[:, :: max(views.shape[1] // count, 1)]
+    return some
 
 
 def shared_lines(window: Window, length: int) -> int:

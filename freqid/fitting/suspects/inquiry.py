@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import input_dt
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
+from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LIKELY, evidence, ordered
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
@@ -88,18 +89,21 @@ class Inquiry:
             return None
 
     @cached_property
+    def _std(self) -> FloatArray:
+        variance = np.diag(self.minimum.covariance)
+        return np.sqrt(np.where(np.isfinite(variance), np.maximum(variance, 0), np.inf))
+
+    @cached_property
     def asked(self) -> list[Asked]:
         """Every suspect that the data could show, the strongest first."""
         scene = self.scene
         if scene is None or scene.freedom < 10:
             return []
-        variance = np.diag(self.minimum.covariance)
-        std = np.sqrt(np.where(np.isfinite(variance), np.maximum(variance, 0), np.inf))
         found = []
         for name, draw in SUSPECTS.items():
             drawn = draw(scene, self.model)
             several = [] if drawn is None else [drawn] if isinstance(drawn, Columns) else [*drawn]
-            tried = [(c, score(scene, c, std)) for c in several]
+            tried = [(c, score(scene, c, self._std)) for c in several]
             told = [(c, t) for c, t in tried if t is not None]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
@@ -185,7 +189,7 @@ class Inquiry:
         scene, named = self.scene, self.named
         if scene is None:
             return unheard(self.minimum, self.model, self.readings)
-        if found := silent(scene):
+        if found := silent(scene) or leaking(scene, self.model, self._std):
             return found
         turn = turned(self.minimum, self.model, self.readings) if self._in_trouble(scene) else []
         if turn:

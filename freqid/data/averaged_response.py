@@ -1,0 +1,39 @@
+"""AveragedResponse: a response from segments of signals, with what these cut off its memory."""
+
+from __future__ import annotations
+
+from freqid.checks import FloatArray, numbers
+from freqid.data.frequency_response import FrequencyResponse
+
+
+class AveragedResponse(FrequencyResponse):
+    """A FrequencyResponse from averages over segments.
+
+    Attributes:
+        memory: part of the answer n samples after its input that is seen in the input's own
+            segment, (samples of a segment,), one at n = 0; None where nothing is lost, as from
+            whole periods. What is measured of a plant with the impulse response g is the transform
+            of ``memory`` times g: a lightly damped mode looks broader (Bendat and Piersol, Random
+            Data, 2010, section 8.5.1).
+
+    The other arguments are as in ``FrequencyResponse``. A ``fit`` to it says by how much that moves
+    the parameters. Made by ``h1``, ``h2`` and ``hv``.
+    """
+
+    memory: FloatArray | None
+
+    def __init__(self, *given: object, memory: FloatArray | None = None, **fields: object) -> None:
+        super().__init__(*given, **fields)  # type: ignore[arg-type]
+        if memory is not None:
+            memory = numbers("memory", memory)
+            memory.flags.writeable = False
+        self.__dict__["memory"] = memory
+
+    def with_conditions(self, **conditions: float) -> AveragedResponse:
+        """The same with what was set for it, by name."""
+        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
+        return AveragedResponse(**fields)
+
+    def select(self, limits: tuple[float, float]) -> AveragedResponse:
+        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
+        return AveragedResponse(**{**super().select(limits).__dict__, "memory": self.memory})

@@ -1,0 +1,69 @@
+"""What short segments do to an averaged response: a plant that rings on longer looks damped more.
+
+Of an answer n samples after its input a segment shows the part ``memory``: what is measured of a
+plant g is the transform of memory times g, whatever the number of averages (Bendat and Piersol,
+Random Data, 2010, section 8.5.1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray
+from freqid.data import AveragedResponse
+from freqid.fitting.findings import Finding
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.seen import Seen
+from freqid.models import Model
+
+# standard errors, and part of itself, by which a parameter may be moved without a word
+_SMALL, _HARMLESS = 1.0, 1e-3
+# periods of the transform that makes the impulse response, in segments: it rings on into the next
+_ROOM = 8
+
+
+def leaking(scene: Scene, model: Model, std: FloatArray) -> list[Finding]:
+    """A finding where segments are so short that they move a parameter by its standard error."""
+    rows = np.concatenate([_lost(s, model) for s in scene.seen] + [scene.known[:, -1] * 0])
+    if not rows.any():
+        return []
+    moved = -scene.moved(rows)
+    shifts = np.abs(moved) / np.where(std > 0, std, np.inf)
+    shift, change = float(np.max(shifts, initial=0.0)), scene.relative(moved)
+    if shift < _SMALL or change < _HARMLESS:
+        return []
+    names, worst = getattr(scene.structure, "names", ()), int(np.argmax(shifts))
+    what, part = "parameters", ""
+    if names and scene.x[worst]:
+        what, part = names[worst], f" ({100 * moved[worst] / scene.x[worst]:+.2g} %)"
+    shortest = min(
+        len(d.memory) * d.dt
+        for s in scene.seen
+        if isinstance(d := s.reading.data, AveragedResponse) and d.memory is not None
+    )
+    text = (
+        f"the plant answers for longer than segments of {shortest:.4g} s show: what they cut off "
+        f"moves {what} by {shift:.2g} standard errors{part}; fit the record itself or "
+        "local_rational(record), or take longer segments"
+    )
+    return [Finding("short segments", text, number=shift)]
+
+
+def _lost(s: Seen, model: Model) -> FloatArray:
+    """Rows (rows,) of what segments make of the model's response, less that."""
+    data = s.reading.data
+    if not isinstance(data, AveragedResponse) or data.memory is None:
+        return np.zeros(len(s.left))
+    length = len(data.memory)
+    padded = np.zeros(_ROOM * length)
+    padded[:length] = data.memory
+    every = 2 * np.pi / (_ROOM * length * data.dt) * np.arange(_ROOM * length // 2 + 1)
+    own = s.own(model)
+    hold = None if own.dt else s.reading.hold
+    G: ComplexArray = own.responses_at(every, hold)
+    g = np.fft.irfft(G, _ROOM * length)
+    # causal but for a band-limited input's answer, which comes as much before as after
+    g *= padded + np.roll(padded[::-1], 1) * (np.arange(len(padded)) > 0)
+    seen = np.fft.rfft(g)[..., ::_ROOM]
+    at = np.round(s.omega_input * length * data.dt / (2 * np.pi)).astype(int)
+    return s.answered(seen[..., at] - own.responses_at(s.omega_input, hold))

@@ -1,0 +1,88 @@
+"""Segments that are short for what rings on: what they do to a response, and that it is said."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+DT, SEGMENT = 0.01, 400
+
+
+def resonance(w, z, g):
+    return [[0, 1], [-w * w, -2 * z * w]], [[0], [1]], [[g * w * w, 0]], [[0]]
+
+
+RESONANCE = fq.GreyBox(
+    resonance, [fq.Parameter("w", 40.0), fq.Parameter("z", 0.03), fq.Parameter("g", 1.0)]
+)
+
+
+def record(seed, samples=20_000, noise=0.05, u=None):
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal(samples) if u is None else u
+    A, B, C, D, _ = scipy.signal.cont2discrete(
+        [np.array(M) for M in resonance(40.0, 0.03, 1.0)], DT, "zoh"
+    )
+    b, a = scipy.signal.ss2tf(A, B, C, D)
+    y = scipy.signal.lfilter(b[0, 1:], a, np.concatenate([[0.0], u[:-1]]))
+    return fq.Record(u, y + noise * y.std() * rng.standard_normal(len(u)), DT)
+
+
+def kinds(est):
+    return [w.kind for w in est.warnings]
+
+
+@pytest.mark.parametrize("window", ["hann", "boxcar", ("kaiser", 8.0)])
+def test_what_segments_show_is_memory_times_the_impulse_response(window):
+    """Bendat and Piersol's mean of H1, against the mean of scipy's own over a long record."""
+    long = record(0, 4_000_000, noise=0.0)
+    measured = fq.h1(long, SEGMENT, window=window)
+    args = {"fs": 1 / DT, "window": window, "nperseg": SEGMENT}
+    f, uy = scipy.signal.csd(long.u, long.y, **args)
+    ratio = uy / scipy.signal.welch(long.u, **args)[1]
+    impulse = fq.simulate(RESONANCE, np.eye(1, SEGMENT)[0], DT).y
+    told = np.fft.rfft(impulse * measured.memory)
+    near = (f > 2) & (f < 20)
+    error = np.abs(ratio - told)[near].max()
+    ideal = RESONANCE.frequency_response(f[near], hold=fq.ZeroOrderHold(DT)).response.ravel()
+    assert error < 0.02 * np.abs(told[near]).max()
+    assert error < 0.2 * np.abs(ideal - told[near]).max()
+
+
+def test_damping_from_short_segments_is_no_trust_and_the_record_is():
+    for seed in range(5):
+        data = record(seed)
+        est = fq.fit(RESONANCE, fq.h1(data, SEGMENT, band=(1, 30)), weights="noise")
+        assert kinds(est) == ["short segments"]
+        assert est.verdict.grade == "doubt"
+        # the number that is said is the one that is off
+        off = (est["z"] - 0.03) / est.parameters["std"]["z"]
+        assert abs(est.warnings[0].number - off) < 4
+        assert fq.fit(RESONANCE, data).verdict.grade == "trust"
+
+
+def test_long_segments_whole_periods_and_bursts_are_no_worry():
+    rng = np.random.default_rng(1)
+    long = record(2, noise=0.3)
+    assert "short segments" not in kinds(fq.fit(RESONANCE, fq.h1(long, 10_000, band=(1, 30))))
+    period = np.tile(rng.standard_normal(SEGMENT), 60)
+    whole = fq.h1(
+        record(3, u=period).slice(10 * SEGMENT * DT, 60 * SEGMENT * DT), SEGMENT, window="boxcar"
+    )
+    assert whole.memory is None
+    assert fq.fit(RESONANCE, whole).verdict.grade == "trust"
+    # blows of a hammer after which each segment comes to rest
+    blows = np.zeros((20, 1000))
+    blows[:, :4] = rng.standard_normal((20, 4))
+    struck = fq.h1(record(4, u=blows.ravel()), 1000, window="boxcar", detrend=False)
+    assert struck.memory[500] > 0.999
+    assert "short segments" not in kinds(fq.fit(RESONANCE, struck))
+
+
+def test_memory_goes_with_selections_and_conditions():
+    frf = fq.h1(record(5), SEGMENT)
+    for other in (frf.select((1, 30)), frf.with_conditions(load=2.0)):
+        np.testing.assert_array_equal(other.memory, frf.memory)
+    assert not frf.memory.flags.writeable
+    assert fq.h2(record(5), SEGMENT).memory is not None
