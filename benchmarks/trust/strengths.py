@@ -111,7 +111,7 @@ def _left(s, fault, of_plant=None):
     first = np.concatenate([np.ones(len(names)), np.zeros(len(s.model.state_space().A))])
     near = np.where(np.arange(len(first)) < len(names), 10.0, np.inf)
     found = scipy.optimize.least_squares(
-        residual, first, bounds=(np.where(near < np.inf, 1 / near, -np.inf), near),
+        residual, first, bounds=(np.where(near < np.inf, 0, -np.inf), near),
         x_scale="jac", max_nfev=40,
     )  # fmt: skip
     return 2 * float(found.cost)

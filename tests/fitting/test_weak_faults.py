@@ -184,3 +184,41 @@ def test_a_limit_of_a_swept_output_is_said_first():
         noisy = y + 0.03 * y.std() * coloured(seed, len(y), 0.0)
         record = fq.Record(u, np.clip(noisy, -limit * y.std(), limit * y.std()), 2e-3)
         assert first_said(record) == "saturation"
+
+
+def test_one_sample_that_a_limit_has_cut_is_no_spike():
+    """The one extreme sample lies inside of what the model says; one that lies outside is far off
+    for another reason.
+    """
+    inside, outside = [], []
+    for seed in range(8):
+        u = fq.white_noise(800, seed=seed)
+        y = fq.simulate(LAG, u, DT).y
+        y = y + 0.02 * y.std() * coloured(seed, 800, 0.0)
+        at = np.argmax(y)
+        for off, said in ((-0.15, inside), (0.15, outside)):
+            other = np.sort(y)[-2]
+            moved = np.where(np.arange(800) == at, max(y[at] + off * y.std(), 1.0001 * other), y)
+            said.append((first_said(fq.Record(u, moved, DT)), moved[at] - y[at], y.std()))
+    cut = [kind for kind, by, std in inside if by < -0.14 * std]
+    assert cut.count("saturation") == len(cut) >= 3, inside
+    assert [kind for kind, *_ in outside] == ["spikes"] * 8
+
+
+def test_a_drift_that_friction_has_absorbed_is_said_by_its_name():
+    """Of an axis that hardly anything brakes it pulls the friction below zero: one step from there
+    tells no drift, a fit beside physical values does.
+    """
+    axis, dt, samples = fq.two_mass(), 2e-3, 600
+    named = []
+    for seed in range(10):
+        period = samples * dt / 2
+        u = fq.multisine((1 / period, 150.0), period, dt, crest="random", seed=seed)
+        y = fq.simulate(axis, np.resize(u, samples), dt).y
+        added = 0.8 * y.std() * np.linspace(-0.5, 0.5, samples)
+        noise = 0.1 * y.std() * coloured(seed, samples)
+        est = fq.fit(axis, fq.Record(np.resize(u, samples), y + added + noise, dt))
+        if est["fm"] < 0:
+            named.append([w.kind for w in est.warnings][0] in ("drift", "offset"))
+    assert len(named) >= 4
+    assert np.mean(named) >= 0.8, named

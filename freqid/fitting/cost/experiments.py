@@ -160,7 +160,13 @@ class SpectralExperiment:
         """The same where shapes (q, outputs, K) of unknown size are added to the outputs' lines."""
         if not len(shapes):
             return self
-        rows = (shapes[:, :, None] * self.lines.scale).reshape(len(shapes), -1).view(float)
+        return self.with_rows(
+            (shapes[:, :, None] * self.lines.scale).reshape(len(shapes), -1).view(float)
+        )
+
+    def with_rows(self, rows: FloatArray) -> SpectralExperiment:
+        """The same where these rows (q, rows) of the residual are of unknown size."""
+        rows = rows[rows.any(axis=1)]
         before = [] if self.added is None else [self.added]
         return dataclasses.replace(self, added=np.concatenate([*before, rows]))
 

@@ -15,6 +15,7 @@ from freqid.data import input_dt
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
+from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
 from freqid.fitting.suspects.leakage import leaking
@@ -45,6 +46,8 @@ _HOLDS = ("hold", "hold period")
 _REACHED = 0.5
 # part of the strongest one's evidence from which another is said, and how many are
 _WORTH, _SAID = 0.5, 3
+# chance from which a suspect is no certainty
+_SURE = 1e-6
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
 # part of the output left that means trouble
@@ -54,7 +57,7 @@ _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
 _KNOWN = (measurement, plant)
 # level at which all suspects together speak of good data
-LEVEL = 0.005
+LEVEL = 0.0075
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,12 +107,13 @@ class Inquiry:
             drawn = draw(scene, self.model)
             several = [] if drawn is None else [drawn] if isinstance(drawn, Columns) else [*drawn]
             tried = [(c, score(scene, c, self._std)) for c in several]
-            told = [(c, t) for c, t in tried if t is not None]
+            told = [(c, t) for c, t in tried if t and (t.size > 0 or not c.onesided)]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
                 p = of_several(t.p_value, c.trials)
                 p = max(min(p, 1.0), c.chance)
                 found.append(Asked(name, t, c.unit, p, c.detail, c.trials, c.certain))
+        found = asked_again(self, scene, found, self._std)
         found += unlike(self, scene)
         found = midway(self, scene, found)
         found += one_more_mode(self, scene)
@@ -200,7 +204,12 @@ class Inquiry:
         apart = [a for a in named if a.certain or a.name == "unsteady"]
         least = evidence(scene, named[0])
         least *= _WORTH if least > 0 else 1
-        near = [a for a in named if a in apart or evidence(scene, a) >= least]
+        # beside one that is no certainty, what is even less by chance is said as well
+        chance = named[0].p_value if named[0].p_value > _SURE else 0.0
+        near = [
+            a for a in named
+            if a in apart or a.p_value < chance or evidence(scene, a) >= least
+        ]  # fmt: skip
         said = [a for a in near if not self._negligible(scene, a)]
         said = [a for i, a in enumerate(said) if i < _SAID or a.certain]
         found = [self._finding(scene, a) for a in said]

@@ -19,6 +19,8 @@ _AT_LIMIT, _NEAR = 4, 1e-9
 _SHARED, _REST = ((1.0, 2), (0.99, 3), (0.9, 4)), 0.01
 # periods that a tone has in a record at least, and rows of all tones together at the most
 _PERIODS, _MOST_ROWS = 4, 2e7
+# what is said of one sample
+_INSIDE = "the one extreme sample of an output lies inside of what the model says"
 # lines next to a tone that tell the noise there
 _NEIGHBOURS = 14
 # relative difference of two levels that is one
@@ -144,12 +146,15 @@ def _sticking_out(s: Seen) -> list[tuple[float, float]]:
 
 
 @suspect("saturation")
-def saturation(scene: Scene, model: Model) -> Columns | None:
-    """An output stays at one extreme value for several samples, as at a limit."""
+def saturation(scene: Scene, model: Model) -> list[Columns]:
+    """An output stays at one extreme value for several samples, as at a limit, or its one extreme
+    sample lies inside of what the model says.
+    """
     drawn, found, certain = [], False, False
-    for s in scene.seen:
+    ends: list[list[FloatArray]] = []
+    for number, s in enumerate(scene.seen):
         if s.record is None:
-            return None
+            return []
         y = s.record.outputs[: len(s.record.u) // s.record.factor].T
         rows = []
         for o, signal in enumerate(y):
@@ -163,8 +168,14 @@ def saturation(scene: Scene, model: Model) -> Columns | None:
                     found, certain = True, certain or clipped
                     pulse[0, o] = sign * at
                 rows.append(s.sampled(pulse)[0])
+                pulse[0, o] = -sign * at
+                alone = [np.zeros((1, len(other.left))) for other in scene.seen]
+                alone[number] = s.sampled(pulse)
+                ends.append(alone)
         drawn.append(np.array(rows))
-    return Columns(drawn, certain=certain) if found else None
+    if found:
+        return [Columns(drawn, certain=certain)]
+    return [Columns(alone, "", len(ends), _INSIDE, onesided=True) for alone in ends]
 
 
 def _clipped(signal: FloatArray) -> bool:
@@ -215,9 +226,7 @@ def unsteady(scene: Scene, model: Model) -> Columns | None:
 
 def _second_half(s: Seen, rows: FloatArray) -> FloatArray:
     """Rows (c, rows) of what outputs do, of their second half alone."""
-    scale = s.experiment.lines.scale[:, 0]
-    each = rows.view(complex).reshape(len(rows), *scale.shape)
-    signals = s.signals(np.divide(each, scale, out=np.zeros_like(each), where=scale > 0))
+    signals = s.signals(s.unweighted(rows))
     signals[..., : signals.shape[-1] // 2] = 0
     return s.sampled(signals)
 

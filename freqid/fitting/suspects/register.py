@@ -29,6 +29,7 @@ class Columns:
     certain: bool = False
     alike: bool = False
     chance: float = 0.0
+    onesided: bool = False
 
 
 Drawn = Columns | Sequence[Columns] | None

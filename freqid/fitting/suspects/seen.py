@@ -103,6 +103,13 @@ class Seen:
         made: FloatArray = np.fft.irfft(X, N, axis=-1)
         return made
 
+    def unweighted(self, rows: FloatArray) -> ComplexArray:
+        """Rows (c, rows) as lines (c, outputs, K) of DFTs, without their weights."""
+        scale = self.experiment.lines.scale[:, 0]
+        each = np.ascontiguousarray(rows).view(complex).reshape(len(rows), *scale.shape)
+        found: ComplexArray = np.divide(each, scale, out=np.zeros_like(each), where=scale > 0)
+        return found
+
     def sampled(self, signals: Array) -> FloatArray:
         """Rows of signals of the outputs (…, outputs, N) in time, (…, rows)."""
         lines, (N, at) = self.experiment.lines, self.grid

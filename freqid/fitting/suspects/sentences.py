@@ -45,7 +45,7 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "drift": f"an output drifts by {number}",
         "spikes": f"one sample is off by {number} {detail}",
         "tone": f"a sine of {number} {detail} is added that the input does not have",
-        "saturation": "an output stays at one extreme value, as at a limit",
+        "saturation": f"{detail or 'an output stays at one extreme value'}, as at a limit",
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
         "amplitude": "the parameters change with the level of the input",
