@@ -219,6 +219,6 @@ def test_a_drift_that_friction_has_absorbed_is_said_by_its_name():
         noise = 0.1 * y.std() * coloured(seed, samples)
         est = fq.fit(axis, fq.Record(np.resize(u, samples), y + added + noise, dt))
         if est["fm"] < 0:
-            named.append([w.kind for w in est.warnings][0] in ("drift", "offset"))
+            named.append(est.warnings[0].kind in ("drift", "offset"))
     assert len(named) >= 4
     assert np.mean(named) >= 0.8, named
