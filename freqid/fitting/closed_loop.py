@@ -17,10 +17,9 @@ import numpy as np
 from freqid.checks import FloatArray, InputError
 from freqid.data import DataSet, Record
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.heard_back import heard_back
+from freqid.fitting.heard_back import related
 from freqid.fitting.loop_box import LoopBox
 from freqid.fitting.loop_noise import Loop, LoopShare, loop_scores
-from freqid.fitting.met import met_by
 from freqid.fitting.noise_models import NoiseModel, as_noise_model
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
@@ -32,13 +31,9 @@ from freqid.models import GreyBox, observed_order
 # an input of which the reference explains so much stays as it is unless it answers to the noise:
 # what a linear black box of the loop lacks would do more harm
 _WHOLE = 0.995
-# and one of which it explains so little has another reference
-_NOTHING = 0.02
-# said where the rest of the input did harm
-FED_BACK = (
-    "what a fit to the input as it is leaves goes together with what the reference leaves of it: "
-    "the noise comes back through a loop, or the input was measured with noise; it was not used"
-)
+# and one of which it explains so little has another reference; to a peak of a lightly damped loop a
+# stranger explains more, up to so much
+_NOTHING, _CHANCE = 0.02, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +92,8 @@ def through_references(
     for members in groups.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
         explained, share, loop, order = _explained(records, _plant_order(model))
-        if share < _NOTHING and reference is not True:
+        alone = share < _CHANCE and any(_strangers(r) for r in records)
+        if (share < _NOTHING or alone) and reference is not True:
             notes.append(
                 f"the reference explains {100 * share:.2g} % of the input's power: it comes too "
                 "late, or belongs to another input, and the input was fitted as it is"
@@ -142,24 +138,6 @@ def with_loop_noise(
     return dataclasses.replace(est, problem=minimum, uncertainty=spread), share
 
 
-def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
-    """Whether what inputs that were fitted as they are leave shows the feedback, and all could be
-    fitted through their references.
-    """
-    direct = sum(len(loop.places) for loop in way.loops) < len(est.data)
-    could = (isinstance(d, Record) and d.reference is not None and d.factor == 1 for d in est.data)
-    timed = any(r.in_time for r in readings)
-    if not direct or not all(could) or timed or not way.unexplained:
-        return False
-    for place, unexplained in way.unexplained.items():
-        record = readings[place].data
-        assert isinstance(record, Record)
-        left = errors_of(met_by(est, readings[place]), readings[place]).in_time()
-        if heard_back(left, unexplained, float(np.mean(record.inputs**2))):
-            return True
-    return "feedback" in [w.kind for w in est.warnings]
-
-
 def _explained(records: Sequence[Record], order: int) -> tuple[list[Record], float, Loop, int]:
     """Records of one loop with what the reference explains of their input, the share of its power
     that this is, the loop, and its order.
@@ -187,6 +165,12 @@ def _explained(records: Sequence[Record], order: int) -> tuple[list[Record], flo
         )
     share = 1 - left / max(power, 1e-300)
     return seen, share, Loop(box.chart, box.found.x, box.readings, size, ()), box.order
+
+
+def _strangers(record: Record) -> bool:
+    """Whether its input shows no trace of its reference."""
+    signal = np.asarray(record.reference, dtype=float).reshape(record.n_samples, -1)
+    return related(record.inputs, signal) is False
 
 
 def _loop(record: Record, size: np.ndarray) -> Record:

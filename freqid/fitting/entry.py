@@ -13,8 +13,9 @@ from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.clock_offset import clock_notes, with_clock_offset
-from freqid.fitting.closed_loop import FED_BACK, fed_back, through_references, with_loop_noise
+from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.fed_back import FED_BACK, fed_back
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model

@@ -1,4 +1,4 @@
-"""Whether what a fit leaves comes back in its input: feedback, heard beside the reference.
+"""Whether signals are strangers: what a fit leaves and its input, a reference and the input.
 
 In a loop what a reference leaves of the input is the controller's answer to the plant's own noise,
 and goes together with what a direct fit leaves at every frequency; where nothing is fed back the
@@ -20,20 +20,31 @@ _SEGMENTS, _LEAST = 24, 16
 _APART = 3
 # level at which the two are no strangers, and part of the input's power that is but rounding
 _LEVEL, _NOTHING = 1e-4, 1e-12
+# level at which a reference and an input are none
+_RELATED = 1e-3
+
+
+def related(u: FloatArray, reference: FloatArray) -> bool | None:
+    """Whether inputs (N, m) go together with a reference (N, q); None for too few samples."""
+    return _together(u, reference, _RELATED)
 
 
 def heard_back(left: FloatArray, unexplained: FloatArray, power: float) -> bool:
     """Whether what is ``left`` of the outputs (N, p) comes back in what is ``unexplained`` of the
     inputs (N, m), whose whole ``power`` is known.
     """
-    N = min(len(left), len(unexplained))
+    inputs = unexplained[:, np.mean(unexplained**2, axis=0) > _NOTHING * power]
+    return bool(_together(left, inputs, _LEVEL))
+
+
+def _together(a: FloatArray, b: FloatArray, level: float) -> bool | None:
+    """Whether any two of the channels (N, c) go together; None for too few samples."""
+    N = min(len(a), len(b))
     length = max(N // _SEGMENTS, _LEAST)
-    count = N // length
-    if count < 4:
-        return False
-    inputs = [d for d in unexplained.T if np.mean(d**2) > _NOTHING * power]
-    chances = [_chance(e, d, length) for e in left.T for d in inputs if e.any()]
-    return bool(chances) and min(chances) * len(chances) < _LEVEL
+    if N // length < 4:
+        return None
+    chances = [_chance(x[:N], y[:N], length) for x in a.T for y in b.T if x.any() and y.any()]
+    return bool(chances) and min(chances) * len(chances) < level
 
 
 def _chance(a: FloatArray, b: FloatArray, length: int) -> float:
