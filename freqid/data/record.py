@@ -130,8 +130,8 @@ class Record(Signals):
 
         ``keep_input=True`` keeps the whole input beside the slower output, which loses nothing
         (the lifted model). ``antialias=True`` first runs the same zero-phase low-pass filter over
-        input and output, so that the relation between them is unchanged: an eighth-order Chebyshev
-        filter. Raises ValueError for a factor that leaves fewer than two output samples.
+        input and output, which leaves their relation alone: one up to 0.9 of the new Nyquist
+        frequency, zero above it. Raises ValueError for a factor that leaves fewer than two samples.
 
         >>> Record(np.arange(8.0), np.arange(8.0), dt=0.1).decimate(4).y
         array([0., 4.])

@@ -222,3 +222,22 @@ def test_a_drift_that_friction_has_absorbed_is_said_by_its_name():
             named.append(est.warnings[0].kind in ("drift", "offset"))
     assert len(named) >= 4
     assert np.mean(named) >= 0.8, named
+
+
+def test_decimated_data_whose_mode_has_gone_to_its_mirror_image_name_the_hold():
+    """A delay of half a millisecond was said first, and no hold at all."""
+
+    def mode(w, z, g):
+        return [[0, 1], [-w * w, -2 * z * w]], [[0], [1]], [[g, 0]], [[0]]
+
+    values = {"w": 75.4, "z": 0.03, "g": 2000.0}
+    plant = fq.GreyBox(mode, [fq.Parameter(n, v) for n, v in values.items()])
+    for seed in range(3):
+        u = fq.chirp(1, 40, 8.0, 2e-3)
+        y = fq.simulate(plant, u, 2e-3).y
+        y = y + 0.03 * y.std() * coloured(seed, len(u), 0.0)
+        est = fq.fit(plant, fq.Record(u[::5], y[::5], 0.01), start={"w": 70.0})
+        assert est["w"] > np.pi / 0.01
+        assert est.warnings[0].kind == "hold rejected"
+        assert "zero-order hold of about 0.0020" in est.warnings[0] or "0.0019" in est.warnings[0]
+        assert est.verdict.grade == "do not use"

@@ -11,18 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import input_dt
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import measurement, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
+from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LIKELY, evidence, ordered
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
-from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, of_several, score
@@ -32,7 +31,7 @@ from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
-from freqid.lti import PeriodicHold, in_one_blas_thread
+from freqid.lti import in_one_blas_thread
 from freqid.models import GreyBox, Model
 
 if TYPE_CHECKING:
@@ -40,10 +39,6 @@ if TYPE_CHECKING:
 
     from freqid.fitting.estimate import Estimate
 
-# tests that are answered by one fit with another hold
-_HOLDS = ("hold", "hold period")
-# part of a hold's gain that one that is possible has to reach
-_REACHED = 0.5
 # part of the strongest one's evidence from which another is said, and how many are
 _WORTH, _SAID = 0.5, 3
 # chance from which a suspect is no certainty
@@ -57,7 +52,7 @@ _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
 _KNOWN = (measurement, plant)
 # level at which all suspects together speak of good data
-LEVEL = 0.0075
+LEVEL = 0.0065
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +130,18 @@ class Inquiry:
         scene = self.scene
         if scene is None or not self.speaking:
             return []
+        most = max(a.test.gain for a in self.speaking)
+        if other := unmirrored(self, scene, most):
+            return [other]
         merged: dict[str, Asked] = {}
         # a step towards no hold at all is something else, where something else speaks
-        possible = [a for a in self.speaking if a.name not in _HOLDS or self._possible(a)]
+        possible = [a for a in self.speaking if possible_hold(self, a)]
         for a in possible or self.speaking:
-            kind = "hold rejected" if a.name in _HOLDS else a.name
+            kind = "hold rejected" if a.name in HOLDS else a.name
             other = merged.get(kind)
             if other is None or a.test.gain > other.test.gain:
                 merged[kind] = dataclasses.replace(a, name=kind)
-        merged = {kind: self._again(scene, a) for kind, a in merged.items()}
+        merged = {kind: fitted_again(self, scene, a) for kind, a in merged.items()}
         if "saturation" in merged:
             # samples at a limit are what is left of peaks
             merged.pop("spikes", None)
@@ -161,31 +159,6 @@ class Inquiry:
             return ranked
         loop = looped(self, scene, LEVEL / max(len(self.asked), 1))
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
-
-    def _possible(self, a: Asked) -> bool:
-        """Whether a score's step leads towards another hold, or to a period that can be."""
-        if a.name == "hold":
-            return a.test.size > 0
-        hold, dt = self.readings[0].hold, input_dt(self.readings[0].data)
-        own = hold.period if isinstance(hold, PeriodicHold) else dt
-        return a.test.size < 0 or own + a.test.size <= dt
-
-    def _again(self, scene: Scene, a: Asked) -> Asked:
-        """The suspect after a fit with it free, where that is worth one."""
-        again = None
-        if a.name == "delay":
-            again = late(self.minimum, self.readings, a.test.size)
-        elif a.name == "hold rejected":
-            again = held(self.minimum, self.readings)
-        # a hold that is possible may reach much less than a change of the response by as much
-        reached = -np.inf if again is None else scene.cost - again.cost
-        possible = a.name != "hold rejected" or reached > _REACHED * a.test.gain
-        if again is None:
-            return a
-        if possible and reached <= a.test.gain:
-            return dataclasses.replace(a, odd=again.odd, detail=again.sentence)
-        test = dataclasses.replace(a.test, gain=reached, size=again.size)
-        return dataclasses.replace(a, test=test, detail=again.sentence, odd=again.odd)
 
     @in_one_blas_thread
     def findings(self) -> list[Finding]:

@@ -71,20 +71,26 @@ def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit |
     return Refit(best.cost, size, f"the input acts {_time(size)} later than the model says")
 
 
-def held(minimum: Minimum, readings: Sequence[Reading]) -> Refit | None:
-    """With another hold: a zero-order hold of any length that is possible, first-order, none."""
+def held(
+    minimum: Minimum, readings: Sequence[Reading], near: FloatArray | None = None
+) -> Refit | None:
+    """With another hold: a zero-order hold of any length that is possible, first-order, none.
+
+    Begun where the fit ended, or ``near`` other unknowns.
+    """
     structure = minimum.structure
     dt = input_dt(readings[0].data)
     if not _plain(structure) or not dt:
         return None
     at_lines = [r.at_lines().with_(delayed=True) for r in readings]
-    found = [_of_any_length(minimum, structure, at_lines, dt)]
+    near = _alone(minimum) if near is None else near
+    found = [_of_any_length(near, structure, at_lines, dt)]
     if all(input_dt(r.data) == dt for r in readings):
         others: list[tuple[Hold, str]] = [
             (FirstOrderHold(dt), "straight lines between the samples"),
             (BandLimited(), "a band-limited or measured input"),
         ]
-        found += [_through(minimum, structure, at_lines, hold, text) for hold, text in others]
+        found += [_through(near, structure, at_lines, hold, text) for hold, text in others]
     told = [f for f in found if f is not None]
     return min(told, key=lambda f: f.cost, default=None)
 
@@ -96,9 +102,9 @@ def _plain(structure: object) -> TypeGuard[GreyStructure]:
 
 
 def _of_any_length(
-    minimum: Minimum, structure: GreyStructure, readings: Sequence[Reading], dt: float
+    near: FloatArray, structure: GreyStructure, readings: Sequence[Reading], dt: float
 ) -> Refit | None:
-    freed = structure.with_unknown(HoldPeriod.of(dt), _alone(minimum))
+    freed = structure.with_unknown(HoldPeriod.of(dt), near)
     lines = [r.lines() for r in readings]
     if any(e.lines.aliases > 1 for e in lines) or structure.model.delay_sources:
         return None
@@ -127,11 +133,11 @@ def _odd(part: float) -> bool:
 
 
 def _through(
-    minimum: Minimum, structure: GreyStructure, readings: Sequence[Reading], hold: Hold, text: str
+    near: FloatArray, structure: GreyStructure, readings: Sequence[Reading], hold: Hold, text: str
 ) -> Refit | None:
     if all(r.hold == hold for r in readings):
         return None
-    plain = GreyStructure(structure.model, structure.physical(_alone(minimum)))
+    plain = GreyStructure(structure.model, structure.physical(near))
     try:
         lines = [r.with_(hold=hold).lines() for r in readings]
         found = polish(Objective(plain, lines), plain.start, limit=_LIMIT)
