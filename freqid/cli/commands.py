@@ -13,8 +13,9 @@ import cyclopts
 
 import freqid as fq
 from freqid.checks import InputError
-from freqid.cli.estimates import bias, fit, fit_many, new_model
+from freqid.cli.estimates import fit, fit_many, new_model
 from freqid.cli.options import Band, Columns, Dt
+from freqid.cli.planned import bias
 from freqid.cli.terminal import (
     PICTURES,
     TABLES,

@@ -1,31 +1,16 @@
-"""Commands that estimate, from data or without: fit and bias."""
+"""Commands that estimate: fit, fit-many, and the template of a plant for them."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import numpy as np
-from cyclopts import Parameter as Option
+from typing import Any, Literal
 
 import freqid as fq
-from freqid.checks import choice, whole
 from freqid.cli.fleets import engine, matching
 from freqid.cli.options import Band, Columns, Dt, Hold, Limits, Texts, hold_of
-from freqid.cli.plants import TEMPLATE, model_of, pairs, with_options
-from freqid.cli.terminal import (
-    PICTURES,
-    TABLES,
-    may_write,
-    progress,
-    show,
-    write_picture,
-    write_table,
-)
+from freqid.cli.plants import TEMPLATE, model_of, pairs, texts, with_options
+from freqid.cli.terminal import PICTURES, may_write, progress, show, write_picture
 from freqid.data import whole_file
-from freqid.excitation import below_nyquist
-from freqid.lti import holds
-from freqid.models import PLANTS
 
 
 def fit(
@@ -35,8 +20,11 @@ def fit(
     order: int = 3,
     zeros: int | None = None,
     poles: int | None = None,
+    feedthrough: bool = False,
     input: Columns = None,
     output: Columns = None,
+    reference: str | None = None,
+    units: Texts = None,
     dt: Dt = None,
     time: str | None = None,
     resample: bool = False,
@@ -47,6 +35,8 @@ def fit(
     domain: Literal["frequency", "time"] = "frequency",
     initial_state: Literal["estimate", "zero", "steady"] = "estimate",
     weights: str | None = None,
+    offset: bool = False,
+    loss: Literal["linear", "huber"] = "linear",
     start: Texts = None,
     fix: Texts = None,
     bounds: Limits = None,
@@ -68,6 +58,12 @@ def fit(
     model
         two-mass (the paper's), three-mass, first-order, output-error (a black box of --order),
         transfer-function (--zeros, --poles), or your own: my_plant.py:plant (freqid new-model).
+    feedthrough
+        output-error with a direct term.
+    reference
+        the column of what was commanded, in a closed loop: the fit goes through it.
+    units
+        NAME=UNIT of columns, such as time=ms.
     time
         the column of the time, where its name does not tell.
     resample
@@ -78,6 +74,10 @@ def fit(
         when decimating, keep the whole input (the lifted model).
     weights
         noise: weigh each line by the noise that the fit leaves there.
+    offset
+        make a constant of each output an unknown.
+    loss
+        huber: samples that are far off count less.
     start
         NAME=VALUE to begin from, as often as wanted.
     fix
@@ -104,7 +104,10 @@ def fit(
     read = [data, *([] if validate is None else [validate])]
     for path, kinds in ((out, (".json",)), (plot, PICTURES), (report, (".html", ".htm"))):
         may_write(path, read, force, kinds)
-    options: dict[str, Any] = {"dt": dt, "time": time, "resample": resample}
+    options: dict[str, Any] = {
+        "dt": dt, "time": time, "resample": resample, "reference": reference,
+        "units": texts("--units", units),
+    }  # fmt: skip
     record = fq.read(data, input, output, **options)
     other = None if validate is None else fq.read(validate, input, output, **options)
     if conditions:
@@ -112,7 +115,8 @@ def fit(
         other = other and other.with_conditions(**record.conditions)
     if decimate != 1:
         record = record.decimate(decimate, keep_input=keep_input)
-    plant = with_options(model_of(model, order, zeros, poles), fix or (), bounds or (), prior or ())
+    asked = model_of(model, order, zeros, poles, feedthrough)
+    plant = with_options(asked, fix or (), bounds or (), prior or ())
     with progress() as bar:
         bar.add_task(f"fitting {model} to {record.n_samples} samples", total=None)
         estimate = fq.fit(
@@ -123,6 +127,8 @@ def fit(
             domain=domain,
             initial_state=initial_state,
             weights=weights,
+            offset="estimate" if offset else None,
+            loss=loss,
             start=pairs("--start", start) or None,
             n_starts="auto" if n_starts is None else n_starts,
         )
@@ -230,70 +236,3 @@ def new_model(path: Path = Path("my_plant.py"), *, force: bool = False) -> None:
     with whole_file(path) as beside:
         beside.write_text(TEMPLATE.format(name=path.name, stem=path.stem), encoding="utf-8")
     print(f"{path}: change it, then: freqid fit DATA --model {path}:plant")
-
-
-def bias(
-    *,
-    model: Literal["two-mass", "three-mass", "first-order"],
-    chirp: tuple[float, float],
-    factor: Annotated[list[float], Option(consume_multiple=True)],
-    hold: Annotated[list[str] | None, Option(consume_multiple=True)] = None,
-    base_dt: float = 0.5e-3,
-    parameter: str | None = None,
-    out: Path | None = None,
-    plot: Path = Path("bias.png"),
-    force: bool = False,
-) -> int:
-    """What a chirp, decimated, makes of a model's parameters: computed, without data.
-
-    Parameters
-    ----------
-    model
-        two-mass (the paper's), three-mass or first-order, at its own values.
-    chirp
-        lowest and highest frequency in Hz.
-    factor
-        decimation factors.
-    hold
-        what the fit assumes: any of zoh, foh, bl and remembered; by default zoh, foh, remembered.
-    base_dt
-        sample time of the converter in s.
-    parameter
-        that the picture shows; by default the one that is most wrong.
-    out
-        CSV file for the table.
-    plot
-        heat map over upper frequency and factor, one panel a hold.
-    force
-        overwrite files that are there already.
-    """
-    may_write(out, [], force, TABLES)
-    may_write(plot, [], force, PICTURES)
-    names = ["zoh", "foh", "remembered"] if hold is None else hold
-    for name in names:
-        choice("--hold", name, (*holds.Hold.named, "remembered"))
-    assumed = [None if name == "remembered" else name for name in names]
-    factors = [whole("--factor", f) for f in factor]
-    plant = PLANTS[model]()
-    low, high = chirp
-    below_nyquist(high, base_dt)
-    asked = f"{low:g}-{high:g}"
-    table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, assumed, base_dt)
-    if out is not None:
-        write_table(out, table)
-    shown = table.drop(columns=["spectrum", "message"])
-    shown["relative_bias"] = [f"{100 * b:+.3g} %" for b in shown["relative_bias"]]
-    show(f"{model}, chirp {asked} Hz held for {1e3 * base_dt:g} ms", shown)
-    finite = table[np.isfinite(table["relative_bias"])]
-    if parameter is None and len(finite):
-        parameter = finite.loc[finite["relative_bias"].abs().idxmax(), "parameter"]
-    for message in dict.fromkeys(m for m in table["message"] if m):
-        print(f"warning: {message}")
-    nyquist = 0.5 / base_dt
-    uppers = sorted({float(f"{u:.3g}") for u in np.linspace(low, 2 * high - low, 15)[2:]} | {high})
-    around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}
-    picture = fq.bias_map(plant, around, factors, assumed, base_dt)
-    axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[asked])
-    write_picture(plot, axes)
-    print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")
-    return 0 if table["converged"].all() else 1

@@ -14,7 +14,7 @@ Hold = Annotated[
     str | None,
     Option(
         help="what the input did between samples: zoh, foh or bl at the record's sample time, or "
-        "zoh:PERIOD, foh:PERIOD in s; by default what the record remembers"
+        "zoh:PERIOD, foh:PERIOD in s, or estimate; by default what the record remembers"
     ),
 ]
 Dt = Annotated[float | None, Option(help="sample time in s, for data without a time column")]

@@ -46,12 +46,16 @@ plant = fq.GreyBox(
 '''
 
 
-def model_of(text: str, order: int, zeros: int | None, poles: int | None) -> object:
+def model_of(
+    text: str, order: int, zeros: int | None, poles: int | None, feedthrough: bool = False
+) -> object:
     """The model that ``--model`` names; ValueError, with what there is, for another."""
+    if text == "output-error":
+        return fq.OutputError(order, feedthrough)
+    if feedthrough:
+        raise InputError(f"--feedthrough is output-error's; give {text} its own direct term D")
     if text in PLANTS:
         return PLANTS[text]()
-    if text == "output-error":
-        return fq.OutputError(order)
     if text == "transfer-function":
         n = order if poles is None else poles
         return fq.TransferFunction(n - 1 if zeros is None else zeros, n)
@@ -91,14 +95,24 @@ def from_file(path: Path, name: str) -> object:
 def pairs(option: str, given: Sequence[str] | None) -> dict[str, float]:
     """``name=value`` texts as numbers by name."""
     found = {}
+    for name, value in texts(option, given, "k=1.5e5").items():
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise InputError(
+                f"{option} {name}={value} is not NAME=VALUE, such as {option} k=1.5e5"
+            ) from None
+    return found
+
+
+def texts(option: str, given: Sequence[str] | None, such_as: str = "time=ms") -> dict[str, str]:
+    """``name=text`` as texts by name."""
+    found = {}
     for text in given or ():
         name, mark, value = text.partition("=")
-        try:
-            found[name.strip()] = float(value)
-        except ValueError:
-            mark = ""
         if not mark or not name.strip():
-            raise InputError(f"{option} {text} is not NAME=VALUE, such as {option} k=1.5e5")
+            raise InputError(f"{option} {text} is not NAME=VALUE, such as {option} {such_as}")
+        found[name.strip()] = value.strip()
     return found
 
 

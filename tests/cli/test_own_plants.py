@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import freqid as fq
@@ -141,3 +142,30 @@ def test_a_file_that_fails_says_where(day, capsys):
     assert run("fit", "train.csv", "--model", "bad.py:plant") == 2
     assert "bad.py: ModuleNotFoundError" in capsys.readouterr().err
     assert np.isfinite(fq.read("train.csv").dt)
+
+
+def test_what_warnings_advise_can_be_done(tmp_path, monkeypatch, capsys):
+    """Time in ms by name of unit, an offset, spikes, a reference and a direct term."""
+    monkeypatch.chdir(tmp_path)
+    lag = fq.first_order(b=50.0, a=20.0)
+    rng = np.random.default_rng(4)
+    u = rng.standard_normal(800)
+    y = fq.simulate(lag, u, 0.01).y
+    y = y + 0.5 + 0.02 * y.std() * rng.standard_normal(800)
+    y[[100, 500]] += 10 * y.std()
+    table = pd.DataFrame({"t": 10.0 * np.arange(800), "u": u, "y": y, "wanted": u})
+    table.to_csv("log.csv", index=False)
+    given = ("fit", "log.csv", "--model", "first-order", "--input", "u", "--output", "y")
+    assert run(*given, "--units", "t=ms", "--offset", "--loss", "huber", "--out", "est.json") == 0
+    said = capsys.readouterr().out
+    assert "offset estimated: y 0." in said
+    est = fq.load("est.json")
+    assert est["a"] == pytest.approx(20, rel=0.05)
+    assert run(*given, "--units", "t=ms", "--reference", "wanted", "--force") == 0
+    assert "the reference explains 100 %" in capsys.readouterr().out
+    assert run("fit", "log.csv", "--model", "output-error", "--order", "1", "--feedthrough",
+               "--units", "t=ms", "--input", "u", "--output", "y") == 0  # fmt: skip
+    assert run(*given, "--feedthrough") != 0
+    assert "--feedthrough is output-error's" in capsys.readouterr().err
+    assert run(*given, "--units", "ms") != 0
+    assert "--units ms is not NAME=VALUE" in capsys.readouterr().err

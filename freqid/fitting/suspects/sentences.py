@@ -13,7 +13,10 @@ CURES = {
         "answers within the sample drives the input"
     ),
     "offset": "fit with offset='estimate', or take the offset off the record",
-    "drift": "use record.detrend(order=1), and look for what drifts",
+    "drift": (
+        "look for what drifts; take the slope off the output (record.detrend(order=1) takes it off "
+        "the input too, which harms a plant that all but integrates)"
+    ),
     "spikes": "look at the record there; fit with loss='huber', or mend the sample",
     "tone": "look for its source; weights='noise' counts the lines around it less",
     "saturation": "lower the excitation, or leave those samples out",
