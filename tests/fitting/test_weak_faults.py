@@ -207,7 +207,7 @@ def test_one_sample_that_a_limit_has_cut_is_no_spike():
 
 def test_a_drift_that_friction_has_absorbed_is_said_by_its_name():
     """Of an axis that hardly anything brakes it pulls the friction below zero: one step from there
-    tells no drift, a fit beside physical values does.
+    tells no drift, a fit with it free does.
     """
     axis, dt, samples = fq.two_mass(), 2e-3, 600
     named = []

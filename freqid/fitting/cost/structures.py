@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
 
@@ -100,15 +99,6 @@ class GreyStructure:
         """The same with one unknown more, begun from the unknowns ``near``."""
         values = dict(zip(self.physical_names, near * self.scale, strict=False))
         return GreyStructure(self.model, values, (*self.unknown, nuisance), self.known)
-
-    def within_physical(self) -> GreyStructure:
-        """The same, confined to the physical ranges of its parameters."""
-        other = copy.copy(self)
-        low, high = np.transpose([p.physical for p in self.parameters]) / self.scale[: self.count]
-        other.lower, other.upper = self.lower.copy(), self.upper.copy()
-        other.lower[: self.count] = np.maximum(low, self.lower[: self.count])
-        other.upper[: self.count] = np.minimum(high, self.upper[: self.count])
-        return other
 
     def physical(self, x: FloatArray) -> dict[str, float]:
         """The plant's free parameters at x by name."""
