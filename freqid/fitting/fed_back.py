@@ -24,7 +24,7 @@ FED_BACK = (
     "the noise comes back through a loop, or the input was measured with noise; it was not used"
 )
 # standard errors that it may have moved a parameter by: going through the reference costs as much
-_HARMLESS = 1.0
+_HARMLESS = 0.7
 
 
 def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:

@@ -61,14 +61,18 @@ def test_a_loop_without_noise_needs_no_detour():
     assert forced["a"] == pytest.approx(20, rel=1e-6)
 
 
-def test_little_noise_in_a_loop_is_heard_in_the_input():
-    """Of 0.1 % the loop brings 1e-7 of the input's power back, which biases a direct fit."""
-    off = []
-    for seed in range(8):
-        est = fq.fit(LAG, in_a_loop(seed, level=0.003))
-        assert "goes together with what the reference leaves" in est.notes[0]
-        off.append((est["a"] - 20) / est.parameters.loc["a", "std"])
-    assert np.sqrt(np.mean(np.square(off))) < 2
+def test_little_noise_in_a_loop_is_heard_in_the_input_and_left_where_it_does_no_harm():
+    """Of 0.8 % the loop brings back what biases a direct fit by 0.6 standard errors, of 0.1 % by
+    nothing that shows.
+    """
+    for level, through in ((0.02, True), (0.003, False)):
+        off = []
+        for seed in range(8):
+            est = fq.fit(LAG, in_a_loop(seed, level=level))
+            heard = "goes together with what the reference leaves" in est.notes[0]
+            assert heard == through
+            off.append((est["a"] - 20) / est.parameters.loc["a", "std"])
+        assert np.sqrt(np.mean(np.square(off))) < 2
 
 
 def test_a_reference_that_comes_too_late_is_none():
