@@ -185,7 +185,7 @@ class Reading:
             free = self.initial_state == "estimate"
             return StampedExperiment(self.data, self.hold, free, self.place)
         if self.in_time:
-            return self._samples(plane)
+            return self.samples(plane)
         if self.logarithmic:
             return self._logarithm()
         if self.both_ends:
@@ -238,7 +238,8 @@ class Reading:
         weight = np.sqrt(relative) * np.abs(frf.response)
         return LogResponse(frf.omega, frf.response, self.hold, weight, self.place)
 
-    def _samples(self, plane: Plane | None) -> TimeExperiment:
+    def samples(self, plane: Plane | None = None) -> TimeExperiment:
+        """The samples of a record as residuals; ValueError where the input's do not tell."""
         assert isinstance(self.data, Record)
         record, hold = self.data, self.hold
         if not self.noise.plain:

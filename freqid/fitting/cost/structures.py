@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Mapping, Sequence
 
@@ -27,6 +28,8 @@ from freqid.models import GreyBox, Parameter
 
 # scattered starts lie within this factor of the start, where there are no bounds
 SPREAD = 10.0
+# part of a parameter's size by which it keeps off the end of what is physical
+_INSIDE = 1e-4
 
 
 def _not_early(p: Parameter, model: GreyBox) -> Parameter:
@@ -99,6 +102,17 @@ class GreyStructure:
         """The same with one unknown more, begun from the unknowns ``near``."""
         values = dict(zip(self.physical_names, near * self.scale, strict=False))
         return GreyStructure(self.model, values, (*self.unknown, nuisance), self.known)
+
+    def confined(self) -> GreyStructure:
+        """The same with all parameters where they are physical, and none at the end of that: an
+        axis without friction has no response at zero.
+        """
+        same = copy.copy(self)
+        ends = np.array([p.physical for p in self.parameters]).T / self.scale[: self.count]
+        same.lower, same.upper = self.lower.copy(), self.upper.copy()
+        same.lower[: self.count] = np.maximum(self.lower[: self.count], ends[0] + _INSIDE)
+        same.upper[: self.count] = np.minimum(self.upper[: self.count], ends[1] - _INSIDE)
+        return same
 
     def physical(self, x: FloatArray) -> dict[str, float]:
         """The plant's free parameters at x by name."""

@@ -7,7 +7,6 @@ import scipy
 
 from freqid.checks import Array, FloatArray
 from freqid.data import Record
-from freqid.fitting.cost.experiments import Evaluation
 from freqid.frf import Spectra
 from freqid.lti import Linearisation, PeriodicHold, Realisation, Sampled
 from freqid.models import FreeMotion, forcing, propagate
@@ -45,9 +44,9 @@ class TimeExperiment:
         """Energy of the data, the cost of a model that is zero."""
         return float(np.sum(self.rows(self.y) ** 2))
 
-    def at(self, realisation: Realisation) -> Evaluation:
+    def at(self, realisation: Realisation) -> TimeEvaluation:
         """Evaluate at one trial point."""
-        return _TimeEvaluation(self, realisation.for_place(self.place).linearisation)
+        return TimeEvaluation(self, realisation.for_place(self.place).linearisation)
 
     def rows(self, y: Array) -> FloatArray:
         """(…, outputs, N) as real rows."""
@@ -57,7 +56,9 @@ class TimeExperiment:
         return y.reshape(*y.shape[:-2], -1)
 
 
-class _TimeEvaluation:
+class TimeEvaluation:
+    """The samples at one trial point, with a motion (n, N) of the input alone and free ones."""
+
     def __init__(self, experiment: TimeExperiment, lin: Linearisation) -> None:
         e, self.lin = experiment, lin
         self.experiment = e
@@ -83,9 +84,7 @@ class _TimeEvaluation:
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         e, d, at = self.experiment, self.lin.derivative, self.lin.at
-        x = self.x
-        if initial is not None:
-            x = x + np.tensordot(self.mix @ initial, self.free.motions, 1)
+        x = self._states(initial)
         push = self.change.phi @ x + forcing(self.change, e.u)
         if e.free_state:
             dx = self.free.particular(push)
@@ -93,6 +92,24 @@ class _TimeEvaluation:
             dx = propagate(self.sampled.phi, push, self.change.gamma_next @ e.u[:, 0])
         dy = at.C @ dx + d.C @ x + d.D @ e.u
         return e.rows(dy[..., :: e.factor])
+
+    def changed_midway(self, initial: FloatArray | None) -> FloatArray:
+        """Derivative of the outputs by parameters that change in the middle, (P, outputs, N): the
+        state goes on from there as it was.
+        """
+        e, d, at = self.experiment, self.lin.derivative, self.lin.at
+        x = self._states(initial)
+        changed = np.arange(e.u.shape[1]) >= e.factor * (e.y.shape[1] // 2)
+        push = (self.change.phi @ x + forcing(self.change, e.u)) * changed
+        dx = propagate(self.sampled.phi, push, np.zeros(push.shape[:-1]))
+        dy = at.C @ dx + (d.C @ x + d.D @ e.u) * changed
+        return np.asarray(dy[..., :: e.factor])
+
+    def _states(self, initial: FloatArray | None) -> FloatArray:
+        """The motion (n, N) that the unknowns of the initial state add up to."""
+        if initial is None:
+            return self.x
+        return self.x + np.tensordot(self.mix @ initial, self.free.motions, 1)
 
 
 def _independent(motions: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:

@@ -30,6 +30,8 @@ from freqid.fitting.uncertainty.gradient_noise import projected
 # what is added to an output, level from which it is worth a fit, and standard errors that one step
 # must not have gone
 _ADDED, _WORTH, _FAR = ("offset", "drift"), 0.1, 3.0
+# variances of the noise by which what explains it all may cost more
+_DEARER = 10.0
 _LIMIT = 40
 
 
@@ -38,30 +40,42 @@ def asked_again(
 ) -> list[Asked]:
     """All that was found, what the parameters (standard errors ``std``) may have absorbed where a
     fit without it ends.
+
+    Where a parameter has absorbed so much that it is not physical, the fits keep to what is.
     """
     structure = inquiry.minimum.structure
-    plain = isinstance(structure, GreyStructure) and not isinstance(structure, PlacedStructure)
-    if not plain or inquiry.minimum.prior is not None:
+    if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
         return [*found]
-    return [_freed(inquiry, scene, a, std) or a if _far(a) else a for a in found]
+    if inquiry.minimum.prior is not None:
+        return [*found]
+    within = structure.confined()
+    beyond = np.maximum(within.lower - scene.x, scene.x - within.upper)
+    outside = bool((beyond > _FAR * np.where(std > 0, std, np.inf)).any())
+    among = within if outside else structure
+    again = [a for a in found if a.name in _ADDED and (outside or _far(a))]
+    return [_freed(inquiry, scene, a, std, among) or a if a in again else a for a in found]
 
 
 def _far(a: Asked) -> bool:
-    return a.name in _ADDED and a.p_value < _WORTH and a.test.largest_shift > _FAR
+    return a.p_value < _WORTH and a.test.largest_shift > _FAR
 
 
-def _freed(inquiry: Asking, scene: Scene, a: Asked, std: FloatArray) -> Asked | None:
-    """The suspect as what a fit with it free gains; None where there is none."""
-    structure, draw = inquiry.minimum.structure, SUSPECTS[a.name]
-    assert isinstance(structure, GreyStructure)
-    drawn = draw(scene, inquiry.model)
+def _freed(
+    inquiry: Asking, scene: Scene, a: Asked, std: FloatArray, structure: GreyStructure
+) -> Asked | None:
+    """The suspect as what a fit of the structure with it free gains; None where there is none."""
+    drawn = SUSPECTS[a.name](scene, inquiry.model)
     assert isinstance(drawn, Columns)
     pairs = list(zip(scene.seen, drawn.columns, strict=True))
     try:
         freed = Objective(structure, [s.experiment.with_rows(c) for s, c in pairs])
         best = _least(freed, [scene.x, structure.start])
+        if best.cost > scene.cost * (1 + _DEARER / scene.freedom):
+            # values that are not physical have another cause
+            return None
         gain = max(scene.cost - best.cost, 0.0)
-        more = gain / best.cost
+        without = _least(Objective(structure, [s.experiment for s in scene.seen]), [scene.x])
+        more = without.cost / best.cost - 1
         if not scene.even:
             readings = _weighed(freed, best.x, scene)
             plain = [r.lines() for r in readings]

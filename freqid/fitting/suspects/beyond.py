@@ -28,8 +28,9 @@ _MOST = 4000
 # level at which one step apart is enough, experiments that are fitted apart at the most, and cost
 # over that of their own noise from which they are
 _SURELY, _APART, _NOISY = 1e-6, 40, 1.3
-# level from which halves that were fitted apart say more than the step between them
-_SEEN = 0.01
+# level from which a change midway is worth separate fits, and that from which halves that were
+# fitted apart say more than the step between them
+_HINT, _SEEN = 0.05, 0.01
 # the highest order of a black box beside which feedback is asked
 _BOX = 8
 
@@ -133,7 +134,7 @@ def midway(inquiry: Asking, scene: Scene, asked: Sequence[Asked]) -> list[Asked]
     told = [a for a in asked if a.name == "unsteady"]
     if halves is None or any(a.p_value <= _SURELY for a in told):
         return [*asked]
-    moved = _fitted_apart(inquiry, scene, halves, "unsteady")
+    moved = _fitted_apart(inquiry, scene, halves, "unsteady", any(a.p_value < _HINT for a in told))
     if moved is None:
         return [*asked]
     better = [_better(a, moved) for a in told] or [moved]
@@ -148,8 +149,11 @@ def _better(stepped: Asked, apart: Asked) -> Asked:
     return dataclasses.replace(apart, test=dataclasses.replace(apart.test, p_value=p), p_value=p)
 
 
-def _fitted_apart(inquiry: Asking, scene: Scene, parting: Parting, name: str) -> Asked | None:
-    """Parts of the data fitted apart, where more is left of them than their own noise.
+def _fitted_apart(
+    inquiry: Asking, scene: Scene, parting: Parting, name: str, hinted: bool = False
+) -> Asked | None:
+    """Parts of the data fitted apart, where that is ``hinted`` at, or more is left of them than
+    their own noise.
 
     One step from what lies between two sharp resonances tells nothing of either.
     """
@@ -159,7 +163,7 @@ def _fitted_apart(inquiry: Asking, scene: Scene, parting: Parting, name: str) ->
     if not isinstance(inquiry.model, GreyBox):
         return None
     floor = noise_floor([s.experiment for s in scene.seen])
-    if scene.cost <= _NOISY * floor:
+    if scene.cost <= _NOISY * floor and not hinted:
         return None
     fits = [f for f in inquiry.apart(parting) if f is not None and f.converged]
     if len(fits) < len(parting.parts):
@@ -178,5 +182,18 @@ def _fitted_apart(inquiry: Asking, scene: Scene, parting: Parting, name: str) ->
     size = float(apart.percent[np.nanargmax(apart.shift)]) / 100
     shift = float(np.nanmax(np.where(np.isfinite(moved), moved, np.nan), initial=0.0))
     statistic, degrees, p = apart.statistic, apart.degrees, apart.p_value
+    if scene.even and all(r.noise.plain and not r.own_cost for r in inquiry.readings):
+        # costs tell more than error bars, which hold only next to their values
+        degrees = _more_unknowns(scene, parting)
+        freedom = scene.freedom - degrees
+        statistic = gain / degrees / max((scene.cost - gain) / freedom, 1e-300)
+        p = float(scipy.stats.f.sf(statistic, degrees, freedom))
     test = Score(statistic, degrees, p, size, 1.0, shift, gain, size)
     return Asked(name, test, "relative", p)
+
+
+def _more_unknowns(scene: Scene, parting: Parting) -> int:
+    """Of parameters and initial states in fits of the parts beside those of the whole."""
+    states = sum(len(s.free) for s in scene.seen)
+    begun = sum(len(part) for part in parting.parts) // len(scene.seen)
+    return int((~scene.held).sum()) * (len(parting.parts) - 1) + states * (begun - 1)

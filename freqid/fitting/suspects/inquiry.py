@@ -13,7 +13,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
-from freqid.fitting.suspects import measurement, plant
+from freqid.fitting.suspects import changing, measurement, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
@@ -50,7 +50,7 @@ _MOST_LEFT = 0.3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
-_KNOWN = (measurement, plant)
+_KNOWN = (changing, measurement, plant)
 # level at which all suspects together speak of good data
 LEVEL = 0.0065
 

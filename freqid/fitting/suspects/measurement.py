@@ -9,7 +9,7 @@ from freqid.checks import FloatArray
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
-from freqid.models import GreyBox, Model
+from freqid.models import Model
 
 # samples at one extreme value that make it look like a limit, and the part of the range it is
 _AT_LIMIT, _NEAR = 4, 1e-9
@@ -207,28 +207,6 @@ def amplitude(scene: Scene, model: Model) -> Columns | None:
             for s, level in zip(scene.seen, levels, strict=True)
         ]
     )
-
-
-@suspect("unsteady")
-def unsteady(scene: Scene, model: Model) -> Columns | None:
-    """The parameters of the second half of each record differ from those of the first.
-
-    What a parameter does to the second half alone, as a part of it where it has a name: the little
-    that the first half's motion adds as it dies out is left aside.
-    """
-    if any(s.record is None for s in scene.seen):
-        return None
-    free = ~scene.held
-    size = np.abs(scene.x[free]) if isinstance(model, GreyBox) else np.ones(free.sum())
-    drawn = [_second_half(s, s.jacobian[free] * size[:, None]) for s in scene.seen]
-    return Columns(drawn, "of it" if isinstance(model, GreyBox) else "")
-
-
-def _second_half(s: Seen, rows: FloatArray) -> FloatArray:
-    """Rows (c, rows) of what outputs do, of their second half alone."""
-    signals = s.signals(s.unweighted(rows))
-    signals[..., : signals.shape[-1] // 2] = 0
-    return s.sampled(signals)
 
 
 def _level(s: Seen) -> float:

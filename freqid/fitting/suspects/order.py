@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
@@ -14,6 +15,8 @@ LIKELY = ("hold rejected", "delay", "feedthrough")
 _UNLIKELY = ("delay", "feedthrough", "hold rejected")
 # part of a gain that is as much, and the difference that is chance in units of the noise
 _EQUAL, _CHANCE = 0.98, 6.0
+# level at which a change midway explains more than what is simpler
+_CLEAR = 1e-3
 # part of one more mode's gain at which something simpler is believed instead
 _AS_MUCH = 0.8
 # what a sharp mode looks like from near: it has to explain more
@@ -31,6 +34,14 @@ def evidence(scene: Scene, a: Asked) -> float:
         # where the noise differs a quiet experiment says much that costs little
         better = max(better, np.log1p(a.test.statistic * a.test.degrees / n))
     return float(n * better - a.test.degrees * np.log(n) - 2 * np.log(a.trials))
+
+
+def _clearly(a: Asked, other: Asked) -> bool:
+    """Whether one explains more than another by no chance, all its unknowns counted."""
+    more = a.test.degrees - other.test.degrees
+    if more < 1 or a.p_value >= other.p_value:
+        return False
+    return bool(scipy.stats.chi2.sf(a.test.chi - other.test.chi, more) < _CLEAR)
 
 
 def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
@@ -54,6 +65,9 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         # to a sweep whatever the model lacks is a change between its halves
         first = ranked[0]
         ranked.sort(key=lambda a: a is first or a.test.chi - 2 * np.log(a.trials) < first.test.chi)
+    change = next((a for a in ranked if a.name == "unsteady"), None)
+    if change is not None and ranked[0].name not in _BESIDE and _clearly(change, ranked[0]):
+        ranked = [change, *(a for a in ranked if a is not change)]
     if ranked[0].name not in _BESIDE:
         ranked = [a for a in ranked if a.name != "unsteady"]
     # what the data themselves show, and what explains much besides, needs no weighing
