@@ -213,3 +213,28 @@ def test_line_ends_and_blank_lines_of_any_machine(tmp_path):
     spaced = "\n".join(f"   {k * 0.1:.1f}   {k}  {k * k}  " for k in range(9))
     (tmp_path / "b.txt").write_text("  time  u  y\n" + spaced)
     assert fq.read(tmp_path / "b.txt").y.tolist() == [k * k for k in range(9)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time,u,y,no\x0c1\n0,1\x0c,2\n0.1,2\x0c,3\n",
+        'time,u\x0cy,"x\n0.01,1\x0b\n0.02"\n',
+        "a,b,c,d\n0.1\x85\n0.2\u2028\n",
+    ],
+)
+def test_a_line_ends_where_all_readers_end_it(tmp_path, text):
+    """Found by inputs that coverage guided: a form feed ended a line for one reader only."""
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=str(path)):
+        fq.read(path)
+
+
+def test_line_ends_of_any_machine_are_line_ends(tmp_path):
+    path, rows = tmp_path / "a.csv", [f"{0.1 * k:.1f},{k},{2 * k}" for k in range(9)]
+    records = []
+    for end in ("\n", "\r\n", "\r"):
+        path.write_bytes(end.join(["time,u,y", "s,V,m", *rows, ""]).encode())
+        records.append(fq.read(path))
+    assert all(np.array_equal(r.y, 2.0 * np.arange(9)) for r in records)

@@ -30,10 +30,11 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     import pandas as pd
 
     text = _text(path)
-    if "\n" not in text:
-        # line ends of old machines
-        text = text.replace("\r", "\n")
-    lines = [line for line in text[: 400 * LOOK].splitlines()[:LOOK] if line.strip()]
+    if "\r" in text:
+        # line ends of other machines, and of old ones
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    # lines as pandas counts them: splitlines() ends some at form feeds, too
+    lines = [line for line in text[: 400 * LOOK].split("\n")[:LOOK] if line.strip()]
     if not lines:
         raise InputError("is empty; expected columns of samples under a line of names")
     layout = layout_of(_complete(lines, text), sep, decimal)
@@ -109,14 +110,15 @@ def _with_names(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     width = len(layout.names)
     if frame.shape[1] > width:
         more = frame.iloc[:, width:]
-        if not more.isna().to_numpy().all():
-            raise InputError(
-                f"rows have {frame.shape[1]} cells and the line of names {width}: "
-                f"{', '.join(layout.names)}"
-            )
-        frame = frame.iloc[:, :width]
+        if more.isna().to_numpy().all():
+            frame = frame.iloc[:, :width]
     if len(frame) == 0:
         raise InputError("holds names but no samples")
+    if frame.shape[1] != width:
+        raise InputError(
+            f"rows have {frame.shape[1]} cells and the line of names {width}: "
+            f"{', '.join(layout.names)}"
+        )
     frame.columns = layout.names
     frame.attrs["units"] = layout.units
     if not layout.headed:
