@@ -5,9 +5,10 @@
     python benchmarks/guided_fuzz.py --runs 20000 record.csv ties
     python benchmarks/guided_fuzz.py --seconds 60       a minute over all of them
 
-What reached new code is kept in ``--out``, one folder a target, and a run goes on from there; inputs
-that ended otherwise lie beside it. Printed for each target: inputs, the slowest, the most memory, and
-how many ended otherwise. One that takes more than five seconds, or more than 256 MiB at once, has.
+What reached new code is kept in ``--out``, one folder a target, and a run goes on from there;
+inputs that ended otherwise lie beside it. Printed for each target: inputs, the slowest, the most
+memory, and how many ended otherwise. One that takes more than five seconds, or more than 256 MiB
+at once, has.
 """
 
 import argparse
