@@ -13,6 +13,9 @@ from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.models import GreyBox, Model
 
+# values of all states by all unknowns from which a record is too long to be simulated
+_MOST = 2e7
+
 
 @suspect("unsteady")
 def unsteady(scene: Scene, model: Model) -> Columns | None:
@@ -45,7 +48,9 @@ def _simulated(scene: Scene, model: Model, s: Seen) -> FloatArray | None:
     The state goes on as it was: a lightly damped plant remembers for long that it had not changed.
     """
     held = HoldPeriod.name in getattr(scene.structure, "names", ())
-    if not isinstance(model, GreyBox) or model.late or held:
+    if not isinstance(model, GreyBox) or model.late or held or s.record is None:
+        return None
+    if len(scene.x) * len(model.state_space().A) * len(s.record.u) > _MOST:
         return None
     reading = s.reading.with_(domain="time", noise=BiasIntegral(), initial_state="estimate")
     try:

@@ -1,0 +1,132 @@
+"""Whether the tests notice when the kernel, the holds, the cost or the search is changed.
+
+    pip install cosmic-ray
+    python benchmarks/mutation.py lti --every 10       each tenth change, resumed where it stopped
+    python benchmarks/mutation.py lti --report         what survived, as differences
+
+Cosmic Ray changes one operator, number or condition at a time in a copy of the project and runs the
+tests of that room. Left out: ``|``, which only annotations have here, decorators, and numbers that
+are limits of their own (module constants), whose exact value no test may pin.
+"""
+
+import argparse
+import ast
+import collections
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from table import show
+
+HERE = Path(__file__).resolve().parents[1]
+# what is changed, and the tests that have to notice, the quick ones first
+ROOMS = {
+    "lti": (["freqid/lti"], "tests/lti tests/models tests/fitting/test_fit.py"),
+    "cost": (
+        ["freqid/fitting/cost"],
+        "tests/fitting/test_fit.py tests/fitting/test_several_channels.py "
+        "tests/fitting/test_noise_ends.py tests/fitting/test_black_box.py "
+        "tests/fitting/test_entry_options.py tests/fitting/test_minimum.py tests/robots "
+        "tests/fitting/test_delays.py",
+    ),
+    "search": (
+        ["freqid/fitting/search"],
+        "tests/fitting/test_fit.py tests/fitting/test_search.py tests/fitting/test_starts.py "
+        "tests/fitting/test_bounds.py tests/fitting/test_witness.py",
+    ),
+}
+# seconds after which a change has made the tests hang
+_TIMEOUT = 400
+_LEFT_OUT = re.compile(r"core/(ReplaceBinaryOperator_BitOr|RemoveDecorator|ExceptionReplacer)")
+
+
+def _copied(folder):
+    """The files that are kept, in a folder of their own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    names = subprocess.run(["git", "ls-files"], cwd=HERE, capture_output=True, check=True).stdout
+    pack = subprocess.run(
+        ["tar", "cf", "-", "-T", "-"], cwd=HERE, input=names, capture_output=True, check=True
+    )
+    subprocess.run(["tar", "xf", "-"], cwd=folder, input=pack.stdout, check=True)
+
+
+def _constants(path):
+    """Lines of limits: names of a module that are bound to numbers."""
+    lines = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            lines.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+    return lines
+
+
+def _chosen(db, tree, every):
+    """Mark all but each so-manieth change as left out."""
+    from cosmic_ray.work_item import WorkerOutcome, WorkResult
+
+    limits, skipped, left = {}, [], []
+    for item in db.work_items:
+        m = item.mutations[0]
+        known = limits.setdefault(m.module_path, _constants(tree / m.module_path))
+        number = m.operator_name == "core/NumberReplacer" and m.start_pos[0] in known
+        keep = not number and not _LEFT_OUT.match(m.operator_name)
+        (left if keep else skipped).append((str(m.module_path), m.start_pos, item.job_id))
+    left.sort()
+    kept = left[every // 2 :: every]
+    gone = {job for *_, job in skipped} | {j for *_, j in left} - {j for *_, j in kept}
+    db.set_multiple_results(gone, WorkResult(worker_outcome=WorkerOutcome.SKIPPED))
+    return len(kept), len(left)
+
+
+def _told(db, diffs):
+    """How many of each module were noticed."""
+    count, total = collections.defaultdict(lambda: [0, 0]), [0, 0]
+    for item, result in db.completed_work_items:
+        if result.test_outcome is None:
+            continue
+        for tally in (count[item.mutations[0].module_path], total):
+            tally[0] += result.is_killed
+            tally[1] += 1
+        if diffs and not result.is_killed:
+            print(result.diff)
+    for module, (killed, of) in sorted(count.items()):
+        print(f"    {module}: {killed} of {of}")
+    return total
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("room", choices=ROOMS)
+    parser.add_argument("--every", type=int, default=1, help="take each so-manieth change")
+    parser.add_argument("--out", type=Path, default=Path("mutation_results"))
+    parser.add_argument("--report", action="store_true", help="print what survived, run nothing")
+    given = parser.parse_args()
+    from cosmic_ray.work_db import WorkDB
+
+    tree = (given.out / f"{given.room}_tree").resolve()
+    session, config = tree.with_name(f"{given.room}.sqlite"), tree.with_name(f"{given.room}.toml")
+    modules, tests = ROOMS[given.room]
+    run = f"{sys.executable} -m pytest -x -q -n 0 -p no:cacheprovider {tests}"
+    if not session.exists() and not given.report:
+        _copied(tree)
+        config.write_text(
+            f"[cosmic-ray]\nmodule-path = {modules!r}\ntimeout = {_TIMEOUT}\n"
+            f'excluded-modules = []\ntest-command = "{run}"\n'
+            '[cosmic-ray.distributor]\nname = "local"\n'
+        )
+        call = ["cosmic-ray", "init", str(config), str(session)]
+        subprocess.run(call, cwd=tree, check=True)
+        db = WorkDB(session, WorkDB.Mode.open)
+        print("changes chosen: {} of {}".format(*_chosen(db, tree, given.every)), flush=True)
+    if not given.report:
+        environment = {**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"}
+        call = ["cosmic-ray", "exec", str(config), str(session)]
+        subprocess.run(call, cwd=tree, check=True, env=environment)
+    killed, of = _told(WorkDB(session, WorkDB.Mode.open), given.report)
+    show(f"{given.room}: noticed of {of} changes", f"{100 * killed / max(of, 1):.1f} %", "90 %")
+
+
+if __name__ == "__main__":
+    main()
