@@ -153,6 +153,20 @@ class Reading:
         """The same with other settings."""
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
+    def of_part(self, record: Record) -> Reading:
+        """The same of some of its samples, with the weights of the whole at their own lines."""
+        part = self.with_(data=record)
+        if self.noise.plain or self.in_time or not isinstance(self.data, Record):
+            return part
+        plain = BiasIntegral()
+        outputs, _, count = self.with_(noise=plain).lines().lines.Y.shape
+        own = part.with_(noise=plain).lines().lines.Y.shape[-1]
+        weights = np.broadcast_to(self.noise.weights(self.data, (outputs, count)), (outputs, count))
+        at = np.round(np.linspace(0, count - 1, own)).astype(int)
+        # half of the samples have half of the noise's energy at each line
+        longer = self.data.n_samples / record.n_samples
+        return part.with_(noise=GivenWeights(longer * weights[:, at]))
+
     @property
     def sample_time(self) -> float:
         """Period in s of a sampled model of these data: that of the hold, or of the input."""

@@ -3,6 +3,7 @@
 import control
 import numpy as np
 import pytest
+import scipy.signal
 
 import freqid as fq
 
@@ -213,3 +214,25 @@ def test_a_delay_of_many_samples_is_found_without_a_start(delay, seed):
     est = fq.fit(swinging(0.0), swung(seed, delay))
     assert est["Td"] == pytest.approx(delay, abs=5 * est.parameters["std"]["Td"])
     assert est.verdict.grade == "trust"
+
+
+@pytest.mark.parametrize("late", [0.013, 0.042])
+def test_a_delay_and_weights_go_together(late):
+    """Found: a known delay of more than a sample and weights="noise" ended in numpy's words."""
+
+    def lag(a, b):
+        return [[-a]], [[b]], [[1]], [[0]]
+
+    plant = fq.GreyBox(lag, [fq.Parameter("a", 20.0), fq.Parameter("b", 50.0)], input_delay=late)
+    complete = []
+    for seed in range(6):
+        record = fq.simulate(plant, fq.white_noise(600, seed=seed), 0.01)
+        e = np.random.default_rng(seed).standard_normal(900)
+        noise = scipy.signal.lfilter([np.sqrt(0.19)], [1, -0.9], e)[300:]
+        record = fq.Record(record.u, record.y + 0.1 * record.y.std() * noise, 0.01)
+        est = fq.fit(plant, record, weights="noise")
+        assert est.verdict.grade == "trust", est.verdict
+        complete.append(est.witness.verdict)
+        given = np.linspace(1, 3, 301)
+        assert fq.fit(plant, record, weights=given).witness.verdict != "absent"
+    assert complete.count("complete") >= 5, complete

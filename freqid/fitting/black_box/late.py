@@ -46,7 +46,7 @@ def in_step(reading: Reading, shifts: Sequence[int], least: int = 0) -> Reading:
         np.column_stack(inputs), record.outputs[first : first + count], record.dt, record.hold,
         input_names=record.input_names, output_names=record.output_names,
     )  # fmt: skip
-    return reading.with_(data=moved, delayed=False)
+    return reading.of_part(moved).with_(delayed=False)
 
 
 def with_less_delay(model: GreyBox, period: float, shifts: Sequence[int]) -> GreyBox:

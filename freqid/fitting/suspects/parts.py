@@ -74,11 +74,11 @@ def _half(reading: Reading, first: bool) -> Reading:
     assert isinstance(record, Record)
     middle = (record.n_samples // 2) * record.dt
     half = record.slice(None, middle) if first else record.slice(middle, None)
-    return _at_fewer_lines(reading, reading.with_(data=half))
+    return reading.of_part(half)
 
 
-def _at_fewer_lines(whole: Reading, part: Reading, last: bool = False) -> Reading:
-    """A part with the weights of the whole at its own lines: ``last`` of them, or all thinned."""
+def _at_fewer_lines(whole: Reading, part: Reading, last: bool) -> Reading:
+    """A band with the weights of the whole at its own lines: the first of them, or the ``last``."""
     if whole.noise.plain or whole.in_time or not isinstance(whole.data, Record):
         return part
     plain = BiasIntegral()
@@ -86,10 +86,6 @@ def _at_fewer_lines(whole: Reading, part: Reading, last: bool = False) -> Readin
     own = part.with_(noise=plain).lines().lines.Y.shape[-1]
     every = outputs, count
     weights = np.broadcast_to(whole.noise.weights(whole.data, every), every)
-    if part.band == whole.band:
-        # half of the samples have half of the noise's energy at each line
-        at = np.round(np.linspace(0, count - 1, own)).astype(int)
-        return part.with_(noise=GivenWeights(2 * weights[..., at]))
     return part.with_(noise=GivenWeights(weights[..., -own:] if last else weights[..., :own]))
 
 
