@@ -13,7 +13,8 @@ from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Record, rate_factor
 from freqid.fitting.black_box.lag_scan import likely_lags
 from freqid.fitting.black_box.late import in_step, whole_samples
-from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.black_box.reference import Reference, lines_in_plane
+from freqid.fitting.black_box.refinement import roughly
 from freqid.fitting.cost.box_distance import BoxDistance
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
@@ -24,7 +25,7 @@ from freqid.fitting.search.log_stage import Smooth, log_targets, told
 from freqid.fitting.search.stopping import Bound
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.lti import PeriodicHold
-from freqid.models import GreyBox
+from freqid.models import GreyBox, observed_order
 
 # lines on which many starts walk together: where responses bend, and evenly
 ROUND_LINES, _EVEN_LINES = 60, 120
@@ -32,6 +33,10 @@ ROUND_LINES, _EVEN_LINES = 60, 120
 _DELAYS = 20
 # samples around a likely one that are tried, too
 _NEAR = 3
+# candidates that each take a black box
+_MANY = 8
+# whole samples of delay of each input
+Shifts = tuple[int, ...]
 # the longest delay is such a part of a record, and so many samples
 _LONGEST, _LAGS = 8, 2000
 # lines that each of several black boxes takes at least
@@ -139,7 +144,7 @@ def beside_of(
     if isinstance(structure, PlacedStructure):
         return BesidePlaces.of(structure, readings, lines)
     model, tried = structure.at(structure.start), []
-    for shifts in _candidates(structure, model, readings):
+    for shifts in _likeliest(model, _candidates(structure, model, readings), readings, lines):
         try:
             seen = [in_step(r, shifts) for r in readings]
             box = Reference.of(model, seen, lines)
@@ -154,9 +159,28 @@ def beside_of(
     return Beside(box, shifts, period)
 
 
+def _likeliest(
+    model: GreyBox, candidates: list[Shifts], readings: Sequence[Reading], lines: int
+) -> list[Shifts]:
+    """The first of the candidates, and those of which one start leaves least; of few all."""
+    if len(candidates) <= _MANY:
+        return candidates
+    left: list[tuple[float, Shifts]] = []
+    for shifts in candidates:
+        try:
+            experiments, _ = lines_in_plane([in_step(r, shifts) for r in readings], lines)
+            cost = roughly(experiments, observed_order(model), feedthrough=True)
+        except (InputError, np.linalg.LinAlgError):
+            continue
+        if cost is not None:
+            left.append((cost / sum(e.n_rows for e in experiments), shifts))
+    kept = {shifts for _, shifts in sorted(left)[:_MANY]} or set(candidates)
+    return [c for c in candidates if c in kept or c is candidates[0]]
+
+
 def _candidates(
     structure: GreyStructure, model: GreyBox, readings: Sequence[Reading]
-) -> list[tuple[int, ...]]:
+) -> list[Shifts]:
     """Whole samples of delay of each input: those of the start, and others where it is unknown."""
     own = whole_samples(model, readings[0])
     unknown = [s in structure.physical_names for s in model.delay_sources]

@@ -58,6 +58,17 @@ def first_model(
     return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
 
 
+def roughly(
+    experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
+) -> float | None:
+    """What the minimum below the likeliest poles alone leaves; None where there is none."""
+    if not all(e.single and e.one_to_one for e in experiments):
+        return None
+    lines = RationalLines(thinned_to(experiments, _LINES), feedthrough)
+    found = lines.minimum(next(iter(_begun(lines, order))))
+    return None if found is None else found.cost
+
+
 def exchanged_model(
     experiments: Sequence[SpectralExperiment], poles: ComplexArray, feedthrough: bool
 ) -> StateSpace | None:
