@@ -6,6 +6,7 @@ import os
 import random
 import subprocess
 import sys
+import time
 import warnings
 import zipfile
 
@@ -121,6 +122,26 @@ def test_no_byte_of_a_mat_file_ends_the_interpreter(tmp_path, options):
     )  # fmt: skip
     assert run.returncode == 0, (run.returncode, run.stderr[-500:])
     assert run.stdout.endswith("done\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ((0, 0, 6_000_000, 0, 2), b"u\0"),
+        ((0, 3, 2, 1, 2), b"u\0"),
+        ((0, 1, 1, 0, 2_000_000_000), b"u"),
+        ((60, 1, 1, 0, 2), b"u\0"),
+    ],
+)
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_an_old_mat_file_takes_no_more_than_it_holds(tmp_path, words, name, order):
+    """Found by inputs that coverage guided: 25 bytes took nine seconds and a gigabyte."""
+    path = tmp_path / "a.mat"
+    path.write_bytes(np.array(words, order + "i4").tobytes() + name + b"\0" * 40)
+    begin = time.perf_counter()
+    with pytest.raises(InputError, match=r"a\.mat.*byte 0"):
+        fq.read(path)
+    assert time.perf_counter() - begin < 1
 
 
 def test_what_scipy_writes_has_the_structure_that_is_checked(tmp_path):
