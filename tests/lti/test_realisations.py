@@ -18,7 +18,7 @@ OMEGA = 2 * np.pi * np.linspace(0.5, 45, 40)
 def chain(a, b, c):
     """Two inputs, two outputs; three lags in a row, defective where their rates are equal."""
     A = [[-a, 0, 0], [a, -b, 0], [0, b, -c]]
-    return A, [[1, 0], [0, 2], [0, 0]], [[0, 0, 1], [1, 0, 0]], [[0, 0], [0.3 * a / c, 0]]
+    return A, [[1, 0], [0, 2], [0, 0]], [[0, 0, 1], [1, 0.1 * b / c, 0]], [[0, 0], [0.3 * a / c, 0]]
 
 
 RATES = {"eigenvalues": {"a": 5.0, "b": 20.0, "c": 60.0}, "blocks": dict.fromkeys("abc", 20.0)}
