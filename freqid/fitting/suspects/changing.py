@@ -15,6 +15,8 @@ from freqid.models import GreyBox, Model
 
 # values of all states by all unknowns from which a record is too long to be simulated
 _MOST = 2e7
+# times its time constant after which a motion that grows is all that there is
+_GROWN = 10.0
 
 
 @suspect("unsteady")
@@ -51,6 +53,8 @@ def _simulated(scene: Scene, model: Model, s: Seen) -> FloatArray | None:
     if not isinstance(model, GreyBox) or model.late or held or s.record is None:
         return None
     if len(scene.x) * len(model.state_space().A) * len(s.record.u) > _MOST:
+        return None
+    if float(model.poles.real.max(initial=0.0)) * s.record.n_samples * s.record.dt > _GROWN:
         return None
     reading = s.reading.with_(domain="time", noise=BiasIntegral(), initial_state="estimate")
     try:

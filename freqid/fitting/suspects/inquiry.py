@@ -23,6 +23,7 @@ from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LIKELY, evidence, ordered
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.register import SUSPECTS, Columns
+from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, of_several, score
 from freqid.fitting.suspects.sentences import sentence, words
@@ -45,6 +46,8 @@ _WORTH, _SAID = 0.5, 3
 _SURE = 1e-6
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
+# standard errors by which a value is not physical for certain
+_CERTAIN = 2.0
 # part of the output left that means trouble
 _MOST_LEFT = 0.3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
@@ -168,7 +171,10 @@ class Inquiry:
             return unheard(self.minimum, self.model, self.readings)
         if found := silent(scene) or leaking(scene, self.model, self._std):
             return found
-        turn = turned(self.minimum, self.model, self.readings) if self._in_trouble(scene) else []
+        if found := begun_in_motion(self.minimum, scene, self.readings):
+            return found
+        trouble = self._unphysical or (bool(self.named) and scene.cost > _MOST_LEFT * scene.energy)
+        turn = turned(self, self._unphysical) if trouble else []
         if turn:
             return turn
         if not named:
@@ -198,12 +204,18 @@ class Inquiry:
             Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number) for f in found
         ]
 
-    def _in_trouble(self, scene: Scene) -> bool:
-        """Whether values make no sense, or most of the output is left."""
-        unphysical = isinstance(self.model, GreyBox) and any(
-            not p.physical[0] <= p.value <= p.physical[1] for p in self.model.free_parameters
+    @cached_property
+    def _unphysical(self) -> bool:
+        """Whether a value is not physical by more than two standard errors."""
+        structure = self.minimum.structure
+        if not isinstance(self.model, GreyBox):
+            return False
+        scale = np.abs(getattr(structure, "scale", np.ones(len(self._std))))
+        std = np.nan_to_num(self._std * scale, posinf=0.0)
+        return any(
+            not p.physical[0] - _CERTAIN * s <= p.value <= p.physical[1] + _CERTAIN * s
+            for p, s in zip(self.model.free_parameters, std, strict=False)
         )
-        return unphysical or (bool(self.named) and scene.cost > _MOST_LEFT * scene.energy)
 
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""

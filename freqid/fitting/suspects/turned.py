@@ -6,7 +6,6 @@ Only asked where a fit is in trouble: the same plant is fitted to the data turne
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +16,9 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
+from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.models import GreyBox, Model
+from freqid.models import GreyBox
 
 # what is left has to fall to this part for a turn to be believed
 _BETTER = 0.5
@@ -26,8 +26,9 @@ _BETTER = 0.5
 _STARTS = 3
 
 
-def turned(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[Finding]:
+def turned(inquiry: Asking, unphysical: bool) -> list[Finding]:
     """A finding where the plant explains the data turned back, and them alone, with sense."""
+    minimum, model, readings = inquiry.minimum, inquiry.model, inquiry.readings
     structure = minimum.structure
     if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
         return []
@@ -48,8 +49,7 @@ def turned(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[
             continue
         left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
         sane = not any(w.kind == "not physical" for w in est.signs)
-        own = any(not low <= v <= high for (low, high), v in _ranges(model))
-        if sane and (left < _BETTER * share or (own and left < 1.1 * share)):
+        if sane and (left < _BETTER * share or (unphysical and left < 1.1 * share)):
             return [
                 Finding(
                     kind,
@@ -65,10 +65,6 @@ def _begun(minimum: Minimum) -> np.ndarray:
     structure = minimum.structure
     assert isinstance(structure, GreyStructure)
     return structure.values[: structure.count]
-
-
-def _ranges(model: GreyBox) -> list[tuple[tuple[float, float], float]]:
-    return [(p.physical, p.value) for p in model.free_parameters]
 
 
 def _negated(r: Reading) -> Reading:
