@@ -65,6 +65,7 @@ def open(
         raise InputError(f"dt=None and {found.origin} says no sample time; give dt in s")
     u_names, y_names = _chosen(found.names, inputs, outputs)
     pick = [found.names.index(n) for n in (*u_names, *y_names)]
+    whole_rows = pick == list(range(len(found.names)))
 
     def blocks() -> Iterator[FloatArray]:
         for rows in found.blocks():
@@ -74,7 +75,8 @@ def open(
                 # told by whoever reads it, with the place
                 yield wide
                 continue
-            yield np.asarray(wide[:, pick], dtype=float) * scale
+            picked = wide if whole_rows else wide[:, pick]
+            yield picked if scale == 1 else np.asarray(picked, dtype=float) * scale
 
     said = found.hold if hold is None else hold
     held = as_holds(said, step, ZeroOrderHold(step), tuple(u_names))

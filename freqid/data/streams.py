@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, whole
+from freqid.checks import Array, FloatArray, InputError, whole
 from freqid.data.record import Record
 from freqid.lti import Hold
 
@@ -58,65 +58,72 @@ class Stream:
     ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
         """Whole segments of ``length`` every ``step`` samples, several at a time.
 
-        Yields their number, inputs (n, inputs) and outputs (n, outputs); segments run across the
-        borders of blocks. Raises ValueError, saying where, for a block of another width or one that
-        holds NaN.
+        Yields their number, inputs (n, inputs) and outputs (n, outputs), views that the next ones
+        overwrite; segments run across the borders of blocks. Raises ValueError, saying where, for a
+        block of another width or one that holds NaN.
         """
         per = max(size // step, 1)
         want = (per - 1) * step + length
-        kept: list[FloatArray] = []
-        have = at = 0
+        m, have, at = self.n_inputs, 0, 0
+        # channel by channel, as they are transformed, and the same memory for all
+        held = np.empty((m + self.n_outputs, want))
         for block in self._checked():
-            kept.append(block)
-            have += len(block)
-            while have >= want:
-                rows = np.concatenate(kept) if len(kept) > 1 else kept[0]
-                yield per, rows[:want, : self.n_inputs], rows[:want, self.n_inputs :]
-                kept, have = [rows[per * step :]], have - per * step
-                at += per * step
-        rows = np.concatenate(kept) if kept else np.zeros((0, self.n_inputs + self.n_outputs))
-        left = (len(rows) - length) // step + 1 if len(rows) >= length else 0
+            taken = 0
+            while taken < len(block):
+                some = block[taken : taken + want - have]
+                held[:, have : have + len(some)] = some.T
+                have, taken = have + len(some), taken + len(some)
+                if have == want:
+                    yield per, held[:m].T, held[m:].T
+                    at, have = at + per * step, want - per * step
+                    held[:, :have] = held[:, want - have :].copy()
+        left = (have - length) // step + 1 if have >= length else 0
         if left:
             end = (left - 1) * step + length
-            yield left, rows[:end, : self.n_inputs], rows[:end, self.n_inputs :]
+            yield left, held[:m, :end].T, held[m:, :end].T
         elif at == 0:
             raise InputError(
-                f"segment={length} is longer than {self.origin}, which ended after {len(rows)} "
-                "samples"
+                f"segment={length} is longer than {self.origin}, which ended after {have} samples"
             )
 
     def stretches(self, length: int) -> Iterator[tuple[FloatArray, FloatArray]]:
         """Inputs (n, inputs) and outputs (n, outputs), ``length`` samples after ``length``; the
         last may be shorter.
         """
-        kept: list[FloatArray] = []
+        kept: list[Array] = []
         have = 0
         for block in self._checked():
             kept.append(block)
             have += len(block)
             while have >= length:
-                rows = np.concatenate(kept)
+                rows = np.concatenate(kept).astype(float, copy=False)
                 yield rows[:length, : self.n_inputs], rows[:length, self.n_inputs :]
                 kept, have = [rows[length:]], have - length
-        rows = np.concatenate(kept) if kept else np.zeros((0, 0))
+        rows = np.concatenate(kept).astype(float, copy=False) if kept else np.zeros((0, 0))
         if len(rows):
             yield rows[:, : self.n_inputs], rows[:, self.n_inputs :]
 
-    def _checked(self) -> Iterator[FloatArray]:
+    def _checked(self) -> Iterator[Array]:
         width, at = self.n_inputs + self.n_outputs, 0
         for block in self.blocks():
-            rows = np.asarray(block, dtype=float)
+            rows = np.asarray(block)
             rows = rows[:, None] if rows.ndim == 1 else rows
+            # what is narrower is widened by whoever copies it
+            rows = rows if rows.dtype.kind in "fiu" else np.asarray(rows, dtype=float)
             if rows.ndim != 2 or rows.shape[1] != width:
                 raise InputError(
                     f"{self.origin}: the block at sample {at} has shape {rows.shape}; expected "
                     f"(n, {width})"
                 )
-            bad = ~np.isfinite(rows).all(axis=1)
-            if bad.any():
-                raise InputError(
-                    f"{self.origin}: sample {at + int(np.argmax(bad))} is NaN or infinite"
-                )
+            # a sum shows at once what is not finite; one that is only large is looked at again
+            with np.errstate(all="ignore"):
+                total = rows.sum()
+            if not np.isfinite(total):
+                bad = ~np.isfinite(rows).all(axis=1)
+                if bad.any():
+                    raise InputError(
+                        f"{self.origin}: sample {at + int(np.argmax(bad))} is NaN or infinite"
+                    )
             at += len(rows)
             yield rows
 
@@ -124,14 +131,14 @@ class Stream:
         """The samples, or the first ``stop`` of them (a number), as a Record in memory."""
         if stop is not None:
             stop = whole("stop", stop)
-        rows: list[FloatArray] = []
+        rows: list[Array] = []
         have = 0
         for block in self._checked():
             rows.append(block)
             have += len(block)
             if stop is not None and have >= stop:
                 break
-        every = np.concatenate(rows)[:stop]
+        every = np.concatenate(rows)[:stop].astype(float, copy=False)
         return Record(
             _flat(every[:, : self.n_inputs]), _flat(every[:, self.n_inputs :]), self.dt, self.hold,
             input_names=self.input_names, output_names=self.output_names,

@@ -13,8 +13,9 @@ from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Record, rate_factor
 from freqid.fitting.black_box.lag_scan import likely_lags
 from freqid.fitting.black_box.late import in_step, whole_samples
-from freqid.fitting.black_box.reference import Reference, lines_in_plane
+from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.black_box.refinement import roughly
+from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.cost.box_distance import BoxDistance
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure

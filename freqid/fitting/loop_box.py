@@ -14,8 +14,8 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import Record
-from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import nested_model
+from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import thinned_to
 from freqid.fitting.cost.objective import Objective

@@ -84,11 +84,17 @@ class Averaging:
         }
         count = next(iter(views.values())).shape[1]
         batch = max(_NEAR // length, 1)
+        # new memory for each batch takes as long as what is written into it
+        near = {name: np.empty((len(x), min(batch, count), length)) for name, x in channels.items()}
         for at in range(0, count, batch):
-            yield {
-                name: scipy.fft.rfft(self._level(view[:, at : at + batch]) * window)
-                for name, view in views.items()
-            }
+            found = {}
+            for name, view in views.items():
+                some = view[:, at : at + batch]
+                out = near[name][:, : some.shape[1]]
+                self._level(some, out)
+                out *= window
+                found[name] = scipy.fft.rfft(out)
+            yield found
 
     def density(self, length: int, dt: float) -> tuple[FloatArray, FloatArray]:
         """Frequencies (Hz), and what makes |X|² a density of one side, in units squared per Hz."""
@@ -97,14 +103,16 @@ class Averaging:
         scale[[0, *([-1] if length % 2 == 0 else [])]] /= 2
         return f, scale
 
-    def _level(self, segments: FloatArray) -> FloatArray:
+    def _level(self, segments: FloatArray, out: FloatArray) -> None:
+        """The segments without their trend, into ``out``."""
         if self.detrend is False:
-            return segments
-        if callable(self.detrend):
-            return np.asarray(self.detrend(segments))
-        if self.detrend == "constant":
-            return np.asarray(segments - segments.mean(axis=-1, keepdims=True))
-        return np.asarray(scipy.signal.detrend(segments, type=self.detrend))
+            out[:] = segments
+        elif callable(self.detrend):
+            out[:] = self.detrend(segments)
+        elif self.detrend == "constant":
+            np.subtract(segments, segments.mean(axis=-1, keepdims=True), out=out)
+        else:
+            out[:] = scipy.signal.detrend(segments, type=self.detrend)
 
 
 def pieces(
@@ -133,8 +141,9 @@ def products(a: ComplexArray, b: ComplexArray) -> ComplexArray:
             if a is b and j < i:
                 found[:, i, j] = found[:, j, i].conj()
             elif a is b and j == i:
-                found[:, i, j] = np.einsum("sk,sk->k", x.real, x.real)
-                found[:, i, j] += np.einsum("sk,sk->k", x.imag, x.imag)
+                parts = np.ascontiguousarray(x).view(float)
+                power = np.einsum("sk,sk->k", parts, parts)
+                found[:, i, j] = power[::2] + power[1::2]
             else:
                 found[:, i, j] = np.einsum("sk,sk->k", x, y.conj())
     return found

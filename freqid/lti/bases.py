@@ -66,12 +66,13 @@ def basis_of(at: StateSpace, derivative: StateSpace | None = None) -> Basis:
 def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> EigenBasis:
     """A batch of plants (S, …) in their eigenvectors; not finite where those are badly conditioned.
 
-    The states are balanced as those of the first plant are, which the others resemble.
+    The states are balanced as those of the first finite plant are, which the others resemble.
     """
     if derivative is None:
         derivative = at.still()
-    scale = _state_scale(StateSpace(*(M[0] for M in at)))
-    finite = np.asarray(np.isfinite(at.A).all(axis=(1, 2)))
+    finite = np.asarray(np.all([np.isfinite(M).all(axis=(1, 2)) for M in at], axis=0))
+    first = int(np.argmax(finite))
+    scale = _state_scale(StateSpace(*(np.nan_to_num(M[first]) for M in at)))
     A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1])) * scale / scale[:, None]
     eigenvalues, V = np.linalg.eig(A)
     V = V.astype(complex, copy=False)

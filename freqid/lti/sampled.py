@@ -121,7 +121,7 @@ class SampledPlant:
         if x.shape[-1] > BLOCK and aliases == 1:
             return self._in_blocks(z, w, x, U, direct, moving)
         # with many inputs dΓ u is formed first, which takes fewer products than w and u together
-        push = self._push(z, U) if U is not None and len(U) > 2 else None
+        push = self._push(z, U) if U is not None and U.shape[-3] > 2 else None
         outputs = []
         for o in range(w.shape[-3]):
             terms = self._terms(o, z, w[..., o, :, :], x, None if push is not None else U)
@@ -152,11 +152,14 @@ class SampledPlant:
 
     def _push(self, z: ComplexArray, U: ComplexArray) -> ComplexArray:
         """dΓ U + dΓ⁺ z U for each parameter, (…, P, n, channels, lines)."""
-        push = _times(self.dgamma, U)
+        # a batch has an axis for the parameters between its own and the inputs'
+        push = _times(self.dgamma, U if U.ndim == 3 else U[..., None, :, :, :])
         if self.dgamma_next is None:
             return push
         following = z[..., None, None, :] * U
-        return push + _times(self.dgamma_next, following[:, None] if z.ndim > 1 else following)
+        if following.ndim > 3:
+            following = following[..., None, :, :, :]
+        return push + _times(self.dgamma_next, following)
 
     def _in_blocks(
         self,

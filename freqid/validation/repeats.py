@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import InputError, an, listed, whole
+from freqid.checks import FloatArray, InputError, an, listed, whole
 from freqid.data import Record
 from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
 from freqid.models import GreyBox
@@ -135,10 +135,14 @@ def bootstrap(
     if "start" not in options and hasattr(whole_fit.model, "values"):
         free = [p.name for p in whole_fit.model.free_parameters]
         options = {**options, "start": Near({k: whole_fit[k] for k in free}), "n_starts": 1}
+    # few repeats have few resamples: of four there are 35, in whatever order they were drawn
+    known: dict[tuple[int, ...], FloatArray] = {}
     rows = []
     for _ in range(count):
-        drawn = [sets[i] for i in rng.integers(0, len(sets), len(sets))]
-        est = fit(model, drawn, **options)
-        uninterrupted(est.message)
-        rows.append(est.values)
+        drawn = tuple(sorted(rng.integers(0, len(sets), len(sets)).tolist()))
+        if drawn not in known:
+            est = fit(model, [sets[i] for i in drawn], **options)
+            uninterrupted(est.message)
+            known[drawn] = est.values
+        rows.append(known[drawn])
     return pd.DataFrame(rows, columns=list(whole_fit.names))

@@ -6,8 +6,9 @@ import pytest
 import freqid as fq
 from freqid.fitting.black_box.exchange import exchanged
 from freqid.fitting.black_box.rational_lines import RationalLines
-from freqid.fitting.black_box.reference import Reference, lines_in_plane
+from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.black_box.refinement import fewer_poles
+from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.cost.box_distance import BoxDistance
 from freqid.fitting.reading import Reading
 from freqid.lti import ZeroOrderHold

@@ -37,13 +37,14 @@ def test_a_row_is_the_fit(tmp_path):
     ]  # fmt: skip
     one = fq.fit(LAG, records[3], band=(0.5, 40))
     row = table.iloc[3]
-    assert row["a"] == one["a"]
-    assert row["a_std"] == one.parameters["std"]["a"]
+    # records of one shape are done together, and come to the same minimum another way
+    assert row["a"] == pytest.approx(one["a"], rel=1e-9)
+    assert row["a_std"] == pytest.approx(one.parameters["std"]["a"], rel=1e-6)
     assert row["verdict"] == one.verdict.grade
     assert (table["error"] == "").all()
     quick = fq.fit_many(LAG, records, band=(0.5, 40), verdicts=False)
     assert "verdict" not in quick
-    assert quick["a"].tolist() == table["a"].tolist()
+    assert quick["a"].tolist() == pytest.approx(table["a"].tolist(), rel=1e-7)
 
 
 def test_failures_are_rows(tmp_path):
@@ -101,20 +102,20 @@ def test_an_interrupted_job_goes_on(tmp_path, monkeypatch):
 
     records, path = runs(12, samples=100), tmp_path / "t.parquet"
     whole = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
-    real, calls = fleet._row, []
+    real, calls = fleet._fitted, []
 
-    def interrupted(task, name, source):
+    def interrupted(task, name, *data):
         calls.append(name)
         if len(calls) == 7:
             raise KeyboardInterrupt
-        return real(task, name, source)
+        return real(task, name, *data)
 
-    monkeypatch.setattr(fleet, "_row", interrupted)
+    monkeypatch.setattr(fleet, "_fitted", interrupted)
     with pytest.raises(KeyboardInterrupt):
         fq.fit_many(LAG, records, path, n_jobs=1, verdicts=False, chunk=2)
     assert not path.exists()
     again = []
-    monkeypatch.setattr(fleet, "_row", lambda *a: again.append(a[1]) or real(*a))
+    monkeypatch.setattr(fleet, "_fitted", lambda *a: again.append(a[1]) or real(*a))
     same(whole, fq.fit_many(LAG, records, path, n_jobs=1, verdicts=False, chunk=2))
     # three chunks of two had been finished
     assert len(again) == 6

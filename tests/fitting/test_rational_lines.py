@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import freqid as fq
-from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.reading import Reading
 from freqid.lti.polynomials import PolynomialBasis as Basis
 

@@ -20,7 +20,7 @@ _ROUNDS, _TRIED, _GAIN = 4, 4, 1e-4
 # places of narrow modes, half as wide as so many lines, and of wide ones at so many radii
 _NARROW, _LINES_WIDE, _WIDE, _RADII = 160, 2.0, 24, (0.6, 0.9, 0.97)
 # steps of a descent on trial
-_STEPS = 12
+TRIAL_STEPS = 12
 # poles that are closer than this part of their distance from the circle are one
 _NEAR = 0.5
 # real poles that are tried
@@ -35,12 +35,12 @@ def exchanged(lines: RationalLines, best: Fitted, fewer: Fewer) -> Fitted:
     order, first = len(best.poles), best
     for _ in range(_ROUNDS):
         before = best.cost
-        for added in _asked_for(lines, best):
-            larger = lines.below(np.append(best.poles, added), _STEPS)
+        for added in asked_for(lines, best):
+            larger = lines.below(np.append(best.poles, added), TRIAL_STEPS)
             if larger is None:
                 continue
             poles = fewer(lines, larger.poles, order)
-            found = None if _same(poles, best.poles) else lines.below(poles, _STEPS)
+            found = None if _same(poles, best.poles) else lines.below(poles, TRIAL_STEPS)
             if found is not None and found.cost < best.cost and len(found.poles) == order:
                 best = found
         if best.cost > before * (1 - _GAIN):
@@ -57,7 +57,7 @@ def _same(poles: ComplexArray, others: ComplexArray) -> bool:
 
 
 @np.errstate(all="ignore")
-def _asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
+def asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
     """The pairs, and the real pole, that explain most of what is left, one for each place."""
     left = lines.residual(best)
     pairs = _candidates(lines.w)

@@ -9,8 +9,8 @@ import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
-from freqid.fitting.black_box.reference import lines_in_plane
 from freqid.fitting.black_box.refinement import first_model, nested_model, scattered_model
+from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment

@@ -30,9 +30,10 @@ _SETTLED = 0.3
 FEW = 4
 # a cost of this part of the data's energy is next to their rounding
 _ROUNDING = 1e-16
-# Gauss-Newton steps at the most, and the part of the cost that the last one gains
+# Gauss-Newton steps at the most
 _DESCENTS = 60
-_GAIN = 1e-9
+# part of the cost that the last step of a descent gains unless another is asked for
+FOLLOWED = 1e-9
 # mirrored poles stay this far inside
 _MARGIN = 0.9999
 
@@ -53,12 +54,20 @@ class Fitted:
 
 
 class RationalLines:
-    """The lines of all experiments in a row, and the rational model's columns on them."""
+    """The lines of all experiments in a row, and the rational model's columns on them.
+
+    A descent ends with a step that gains the part ``gain`` of the cost.
+    """
 
     def __init__(
-        self, experiments: Sequence[SpectralExperiment], feedthrough: bool, stable: bool = False
+        self,
+        experiments: Sequence[SpectralExperiment],
+        feedthrough: bool,
+        stable: bool = False,
+        gain: float = FOLLOWED,
     ) -> None:
         self.experiments, self.feedthrough, self.stable = experiments, feedthrough, stable
+        self.gain = gain
         # with one channel the weights are in the data already
         self.w = np.concatenate([e.points.z for e in experiments])
         Y = np.concatenate([e.lines.Y[0, 0] for e in experiments])
@@ -174,7 +183,7 @@ class RationalLines:
                 gain = best.cost - cost
                 best = Fitted(basis, x, cost, straight)
                 R = _triangle([*columns, basis.Q[:n] * (-output * inverse)], error)
-                if damping and gain <= _GAIN * cost:
+                if damping and gain <= self.gain * cost:
                     break
                 damping = damping / 10 if damping > 1e-6 else 0.0
             elif not len(R) or best.cost <= self.rounding:
@@ -189,7 +198,7 @@ class RationalLines:
                 x = best.x + _least(R, damping)
             if self.stable and not _inside(basis, x):
                 break
-            if not damping and cost - R[-1, -1] ** 2 <= _GAIN * cost:
+            if not damping and cost - R[-1, -1] ** 2 <= self.gain * cost:
                 return Fitted(basis, x, R[-1, -1] ** 2, straight)
         return best
 

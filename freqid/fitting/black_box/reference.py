@@ -15,45 +15,23 @@ import numpy as np
 import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.fitting.black_box.refinement import exchanged_model, first_model
-from freqid.fitting.black_box.subspace import plane_for
+from freqid.fitting.black_box.refinement import exchanged_model, first_model, with_a_pair
+from freqid.fitting.black_box.sampled_lines import SampledLines
 from freqid.fitting.cost.box_distance import Surroundings
 from freqid.fitting.cost.charts import Chart, to_plane
-from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
-from freqid.lti import Hold, PeriodicHold, Plane, StateSpace, observed, reduced
+from freqid.lti import Hold, PeriodicHold, StateSpace, observed, reduced
 from freqid.models import DiscreteModel, GreyBox, Model, late_sampled, observed_order
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
+# part of a line's noise that is no gain
+_CHANCE = 0.05
 # a cost that is less by this part is that of another minimum
 _DEEPER = 1e-4
-
-
-def lines_in_plane(
-    readings: Sequence[Reading], count: int | None = None
-) -> tuple[list[SpectralExperiment], Plane]:
-    """The lines of a sampled model, in the plane over which the first one's spread.
-
-    ``count`` is about how many of them are taken; None for all. Raises InputError for data that no
-    one sampled model can stand for.
-    """
-    periods = [r.sample_time for r in readings]
-    kinds = {type(r.hold).__name__ for r in readings}
-    if len(kinds) > 1 or max(periods) > min(periods) * (1 + 1e-9):
-        raise InputError(
-            f"data are held in several ways ({', '.join(sorted(kinds))}, "
-            f"{min(periods):g} to {max(periods):g} s): no one sampled model stands for all; fit "
-            "a TransferFunction or a GreyBox"
-        )
-    experiments = [r.at_lines().lines(Plane()) for r in readings]
-    if count is not None:
-        experiments = list(thinned_to(experiments, count))
-    first = experiments[0]
-    plane = plane_for(first.points.z[first.lines.strongest()])
-    return [e.in_plane(plane) for e in experiments], plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,24 +58,45 @@ class Reference:
 
         Raises InputError where no black box of the order stands beside the model, saying why.
         """
-        bilinear = all(r.unheld for r in readings)
-        if bilinear:
-            if model.delay_sources:
-                raise InputError("no black box of the plant's own order has its delay")
-            dt = _middle_period(readings)
-            readings = [r.at_lines().on_circle(dt) for r in readings]
-        else:
-            dt = _common_period(readings)
-        lines, plane = lines_in_plane(readings, count)
-        # what is left of a delay within a sample lets the input through, too
-        direct = bilinear or bool(model.state_space().D.any() or model.delay_sources)
-        direct = direct or readings[0].hold.reaches_next
+        seen = SampledLines.of(model, readings, count)
         order = observed_order(model) if order is None else order
         try:
-            chart = Chart(first_model(lines, order, direct), direct, plane, dt)
-            return cls._descended(Objective(chart, lines), bilinear)
+            centre = first_model(seen.lines, order, seen.direct)
+            return cls._descended(seen.objective(centre), seen.bilinear)
         except np.linalg.LinAlgError as error:
             raise InputError(f"the black box of order {order} has no start: {error}") from None
+
+    @classmethod
+    def larger(
+        cls,
+        model: GreyBox,
+        readings: Sequence[Reading],
+        count: int,
+        mode: complex | None,
+        worth: float,
+    ) -> tuple[Reference | None, float]:
+        """One with a mode more than the model, begun from it with this ``mode`` (a pole in z) and
+        from the data alone, and about what it leaves of some lines, ``count`` at the most.
+
+        None where a short way shows that this is more than ``worth``. Raises InputError as ``of``
+        does, and where there are several channels.
+        """
+        seen = SampledLines.of(model, readings, count)
+        if seen.bilinear or not all(e.single and e.one_to_one for e in seen.lines):
+            raise InputError("several channels, or lines without a hold, have no rational function")
+        pair = [] if mode is None else [seen.plane.points(np.array([mode, np.conj(mode)]))]
+        # what is not seen of the plant is not seen of its samples
+        W, X = observed(model.state_space(), observed_order(model))
+        own = to_plane(reduced(_held(model, readings[0].hold), W, X), seen.plane)
+        poles = np.linalg.eigvals(own.A).astype(complex)
+        gain = _CHANCE / sum(e.n_rows for e in seen.lines)
+        try:
+            centre, left = with_a_pair(seen.lines, poles, pair, seen.direct, gain, worth)
+            if centre is None:
+                return None, left
+            return cls._descended(seen.objective(centre), seen.bilinear), left
+        except np.linalg.LinAlgError as error:
+            raise InputError(f"no black box with a mode more has a start: {error}") from None
 
     @classmethod
     def _descended(cls, objective: Objective, bilinear: bool) -> Reference:
@@ -241,23 +240,3 @@ def _bilinear(model: GreyBox, dt: float) -> StateSpace:
     return StateSpace(
         inverse @ (eye + A * dt / 2), inverse @ B * dt, C @ inverse, D + C @ inverse @ B * dt / 2
     )
-
-
-def _middle_period(readings: Sequence[Reading]) -> float:
-    """The period in s whose bilinear map takes the middle of the lines to a quarter turn."""
-    omega = np.concatenate(
-        [np.abs(r.at_lines().lines().lines.omega) for r in readings]
-    )  # lines that the band leaves
-    omega = omega[omega > 0]
-    if not len(omega):
-        raise InputError("a response at zero frequency alone has no black box")
-    return float(2 / np.sqrt(omega.min() * omega.max()))
-
-
-def _common_period(readings: Sequence[Reading]) -> float:
-    """The period in s at which one sampled model can stand for all readings."""
-    if any(not isinstance(r.hold, PeriodicHold) for r in readings):
-        raise InputError("an input without a hold has no sampled model of the plant's own order")
-    if any(r.skip_zero != readings[0].skip_zero for r in readings):
-        raise InputError("the data are read at different lines")
-    return readings[0].sample_time

@@ -14,9 +14,10 @@ from itertools import chain
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.fitting.black_box.exchange import exchanged
+from freqid.fitting.black_box.exchange import TRIAL_STEPS, asked_for, exchanged
 from freqid.fitting.black_box.rational_lines import (
     FEW,
+    FOLLOWED,
     Fitted,
     RationalLines,
     mirrored,
@@ -40,20 +41,24 @@ _REAL_PLACES = (-0.95, -0.7, -0.3, 0.05, 0.3, 0.7, 0.9, 0.98)
 
 
 def first_model(
-    experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
+    experiments: Sequence[SpectralExperiment],
+    order: int,
+    feedthrough: bool,
+    gain: float = FOLLOWED,
 ) -> StateSpace:
     """Φ̃, Γ, C, D in the experiments' plane; with one input and output next to the minimum.
 
-    Raises ValueError where the lines are too few.
+    A descent ends with a step that gains the part ``gain`` of the cost. Raises ValueError where the
+    lines are too few.
     """
     if not all(e.single and e.one_to_one for e in experiments):
         return identify(experiments, order, feedthrough)
     # of very many lines a part will do: its minimum is next to that of all
     few = thinned_to(experiments, _LINES)
-    lines = RationalLines(few, feedthrough)
+    lines = RationalLines(few, feedthrough, gain=gain)
     best = best_of(lines, _begun(lines, order))
     if best is not None and few is not experiments:
-        lines = RationalLines(experiments, feedthrough)
+        lines = RationalLines(experiments, feedthrough, gain=gain)
         best = lines.minimum(best.poles)
     return identify(experiments, order, feedthrough) if best is None else lines.state_space(best)
 
@@ -81,6 +86,35 @@ def exchanged_model(
         return None
     after = exchanged(lines, before, fewer_poles)
     return None if after is before else lines.state_space(after)
+
+
+def with_a_pair(
+    experiments: Sequence[SpectralExperiment],
+    poles: ComplexArray,
+    pairs: Sequence[ComplexArray],
+    feedthrough: bool,
+    gain: float,
+    worth: float,
+) -> tuple[StateSpace | None, float]:
+    """A model with two poles more than these, and about what it leaves: the best of those begun
+    with each of the ``pairs``, with what the residual asks for, and from the data alone.
+
+    None where a short way shows that they do not come below a cost ``worth`` more of it. Raises
+    LinAlgError where the polynomials vanish.
+    """
+    lines = RationalLines(thinned_to(experiments, _LINES), feedthrough, gain=gain)
+    own, unit = lines.below(poles), lines.sizes[0] ** 2
+    if own is None:
+        raise np.linalg.LinAlgError("the poles stand for no model")
+    tried = [*pairs, *asked_for(lines, own)[:1]]
+    met = [lines.below(np.append(own.poles, pair), TRIAL_STEPS) for pair in tried]
+    best = min((f for f in met if f is not None), key=lambda f: f.cost, default=own)
+    if len(best.poles) == len(poles) or best.cost * unit > worth:
+        return None, best.cost * unit
+    best = lines.below(best.poles) or best
+    other = best_of(lines, _begun(lines, len(poles) + 2))
+    best = best if other is None or best.cost <= other.cost else other
+    return lines.state_space(best), best.cost * unit
 
 
 def best_of(

@@ -16,11 +16,12 @@ import numpy as np
 from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
 from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
-from freqid.fitting.fitters import fitter_of
+from freqid.fitting.fitters import Near, fitter_of
 from freqid.fitting.many.identity import at_conditions, fingerprint
 from freqid.fitting.many.progress import Bar
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
+from freqid.fitting.many.together import Done, minima
 from freqid.fitting.search.descent import uninterrupted
 from freqid.models import GreyBox
 
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 
-# records of a chunk, which is kept or lost as one, and from how many on processes are worth it
-_CHUNK, _FEW = 8, 16
+# records of a chunk, which is kept or lost as one, with verdicts and without, and from how many on
+# processes are worth it
+_CHUNK, _QUICK, _FEW = 8, 32, 16
 
 Source = DataSet | str | Path
 Row = dict[str, Any]
@@ -54,11 +56,13 @@ def fit_many(
     n_jobs: int | None = None,
     verdicts: bool = True,
     reading: Mapping[str, object] | None = None,
-    chunk: int = _CHUNK,
+    chunk: int | None = None,
     progress: bool | None = None,
     **fit_options: Any,
 ) -> pd.DataFrame:
-    """One model fitted to many records, one by one: a row each.
+    """One model fitted to many records: a row each.
+
+    Records of one shape are fitted together; those in which something is in doubt, one by one.
 
     Args:
         model: as in ``fit``.
@@ -71,7 +75,7 @@ def fit_many(
             ``parallel``.
         verdicts: False leaves out witness, warnings and verdict, which take longer than the fit.
         reading: arguments of ``read`` for paths, ``{"inputs": "torque"}``.
-        chunk: records that are kept, or lost, as one.
+        chunk: records that are kept, or lost, as one; None takes 8, or 32 without verdicts.
         progress: None shows a bar on a terminal, True also lines in a log, False nothing.
         fit_options: of ``fit``: band, hold, weights, start, …
 
@@ -92,7 +96,7 @@ def fit_many(
     if progress is not None:
         flag("progress", progress)
     path = None if path is None else path_of("path", path)
-    size = whole("chunk", chunk)
+    size = (_CHUNK if verdicts else _QUICK) if chunk is None else whole("chunk", chunk)
     named = _named(records)
     if not named:
         raise InputError("records=[] holds nothing to be fitted")
@@ -182,35 +186,74 @@ def _checked(what: str, function: Callable[..., object], options: Mapping[str, A
 
 
 def _rows(task: _Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
-    return [_row(task, name, source) for name, source in job]
-
-
-def _row(task: _Task, name: str, source: Source) -> Row:
-    """Everything of one fit; an error is a row, too."""
-    row: Row = {"name": name}
+    """A row each: those of one shape together as far as nothing is in doubt, the others alone."""
+    rows: list[Row] = []
+    taken: list[float] = []
+    records: list[DataSet | None] = []
+    for name, source in job:
+        begin = time.perf_counter()
+        row: Row = {"name": name}
+        try:
+            from_file = isinstance(source, (str, Path))
+            records.append(read(source, **task.reading) if from_file else source)  # type: ignore[arg-type]
+        except Exception as error:
+            row["error"] = _told(name, error)
+            records.append(None)
+        rows.append(row)
+        taken.append(time.perf_counter() - begin)
     begin = time.perf_counter()
+    found = minima(task.model, records, task.options)
+    together = sum(f is not None for f in found)
+    each = (time.perf_counter() - begin) / max(together, 1)
+    for row, data, done, reading in zip(rows, records, found, taken, strict=True):
+        begin = time.perf_counter()
+        if data is not None:
+            row |= _fitted(task, str(row["name"]), data, done)
+        row["seconds"] = reading + time.perf_counter() - begin + (each if done else 0.0)
+    return rows
+
+
+def _fitted(task: _Task, name: str, data: object, done: Done | None) -> Row:
+    """What is said of one record; an error is a row, too."""
+    if done is not None and not task.verdicts:
+        return _values(done.values, done.std, done.cost, done.fit_percent, True) | {"error": ""}
     try:
-        given = isinstance(source, (str, Path))
-        data = read(source, **task.reading) if given else source  # type: ignore[arg-type]
-        est = fit(task.model, data, **task.options)  # type: ignore[arg-type]
+        options = dict(task.options)
+        if done is not None:
+            options["start"] = Near(done.values)
+        est = fit(task.model, data, **options)  # type: ignore[arg-type]
         uninterrupted(est.message)
-        std = np.sqrt(np.diag(est.covariance_matrix))
-        row |= dict(zip(est.names, est.values.tolist(), strict=True))
-        row |= {f"{n}_std": s for n, s in zip(est.names, std.tolist(), strict=True)}
-        row |= {
-            "cost": float(est.cost), "fit_percent": float(est.fit_percent),
-            "converged": bool(est.converged),
-        }  # fmt: skip
+        std = np.sqrt(np.diag(est.covariance_matrix)).tolist()
+        values, errors = est.values.tolist(), dict(zip(est.names, std, strict=True))
+        row = _values(
+            dict(zip(est.names, values, strict=True)), errors, est.cost, est.fit_percent,
+            est.converged,
+        )  # fmt: skip
         if task.verdicts:
             row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
             row |= {"warnings": "; ".join(est.warnings)}
-        row["error"] = ""
+        return row | {"error": ""}
     except Exception as error:
         # one bad record, or a plant that fails there, must not take the other rows along
-        _LOG.info("%s: %s", name, error)
-        row["error"] = f"{type(error).__name__}: {error}"
-    row["seconds"] = time.perf_counter() - begin
-    return row
+        return {"error": _told(name, error)}
+
+
+def _values(
+    values: Mapping[str, float],
+    std: Mapping[str, float],
+    cost: float,
+    fit_percent: float,
+    converged: bool,
+) -> Row:
+    row: Row = {**values, **{f"{n}_std": s for n, s in std.items()}}
+    return row | {
+        "cost": float(cost), "fit_percent": float(fit_percent), "converged": bool(converged)
+    }  # fmt: skip
+
+
+def _told(name: str, error: Exception) -> str:
+    _LOG.info("%s: %s", name, error)
+    return f"{type(error).__name__}: {error}"
 
 
 def _columns(table: pd.DataFrame) -> list[str]:

@@ -29,6 +29,8 @@ _TOLD = 0.3
 _AGREEMENT, _DOUBTED = ((_CONVINCED, 1), (_RARE, 2)), 4
 # starts that agree without an exception where a black box explains more
 _ALIKE = 6
+# part of the starts that shows a cost with one minimum
+_UNANIMOUS = 0.8
 # costs that agree to this belong to one minimum
 _SAME = 1e-6
 
@@ -170,5 +172,7 @@ class StopRule:
         if not self.determined(found):
             # along what the data leave open no two starts need end alike
             wanted = 1 if both and level > _RARE else _DOUBTED
-        # a gap that is hardly chance is not believed before both kinds of starts were tried
-        return found.n_agreed >= wanted and (both or level > _RARE)
+        # a gap that is hardly chance is not believed before both kinds of starts were tried, unless
+        # nearly all of the first kind have ended alike
+        one = found.n_agreed >= max(_ALIKE, _UNANIMOUS * found.n_starts)
+        return found.n_agreed >= wanted and (both or one or level > _RARE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -11,8 +12,8 @@ import scipy
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Record
 from freqid.fitting.black_box.reference import Reference
-from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
+from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.noise_models import MeasuredNoise
@@ -34,6 +35,8 @@ _DISTANCES = (1.0, 4.0, 16.0)
 _PLACES, _REACH, _LEAST = 80, 16.0, 6
 # lines from which a black box begins: what they miss begins where the model is lacking
 _LINES = 3000
+# level of a gain that is worth a way to its end, and the part of it that a short way has to show
+_RARE, _PART = 1e-3, 0.6
 # part of a line's noise that is left at least
 _KEPT = 0.1
 
@@ -55,17 +58,19 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     grey = inquiry.minimum.solution
     model, group = structure.at(grey.x, 0), range(len(readings))
     weighted = weighted_by([model], [group], readings, every=not scene.even)
-    boxes = _boxes(inquiry.model, scene, weighted)
+    places = float(sum(s.experiment.n_lines for s in scene.seen))
+    # the mode's own initial state is free, too
+    started = 2 * sum(len(s.free) > 0 for s in scene.seen) - len(scene.absorbed)
+    lines = thinned_to([r.at_lines().lines() for r in weighted], _LINES)
+    some = Objective(structure, lines).point(grey.x)
+    boxes = _boxes(inquiry.model, scene, weighted, _Worth(some, started, scene.freedom, places))
     if not boxes:
         return []
     box = min(boxes, key=lambda b: b.cost)
-    # the mode's own initial state is free, too
-    started = 2 * sum(len(s.free) > 0 for s in scene.seen)
-    degrees = box.unknowns - len(scene.absorbed) + started
+    degrees = box.unknowns + started
     freedom = scene.freedom - degrees
     if freedom < 10 or degrees < 1:
         return []
-    places = float(sum(s.experiment.n_lines for s in scene.seen))
     if all(new is old for new, old in zip(weighted, readings, strict=True)):
         told = [(grey.cost / box.cost - 1, places if scene.even else places**2)]
     else:
@@ -121,12 +126,43 @@ def _weighed_again(
     return again
 
 
-def _boxes(model: GreyBox, scene: Scene, readings: Sequence[Reading]) -> list[Reference]:
-    """Black boxes in their minima: begun from the data, and from the model with a mode where that
-    explains most.
+@dataclass(frozen=True)
+class _Worth:
+    """What a black box has to leave of some lines to be worth following to its minimum.
+
+    ``grey`` is the model's own point on them; ``started`` are unknowns beside the box's own.
     """
+
+    grey: Point | None
+    started: int
+    freedom: int
+    places: float
+
+    def cost(self, unknowns: int) -> float:
+        """Of a box of so many unknowns: most of the gain that would be no chance."""
+        degrees = max(unknowns + self.started, 1)
+        freedom = max(self.freedom - degrees, 1)
+        f = scipy.stats.f.isf(_RARE / self.places, degrees, freedom)
+        cost = np.inf if self.grey is None else self.grey.cost
+        return float(cost / (1 + _PART * f * degrees / freedom))
+
+
+def _boxes(
+    model: GreyBox, scene: Scene, readings: Sequence[Reading], worth: _Worth
+) -> list[Reference]:
+    """Black boxes in their minima: begun from the data, and from the model with a mode where that
+    explains most; none where a short way shows no gain.
+    """
+    order, found = observed_order(model) + 2, []
+    mode = None
     try:
-        own = Reference.of(model, readings, _LINES, order=observed_order(model) + 2)
+        single = all(s.experiment.single and s.experiment.one_to_one for s in scene.seen)
+        if single and not all(r.unheld for r in readings):
+            mode = _lacking(scene, readings[0].sample_time)
+            pole = None if mode is None else complex(*mode.A[:, 0])
+            own, _ = Reference.larger(model, readings, _LINES, pole, worth.cost(2 * order))
+            return [] if own is None else [own.on(readings)]
+        own = Reference.of(model, readings, _LINES, order=order)
         found = [own.on(readings)]
     except (InputError, np.linalg.LinAlgError):
         return []
@@ -146,11 +182,14 @@ def _lacking(scene: Scene, dt: float) -> StateSpace | None:
     parts = np.split(scene.variance[: sum(len(s.left) for s in scene.seen)], ends)
     views = [_View(s, v, dt) for s, v in zip(scene.seen, parts, strict=True)]
     for distance in _DISTANCES:
-        for pole in max(views, key=lambda v: v.N).poles(distance):
-            told = [view.explained(pole) for view in views]
-            gain = sum(t[0] for t in told)
-            if gain > best:
-                best, found = gain, (pole, max(told, key=lambda t: t[0])[1])
+        poles = max(views, key=lambda v: v.N).poles(distance)
+        if not len(poles):
+            continue
+        told = [view.explained(poles, distance) for view in views]
+        gains = np.sum([each for each, _ in told], axis=0)
+        i = int(np.argmax(gains))
+        if gains[i] > best:
+            best, found = gains[i], (poles[i], max(told, key=lambda t: t[0][i])[1][i])
     if found is None:
         return None
     pole, residues = found
@@ -191,21 +230,27 @@ class _View:
         poles: ComplexArray = np.exp(-step + 1j * self.angle[inside])
         return poles
 
-    def explained(self, pole: complex) -> tuple[float, ComplexArray]:
-        """How much a mode with this pole explains, and its residues (outputs, inputs)."""
-        reach = max(_REACH * -np.log(abs(pole)), 2 * np.pi / self.N * _LEAST)
-        near = np.abs(self.angle - np.angle(pole)) < reach
-        z, U = self.z[near], self.U[:, near]
-        one, other = 1 / (z - pole), 1 / (z - np.conj(pole))
-        basis = np.concatenate([U * (one + other), 1j * U * (one - other)])
-        gain, residues = 0.0, np.zeros((len(self.lacking), len(U)), complex)
-        for o, (left, weight) in enumerate(zip(self.lacking, self.weight, strict=True)):
-            columns = np.ascontiguousarray(basis * weight[near]).view(float)
-            own = np.ascontiguousarray(left[near]).view(float)
-            gram = columns @ columns.T
-            told = columns @ own
-            x = np.linalg.lstsq(gram, told, rcond=1e-10)[0]
-            gain += float(x @ told)
-            real, imaginary = np.split(x, 2)
-            residues[o] = real + 1j * imaginary
-        return gain, residues
+    def explained(self, poles: ComplexArray, distance: float) -> tuple[FloatArray, ComplexArray]:
+        """How much a mode with each of these poles, so many half lines from the circle, explains
+        (S,), and its residues (S, outputs, inputs).
+        """
+        reach = np.pi / self.N * max(_REACH * distance, 2 * _LEAST)
+        at = np.angle(poles)
+        first, last = (np.searchsorted(self.angle, at + way * reach) for way in (-1, 1))
+        near = first[:, None] + np.arange(max(int((last - first).max()), 1))
+        inside = near < last[:, None]
+        near = np.minimum(near, len(self.angle) - 1)
+        z, U = self.z[near], self.U[:, near].swapaxes(0, 1)
+        one, other = (1 / (z - p[:, None]) for p in (poles, poles.conj()))
+        both, between = (one + other)[:, None], 1j * (one - other)[:, None]
+        basis = np.concatenate([U * both, U * between], axis=1)
+        gain, residues = np.zeros(len(poles)), []
+        for left, weight in zip(self.lacking, self.weight, strict=True):
+            columns = basis * (weight[near] * inside)[:, None]
+            gram = (columns @ columns.conj().swapaxes(1, 2)).real
+            told = (columns.conj() @ left[near][..., None])[..., 0].real
+            x = (np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ told[..., None])[..., 0]
+            gain += (x * told).sum(axis=1)
+            real, imaginary = np.split(x, 2, axis=1)
+            residues.append(real + 1j * imaginary)
+        return gain, np.stack(residues, axis=1)

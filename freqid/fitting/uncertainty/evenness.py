@@ -48,16 +48,23 @@ def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:
 def evenly_spread(error: ComplexArray) -> bool:
     """Whether the power of errors (channels, K) is spread evenly over the lines.
 
+    Each of several channels may be the odd one.
+    """
+    return bool((levels_of_evenness(error) >= _LEVEL / len(error)).all())
+
+
+def levels_of_evenness(error: ComplexArray) -> FloatArray:
+    """How often an even spectrum looks as uneven as that of errors (…, K), (…,).
+
     Bartlett's test of the cumulated periodogram (Priestley, Spectral Analysis and Time Series,
     1981, section 6.2.5).
     """
     power = np.abs(error) ** 2
-    K = power.shape[1]
-    total = power.sum(axis=1, keepdims=True)
-    share = np.cumsum(power, axis=1) / np.where(total > 0, total, 1)
-    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=1) * (total[:, 0] > 0)
-    p = scipy.stats.kstwobign.sf(np.sqrt(K) * gap)
-    return bool((p >= _LEVEL / len(power)).all())
+    K = power.shape[-1]
+    total = power.sum(axis=-1, keepdims=True)
+    share = np.cumsum(power, axis=-1) / np.where(total > 0, total, 1)
+    gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=-1) * (total[..., 0] > 0)
+    return np.asarray(scipy.stats.kstwobign.sf(np.sqrt(K) * gap))
 
 
 def may_be_tied(e: SpectralExperiment) -> bool:

@@ -19,7 +19,7 @@ _LINES = 4000
 # means for each unknown from which they tell their own noise
 _MEANS = 5
 # leverage that is believed at the most
-_MOST = 0.9
+MOST_LEVERAGE = 0.9
 
 
 @in_one_blas_thread
@@ -147,7 +147,7 @@ def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
     own = np.einsum("ak,ab,bk->k", J, half, J) + np.sum(Q**2, axis=0)
-    return np.repeat(np.minimum(own.reshape(-1, 2).mean(axis=1), _MOST), 2)
+    return np.repeat(np.minimum(own.reshape(-1, 2).mean(axis=1), MOST_LEVERAGE), 2)
 
 
 def _of_stamps(

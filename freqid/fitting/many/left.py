@@ -1,0 +1,137 @@
+"""What many minima leave of their records: error bars, and whether anything is in doubt."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from freqid.checks import Array, BoolArray, ComplexArray, FloatArray
+from freqid.fitting.cost.many_costs import ManyCosts, ManyPoints
+from freqid.fitting.uncertainty.evenness import levels_of_evenness
+from freqid.fitting.uncertainty.gradient_noise import MOST_LEVERAGE
+from freqid.fitting.uncertainty.noise_spectrum import smoothed_power
+from freqid.lti import PeriodicHold
+
+# level below which something else is there, and relative standard error of what is open
+_LEVEL, _OPEN = 0.01, 0.3
+# part of the data's energy that is down to rounding; part of the largest eigenvalue that is none
+_EXACT, _SILENT = 1e-15, 1e-12
+# a direction of which so little is its own is that of others
+_SAME = 1e-9
+
+
+class Left:
+    """What is left at minima ``x`` (S, P) of S records, on lines that may be a ``share``
+    of all; ``inverse`` is that of JᵀJ (S, P, P) on all.
+    """
+
+    @np.errstate(all="ignore")
+    def __init__(
+        self,
+        costs: ManyCosts,
+        x: FloatArray,
+        at: ManyPoints,
+        inverse: FloatArray,
+        share: float,
+    ) -> None:
+        self.costs, self.x, self.at, self.inverse, self.e = costs, x, at, inverse, costs.first
+        self.share = share
+        self.jacobian = at.without_transients()
+        # real values that neither parameters nor initial states have taken
+        self.rows = 2 * self.e.n_lines * costs.Y.shape[1]
+        self.freedom = max(self.rows - at.transient.shape[1] - x.shape[1], 1)
+
+    @cached_property
+    @np.errstate(all="ignore")
+    def std(self) -> FloatArray:
+        """Standard errors (S, P), whatever the noise's colour: as those of a single fit."""
+        J, T, S = self.jacobian, self.at.transient, len(self.x)
+        taken = _leverage(J, self.inverse) + _leverage(T, self.at.inverse)
+        taken = np.minimum(taken.reshape(S, -1, 2).mean(axis=-1), MOST_LEVERAGE)
+        power = smoothed_power(self._lines() / np.sqrt(1 - taken).reshape(S, -1, self.e.n_lines))
+        each = np.repeat(power.reshape(S, -1) / 2, 2, axis=-1)
+        score = (J * each[:, None]) @ J.swapaxes(-1, -2) * (self.rows / self.freedom * self.share)
+        return np.asarray(np.sqrt(np.einsum("spp->sp", self.inverse @ score @ self.inverse)))
+
+    @property
+    @np.errstate(all="ignore")
+    def certain(self) -> BoolArray:
+        """Of which records nothing is in doubt, (S,): every parameter is told and physical, and
+        what is left is white noise of which poles of their own would explain no more.
+        """
+        s = self.costs.structure
+        physical = np.array([p.physical for p in s.parameters]).T / s.scale
+        inside = (self.x > np.maximum(s.lower, physical[0])).all(axis=1)
+        inside &= (self.x < np.minimum(s.upper, physical[1])).all(axis=1)
+        told = (self.std <= _OPEN * np.abs(self.x)).all(axis=1)
+        noisy = self.at.cost > _EXACT * self.costs.energy
+        even = levels_of_evenness(self._lines()).min(axis=-1) >= _LEVEL
+        return np.asarray(inside & told & noisy & even & (self._level() >= _LEVEL))
+
+    def _lines(self) -> ComplexArray:
+        """Residuals (S, outputs, K)."""
+        return self.at.residual.view(complex).reshape(len(self.x), -1, self.e.n_lines)
+
+    def _level(self) -> FloatArray:
+        """How often noise alone lets poles of their own explain so much more, (S,).
+
+        What a rational function gains from here is what its derivatives by residues, poles and
+        feedthrough explain: 1/(z − φ), 1/(z − φ)² and 1.
+        """
+        s, hold = self.costs.structure, self.e.hold
+        assert isinstance(hold, PeriodicHold)
+        A = s.model.linearise_many(self.x * s.scale, s.physical_names).at.A
+        phi = np.exp(np.linalg.eigvals(A) * hold.period)[..., None]
+        z = self.e.points.z
+        one, other = 1 / (z - phi), 1 / (z - phi.conj())
+        # a pair of poles has real coefficients of a sum and of a difference
+        shapes = [
+            np.where(phi.imag > 0, a + b, np.where(phi.imag < 0, 1j * (a - b), a))
+            for a, b in ((one, other), (one**2, other**2))
+        ]
+        if hold.reaches_next or s.model.state_space().D.any():
+            shapes.append(np.ones((len(A), 1, len(z)), complex))
+        gain, count = self._explained(np.concatenate(shapes, axis=1))
+        more = np.maximum(count - self.x.shape[1], 0)
+        below = np.maximum(self.freedom - more, 1)
+        f = gain / np.maximum(more, 1) / ((self.at.cost - gain) / below)
+        return np.where(more > 0, scipy.stats.f.sf(f, np.maximum(more, 1), below), 1.0)
+
+    def _explained(self, ways: ComplexArray) -> tuple[FloatArray, FloatArray]:
+        """What responses (S, C, K) from each input to each output explain of what is left (S,), and
+        how many directions of it they have.
+        """
+        U, T, r = self.costs.U[:, :, 0], self.at.transient, self.at.residual
+        S, p, K = len(self.x), self.costs.Y.shape[1], self.e.n_lines
+        driven = (ways[:, :, None] * U[:, None]).reshape(S, -1, 1, K)
+        columns = np.concatenate(
+            [driven * (np.arange(p) == o)[:, None] for o in range(p)], axis=1
+        ).reshape(S, -1, p * K)
+        rows = np.ascontiguousarray(columns).view(float)
+        size = np.sqrt(np.einsum("sck,sck->sc", rows, rows))
+        rows = rows / np.where(size > 0, size, 1.0)[..., None]
+        clear = rows - rows @ T.swapaxes(-1, -2) @ self.at.inverse @ T
+        values, V = np.linalg.eigh(clear @ clear.swapaxes(-1, -2))
+        kept = values > _SAME * values[:, -1:]
+        along = (V.swapaxes(-1, -2) @ (clear @ r[..., None]))[..., 0]
+        gains = np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0)
+        return gains.sum(axis=1), kept.sum(axis=1).astype(float)
+
+
+def _leverage(rows: FloatArray, inverse: FloatArray) -> FloatArray:
+    """Part of each error that rows (S, q, R) have taken on themselves, (S, R)."""
+    return np.asarray(np.einsum("sqk,sqk->sk", rows, inverse @ rows))
+
+
+def inverse_of(H: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """That of matrices (S, P, P), and whether the data tell every direction, (S,)."""
+    size = np.sqrt(np.einsum("spp->sp", H))
+    fine = np.isfinite(H).all(axis=(1, 2)) & (size > 0).all(axis=1)
+    unit = np.where(fine[:, None], size, 1.0)
+    both: Array = unit[:, :, None] * unit[:, None]
+    values, V = np.linalg.eigh(np.where(fine[:, None, None], H, np.eye(H.shape[-1])) / both)
+    told = fine & (values[:, 0] > _SILENT * values[:, -1])
+    inverse = (V / np.maximum(values, 1e-300)[:, None]) @ V.swapaxes(-1, -2)
+    return inverse / both, told
