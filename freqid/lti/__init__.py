@@ -23,7 +23,6 @@ from freqid.lti.quadrature import NODES, TOLERANCE, panel_nodes, resolved, unres
 from freqid.lti.realisation import Realisation, Timing, sampled_response
 from freqid.lti.responses import (
     Plane,
-    many_responses,
     on_circle,
     points,
     response_and_derivatives,

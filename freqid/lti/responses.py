@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.lti.bases import Basis, eigenbasis_of_many
+from freqid.lti.bases import Basis
 from freqid.lti.holds import Hold, PeriodicHold, ZeroOrderHold
 from freqid.lti.sampled import Moving, SampledPlant
-from freqid.lti.state_space import StateSpace
 
 
 @dataclass(frozen=True)
@@ -82,12 +81,3 @@ def response_and_derivatives(
     x = plant.solve(z, plant.drive(z, driving))
     w = plant.output_rows(z)
     return plant.output(x, U), plant.sensitivity(z, w, x, driving, direct=U, moving=moving)
-
-
-def many_responses(at: StateSpace, omega: FloatArray, hold: Hold) -> ComplexArray:
-    """Responses of a batch of plants, (S, outputs, inputs, lines); NaN where A is defective."""
-    basis = eigenbasis_of_many(at)
-    plant, z = basis.through(hold), points(omega, hold)
-    m = at.B.shape[-1]
-    U = np.broadcast_to(np.eye(m, dtype=complex)[:, :, None], (m, m, len(z)))
-    return plant.output(plant.solve(z, plant.drive(z, U)), U)

@@ -242,12 +242,6 @@ class GreyBox(Model):
         """
         return self._function.at(self.values | values)
 
-    def state_spaces(self, **columns: FloatArray) -> StateSpace:
-        """A, B, C, D at many points at once: each argument (S,), each matrix (S, …)."""
-        count = len(next(iter(columns.values())))
-        full = {n: columns.get(n, np.full(count, v)) for n, v in self.values.items()}
-        return self._function.at_many(full)
-
     def linearisation(self) -> Linearisation:
         """The matrices, and their derivatives by the free parameters."""
         return self.linearise(self.values, [p.name for p in self.free_parameters])

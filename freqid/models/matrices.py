@@ -103,15 +103,6 @@ class MatrixFunction:
             raise InputError(f"the model cannot be computed at {where}: {told}") from error
         return shaped(matrices, resolved)
 
-    def at_many(self, columns: Mapping[str, FloatArray]) -> StateSpace:
-        """Matrices (S, …) at many points, each column (S,)."""
-        full = self.ties.resolve(columns)
-        if self.vectorized:
-            return StateSpace(*(np.asarray(M, dtype=float) for M in self._matrices(full)))
-        rows = [dict(zip(full, row, strict=True)) for row in np.array(list(full.values())).T]
-        each = [as_dense(self._matrices({k: float(v) for k, v in r.items()}), float) for r in rows]
-        return StateSpace(*(np.stack(M) for M in zip(*each, strict=True)))
-
     def linearise(self, values: Mapping[str, float], names: Sequence[str]) -> Linearisation:
         """Matrices at ``values`` and their derivatives by the parameters ``names``.
 

@@ -43,6 +43,8 @@ def model_to_dict(model: Model) -> Written:
             "input_delay": model.input_delay,
             "vectorized": model.vectorized,
         }
+    if not isinstance(model, DiscreteModel | ContinuousModel):
+        raise InputError(f"model={type(model).__name__} cannot be written to a file")
     names = {"inputs": list(model.inputs or ()), "outputs": list(model.outputs or ())}
     matrices = {letter: M.tolist() for letter, M in zip("ABCD", model.state_space(), strict=True)}
     if isinstance(model, DiscreteModel):
@@ -54,12 +56,10 @@ def model_to_dict(model: Model) -> Written:
             "hold": hold,
             **names,
         }
-    if isinstance(model, ContinuousModel):
-        return {
-            "kind": "ContinuousModel", "matrices": matrices, "delay": model.delay, **names,
-            "denominator": model.denominator.tolist(), "numerators": model.numerators.tolist(),
-        }  # fmt: skip
-    raise InputError(f"model={type(model).__name__} cannot be written to a file")
+    return {
+        "kind": "ContinuousModel", "matrices": matrices, "delay": model.delay, **names,
+        "denominator": model.denominator.tolist(), "numerators": model.numerators.tolist(),
+    }  # fmt: skip
 
 
 def model_of_dict(written: Given, given: GreyBox | None = None) -> Model:

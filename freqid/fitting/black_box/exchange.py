@@ -35,7 +35,7 @@ def exchanged(lines: RationalLines, best: Fitted, fewer: Fewer) -> Fitted:
     order, first = len(best.poles), best
     for _ in range(_ROUNDS):
         before = best.cost
-        for added in asked_for(lines, best):
+        for added in _asked_for(lines, best):
             larger = lines.below(np.append(best.poles, added), TRIAL_STEPS)
             if larger is None:
                 continue
@@ -56,23 +56,27 @@ def _same(poles: ComplexArray, others: ComplexArray) -> bool:
     return bool((apart.min(axis=1) <= _NEAR * np.abs(1 - np.abs(poles))).all())
 
 
-@np.errstate(all="ignore")
-def asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
+def _asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
     """The pairs, and the real pole, that explain most of what is left, one for each place."""
-    left = lines.residual(best)
+    real = np.array(_REAL, complex)
+    costs = [lines.cost(np.append(best.poles, r)) for r in real]
+    return [*pairs_asked_for(lines, best, _TRIED), real[[int(np.argmin(costs))]]]
+
+
+@np.errstate(all="ignore")
+def pairs_asked_for(lines: RationalLines, best: Fitted, count: int) -> list[ComplexArray]:
+    """So many pairs of poles that explain most of what is left, one for each place."""
     pairs = _candidates(lines.w)
-    gains = _gains(lines, left, pairs)
+    gains = _gains(lines, lines.residual(best), pairs)
     picked: list[ComplexArray] = []
     for i in np.argsort(-gains):
         p = pairs[i]
         near = [abs(p - q[0]) < 2 * max(1 - abs(p), 1 - abs(q[0])) for q in picked]
         if not any(near):
             picked.append(np.array([p, p.conj()]))
-        if len(picked) == _TRIED:
+        if len(picked) == count:
             break
-    real = np.array(_REAL, complex)
-    costs = [lines.cost(np.append(best.poles, r)) for r in real]
-    return [*picked, real[[int(np.argmin(costs))]]]
+    return picked
 
 
 def _candidates(w: ComplexArray) -> ComplexArray:

@@ -14,7 +14,7 @@ from itertools import chain
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.fitting.black_box.exchange import TRIAL_STEPS, asked_for, exchanged
+from freqid.fitting.black_box.exchange import TRIAL_STEPS, exchanged, pairs_asked_for
 from freqid.fitting.black_box.rational_lines import (
     FEW,
     FOLLOWED,
@@ -106,7 +106,7 @@ def with_a_pair(
     own, unit = lines.below(poles), lines.sizes[0] ** 2
     if own is None:
         raise np.linalg.LinAlgError("the poles stand for no model")
-    tried = [*pairs, *asked_for(lines, own)[:1]]
+    tried = [*pairs, *pairs_asked_for(lines, own, 1)]
     met = [lines.below(np.append(own.poles, pair), TRIAL_STEPS) for pair in tried]
     best = min((f for f in met if f is not None), key=lambda f: f.cost, default=own)
     if len(best.poles) == len(poles) or best.cost * unit > worth:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray, IntArray
+from freqid.checks import ComplexArray, FloatArray
 from freqid.lti import Hold, Realisation, sampled_response
 
 # part of the measured response below which that of a model is none
@@ -49,12 +49,11 @@ class LogResponse:
         """Evaluate at one trial point."""
         return _LogEvaluation(self, realisation.for_place(self.place))
 
-    def ratio(self, G: ComplexArray, lines: IntArray | slice = slice(None)) -> ComplexArray:
-        """G/Ĝ at those ``lines``; of a response that is zero the least, and the same everywhere, so
-        that it is far off and leads nowhere.
+    def ratio(self, G: ComplexArray) -> ComplexArray:
+        """G/Ĝ; of a response that is zero the least, and the same everywhere, so that it is far off
+        and leads nowhere.
         """
-        heard = np.abs(G) > self.deaf[..., lines]
-        ratio: ComplexArray = np.where(heard, G / self.measured[..., lines], _DEAF)
+        ratio: ComplexArray = np.where(np.abs(G) > self.deaf, G / self.measured, _DEAF)
         return ratio
 
     def error(self, G: ComplexArray) -> FloatArray:

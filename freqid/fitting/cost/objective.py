@@ -46,16 +46,12 @@ class ScannableStructure(Structure, Protocol):
         """Lowest and highest values to scatter starts over."""
         ...
 
-    def responses(
-        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
-    ) -> ComplexArray:
-        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
-        ...
-
     def sensitivities(
         self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
     ) -> tuple[ComplexArray, ComplexArray]:
-        """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
+        """Responses at many points (S, P), (S, outputs, inputs, lines), and derivatives (S, P, …);
+        NaN where there are none.
+        """
         ...
 
 

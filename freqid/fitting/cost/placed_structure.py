@@ -158,9 +158,3 @@ class PlacedStructure(GreyStructure):
         dG = np.zeros((len(points), points.shape[1], *G.shape[1:]), complex)
         dG[:, by] = own
         return G, dG
-
-    def responses(
-        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
-    ) -> ComplexArray:
-        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
-        return self.sensitivities(points, omega, hold, place)[0]

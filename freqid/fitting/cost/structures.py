@@ -19,7 +19,6 @@ from freqid.lti import (
     Timing,
     eigenbasis_of_many,
     eigenvalues_and_derivatives,
-    many_responses,
     points as points_of,
     response_and_derivatives,
     sampled_response,
@@ -140,21 +139,12 @@ class GreyStructure:
             plant = nuisance.applied(plant, nuisance.start, None)
         return plant
 
-    def responses(
-        self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
-    ) -> ComplexArray:
-        """Responses at many points (S, P), (S, outputs, inputs, lines)."""
-        if self.unknown or self.model.delay_sources:
-            each = [sampled_response(self.realise(x), omega, hold)[0] for x in points]
-            return np.stack(each)
-        theta = points * self.scale
-        columns = dict(zip(self.physical_names, theta.T, strict=True))
-        return many_responses(self.model.state_spaces(**columns), omega, hold)
-
     def sensitivities(
         self, points: FloatArray, omega: FloatArray, hold: Hold, place: int = 0
     ) -> tuple[ComplexArray, ComplexArray]:
-        """The same, and derivatives (S, P, outputs, inputs, lines); NaN where there are none."""
+        """Responses at many points (S, P), (S, outputs, inputs, lines), and derivatives (S, P, …);
+        NaN where there are none.
+        """
         if self.unknown or self.known or self.model.delay_sources:
             return self._one_by_one(points, omega, hold)
         try:

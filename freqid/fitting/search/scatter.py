@@ -2,43 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
 
 from freqid.checks import FloatArray
 from freqid.fitting.cost.objective import Objective, ScannableStructure
-from freqid.fitting.search.log_stage import LogResponse
 
-# scattered points that are looked at before the best of them are walked from, and lines of a look
-_GLANCES, _GLANCE_LINES = 512, 40
+# scattered points that are looked at before the best of them are walked from
+_GLANCES = 64
 
 
-def promising(
-    objective: Objective,
-    start: FloatArray,
-    targets: Sequence[LogResponse],
-    count: int,
-    seed: int,
-) -> FloatArray:
+def promising(objective: Objective, start: FloatArray, count: int, seed: int) -> FloatArray:
     """Scattered points in order of their cost: a look at many is cheaper than a walk from one."""
     structure = cast(ScannableStructure, objective.structure)
-    if targets:
-        points = _scattered(structure, start, max(_GLANCES, count), seed)
-        cost = np.zeros(len(points))
-        with np.errstate(all="ignore"):
-            for target in targets:
-                few = np.linspace(0, len(target.omega) - 1, _GLANCE_LINES).astype(int)
-                G = structure.responses(points, target.omega[few], target.hold, target.place)
-                ratio = target.ratio(G, few)
-                error = np.log(np.abs(ratio)) ** 2 + np.angle(ratio) ** 2
-                error = error * target.weight[..., few] ** 2
-                cost += error.sum(axis=(1, 2, 3))
-    else:
-        points = _scattered(structure, start, max(_GLANCES // 8, count), seed)
-        found = [objective.point(x) for x in points]
-        cost = np.array([np.inf if p is None else p.cost for p in found])
+    points = _scattered(structure, start, max(_GLANCES, count), seed)
+    found = [objective.point(x) for x in points]
+    cost = np.array([np.inf if p is None else p.cost for p in found])
     return points[np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")[:count]]
 
 

@@ -154,7 +154,7 @@ class Search:
         """Ends of scattered starts, the most promising first, made when they are asked for."""
         if rule.limit < 2:
             return
-        points = promising(self.objective, start, self.guide.targets, rule.limit - 1, seed)
+        points = promising(self.objective, start, rule.limit - 1, seed)
         for begin in points:
             try:
                 yield 1, 1, minimise(self.objective, begin, limit=_LIMIT), True
