@@ -17,7 +17,7 @@ from freqid.models import Model
 from freqid.plots.bode_nyquist import bode, nyquist
 from freqid.plots.curves import resonances
 from freqid.plots.heat_maps import heat_map
-from freqid.plots.style import COLOURS, Panels, context, line, several_axes, stacked
+from freqid.plots.style import Panels, context, ink, line, several_axes, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -208,7 +208,7 @@ def _shade(axis: Axes, shown: FrequencyResponse) -> None:
     """The input's spectrum after decimation, under the amplitude, in its own scale."""
     twin = axis.twinx()
     power = shown.input_spectrum[0]  # type: ignore[index]
-    colour = COLOURS[5]
+    colour = ink(5)
     if len(power) > 1 and np.median(np.diff(shown.frequency)) < 0.5 * np.ptp(shown.frequency):
         twin.fill_between(shown.frequency, power, step="mid", color=colour, alpha=0.25, linewidth=0)
     else:

@@ -25,6 +25,7 @@ from freqid.plots.curves import (
     heard,
     shown,
 )
+from freqid.plots.interactive import Backend, offers_plotly
 from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, line, stacked
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ _FEW_DECADES = 50.0
 _OFFSETS = [(13, 3), (-13, 3), (3, -10), (3, 10)]
 
 
+@offers_plotly
 def bode(
     *responses: Drawable,
     labels: Sequence[str] | None = None,
@@ -44,6 +46,7 @@ def bode(
     styles: Sequence[Style] | None = None,
     decibel: bool = False,
     hold: Hold | None = None,
+    backend: Backend = "matplotlib",
 ) -> Panels:
     """Amplitude above phase of responses, models, estimates or control systems.
 
@@ -56,6 +59,8 @@ def bode(
         styles: matplotlib's line properties, one dict for each response.
         hold: through which models in continuous time are seen; by default that of the measured
             responses, as the legend then says.
+        backend: ``"plotly"`` for a ``plotly.graph_objects.Figure`` to zoom into, as notebooks show;
+            needs the extra ``explore``, and no ``ax``. All curves of this package take it.
 
     Phases are unwrapped and moved by whole turns next to the first curve. Returns the two axes. Of
     several channels a new figure has amplitude and phase of each pair, a row of both for an output
@@ -183,6 +188,7 @@ def _draw(curve: BodeCurve, amplitude: Axes, phase: Axes, unit: str, decibel: bo
             axis.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
 
 
+@offers_plotly
 def nyquist(
     *responses: Drawable,
     labels: Sequence[str] | None = None,
@@ -191,6 +197,7 @@ def nyquist(
     ticks: Sequence[float] | None = None,
     unit: str = "rad/s",
     styles: Sequence[Style] | None = None,
+    backend: Backend = "matplotlib",
 ) -> Axes:
     """Responses in the complex plane, with dots at the frequencies ``ticks`` (in ``unit``).
 
@@ -235,7 +242,10 @@ def nyquist(
     return ax
 
 
-def plot_record(record: Record, ax: Panels | None = None) -> Panels:
+@offers_plotly
+def plot_record(
+    record: Record, ax: Panels | None = None, backend: Backend = "matplotlib"
+) -> Panels:
     """Input above output of a ``record`` in time, a zero-order hold as steps; returns the two axes.
 
     Raises ValueError for anything but one record.
@@ -262,7 +272,13 @@ def plot_record(record: Record, ax: Panels | None = None) -> Panels:
     return ax
 
 
-def plot_coherence(frf: FrequencyResponse, ax: Axes | None = None, unit: str = "Hz") -> Axes:
+@offers_plotly
+def plot_coherence(
+    frf: FrequencyResponse,
+    ax: Axes | None = None,
+    unit: str = "Hz",
+    backend: Backend = "matplotlib",
+) -> Axes:
     """Coherence of the response ``frf`` against frequency, in the ``unit`` "Hz" or "rad/s".
 
     Raises ValueError where it has none.

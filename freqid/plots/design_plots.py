@@ -9,7 +9,7 @@ import numpy as np
 from freqid.checks import table_with
 from freqid.plots.bias_plots import hold_title
 from freqid.plots.heat_maps import heat_map
-from freqid.plots.style import COLOURS, Panels, context
+from freqid.plots.style import Panels, context, ink
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,9 +52,7 @@ def plot_design(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
             )  # fmt: skip
             if (best["hold"], best["factor"]) == (hold, factor):
                 at = (lows.index(best["low"]), highs.index(best["high"]))
-                axis.add_patch(
-                    plt.Rectangle(at, 1, 1, fill=False, edgecolor=COLOURS[2], linewidth=2.5)
-                )
+                axis.add_patch(plt.Rectangle(at, 1, 1, fill=False, edgecolor=ink(2), linewidth=2.5))
             axis.set_title(f"{hold_title(hold)}, every {1e3 * part['dt'].iloc[0]:g} ms")
         for axis in grid[-1]:
             axis.set_xlabel("low end / Hz")

@@ -12,7 +12,8 @@ from freqid.data import FrequencyResponse, Record
 from freqid.fitting import Estimate
 from freqid.plots.bode_nyquist import bode
 from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
-from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
+from freqid.plots.interactive import Backend, offers_plotly
+from freqid.plots.style import Panels, drawing, ink, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,8 +47,12 @@ def plot_response(
     return axes
 
 
+@offers_plotly
 def plot_poles(
-    *estimates: Estimate, labels: Sequence[str] | None = None, ax: Axes | None = None
+    *estimates: Estimate,
+    labels: Sequence[str] | None = None,
+    ax: Axes | None = None,
+    backend: Backend = "matplotlib",
 ) -> Axes:
     """Poles in the s plane (rad/s) with their 95 % ellipses. Returns the axes.
 
@@ -65,7 +70,7 @@ def plot_poles(
         an("estimates", est, Estimate)
     with drawing(ax) as ax:
         for index, est in enumerate(estimates):
-            colour = COLOURS[index % len(COLOURS)]
+            colour = ink(index)
             poles, scatter = est.pole_scatter()
             label = None if labels is None else labels[index]
             ax.plot(poles.real, poles.imag, "x", color=colour, markersize=8, label=label)

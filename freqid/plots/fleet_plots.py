@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import BoolArray, FloatArray, InputError, unknown
-from freqid.plots.style import COLOURS, drawing
+from freqid.plots.style import drawing, ink
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,7 +52,7 @@ def plot_fleet(
         axis.axhline(centre, color="0.6", linewidth=1, zorder=0, label=f"median {centre:.4g}")
         changed = f"changed ({int(marked.sum())} of {int(kept.sum())}; level {level:g} for all)"
         for some, marker, colour, label in (
-            (kept & ~marked, "o", COLOURS[1], None), (marked, "s", COLOURS[2], changed),
+            (kept & ~marked, "o", ink(1), None), (marked, "s", ink(2), changed),
         ):  # fmt: skip
             if some.any():
                 axis.errorbar(

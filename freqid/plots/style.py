@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, TypeAlias, TypedDict
@@ -31,6 +32,8 @@ class Style(TypedDict, total=False):
 
 # colours of Okabe and Ito (2008), told apart by colour-blind readers; lines differ in dash too
 COLOURS = ["#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]
+# the same on dark paper, where black cannot be seen and blue hardly
+_ON_DARK = ["#E8E8E8", "#56B4E9", "#FF8C42", "#2EC4A0", "#E19BC4", "#E69F00", "#7FA8D9"]
 DASHES: list[Dash] = [
     "-",
     "--",
@@ -61,10 +64,33 @@ SETTINGS: dict[str, object] = {
 
 
 def context() -> AbstractContextManager[None]:
-    """The settings for the length of a ``with`` block; nothing global is changed."""
+    """The settings for the length of a ``with`` block; nothing global is changed.
+
+    Colours of paper and ink are those of the style in force: ``plt.style.use("dark_background")``
+    makes dark figures.
+    """
     import matplotlib
 
-    return matplotlib.rc_context(SETTINGS)
+    grid = {"grid.color": "#3a3d41"} if on_dark() else {}
+    return matplotlib.rc_context(SETTINGS | grid)
+
+
+def on_dark() -> bool:
+    """Whether matplotlib's style in force has dark paper."""
+    matplotlib = sys.modules.get("matplotlib")
+    # who draws without it has paper of his own
+    if matplotlib is None:
+        return False
+    from matplotlib.colors import to_rgb
+
+    red, green, blue = to_rgb(matplotlib.rcParams["axes.facecolor"])
+    return bool(0.3 * red + 0.6 * green + 0.1 * blue < 0.5)
+
+
+def ink(index: int) -> str:
+    """That of the index-th curve, on the paper of the style in force."""
+    colours = _ON_DARK if on_dark() else COLOURS
+    return colours[index % len(colours)]
 
 
 def an_axes(ax: object) -> None:
@@ -142,4 +168,4 @@ def channel_grid(outputs: int, inputs: int, ax: Panels | None = None) -> Iterato
 
 def line(index: int) -> Style:
     """Colour and dash of the index-th curve of a figure."""
-    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
+    return {"color": ink(index), "linestyle": DASHES[index % len(DASHES)]}

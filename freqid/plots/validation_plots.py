@@ -10,7 +10,8 @@ import numpy as np
 from freqid.checks import table_with
 from freqid.data import FrequencyResponse
 from freqid.plots.bode_nyquist import bode
-from freqid.plots.style import COLOURS, Panels, drawing, line, stacked
+from freqid.plots.interactive import Backend, offers_plotly
+from freqid.plots.style import Panels, drawing, ink, line, stacked
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +20,10 @@ if TYPE_CHECKING:
     from freqid.validation import Comparison
 
 
-def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
+@offers_plotly
+def plot_comparison(
+    comparison: Comparison, ax: Panels | None = None, backend: Backend = "matplotlib"
+) -> Panels:
     """Measured and simulated above their difference, two axes for each output. Returns the axes."""
     record = comparison.record
     if isinstance(record, FrequencyResponse):
@@ -39,13 +43,16 @@ def plot_comparison(comparison: Comparison, ax: Panels | None = None) -> Panels:
             above.plot(time, simulated[:, o], label=text, **line(2))
             above.set_ylabel(label)
             above.legend(loc="upper right", ncols=2)
-            below.plot(time, residuals[:, o], color=COLOURS[1], linewidth=0.8)
+            below.plot(time, residuals[:, o], color=ink(1), linewidth=0.8)
             below.set_ylabel("difference")
         ax[-1].set_xlabel("time / s")
     return ax
 
 
-def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
+@offers_plotly
+def plot_residuals(
+    table: pd.DataFrame, ax: Panels | None = None, backend: Backend = "matplotlib"
+) -> Panels:
     """Correlations in the ``table`` of ``residual_test`` with 99 % limits; one axes for each."""
     table_with(table, "test", "residual_test")
     curves = table.attrs["correlations"]
@@ -56,9 +63,9 @@ def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
             lags = np.arange(1, len(values) + 1) if white else np.arange(len(values))
             lags = lags if white else lags - len(values) // 2
             limit = curve["limit"]
-            axis.axhspan(-limit, limit, color=COLOURS[6], alpha=0.25, linewidth=0)
-            axis.vlines(lags, 0, values, color=COLOURS[0], linewidth=1)
-            axis.plot(lags, values, "o", markersize=3, color=COLOURS[0])
+            axis.axhspan(-limit, limit, color=ink(6), alpha=0.25, linewidth=0)
+            axis.vlines(lags, 0, values, color=ink(0), linewidth=1)
+            axis.plot(lags, values, "o", markersize=3, color=ink(0))
             pair = curve["output"] if white else f"{curve['output']} and {curve['input']}"
             axis.set_title(f"{curve['test']}: {pair} (99 % limits shaded)", loc="left")
             axis.set_ylabel("correlation")
@@ -66,7 +73,10 @@ def plot_residuals(table: pd.DataFrame, ax: Panels | None = None) -> Panels:
     return ax
 
 
-def plot_orders(table: pd.DataFrame, ax: Axes | None = None) -> Axes:
+@offers_plotly
+def plot_orders(
+    table: pd.DataFrame, ax: Axes | None = None, backend: Backend = "matplotlib"
+) -> Axes:
     """Criteria against order, each less its least value; the best order is marked.
 
     Takes the table of ``select_order`` and returns the axes.

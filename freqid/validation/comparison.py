@@ -48,11 +48,11 @@ class Comparison:
     fit_percent: FloatArray
     hold: Hold | None
 
-    def plot(self, ax: Sequence[Axes] | None = None) -> Any:
-        """Measured and simulated outputs above their difference; returns the axes."""
+    def plot(self, ax: Sequence[Axes] | None = None, **options: Any) -> Any:
+        """Measured and simulated outputs above their difference; see ``freqid.plot_comparison``."""
         from freqid.plots import plot_comparison
 
-        return plot_comparison(self, ax)
+        return plot_comparison(self, ax, **options)
 
     def __repr__(self) -> str:
         each = ", ".join(
