@@ -16,6 +16,7 @@ from freqid.checks import InputError
 from freqid.cli.estimates import fit, fit_many, new_model
 from freqid.cli.options import Band, Columns, Dt
 from freqid.cli.planned import bias
+from freqid.cli.plants import in_python, model_of
 from freqid.cli.terminal import (
     PICTURES,
     TABLES,
@@ -190,6 +191,7 @@ def channels(log: Path) -> None:
 def explore(
     data: Path | None = None,
     *,
+    model: str | None = None,
     input: Columns = None,
     output: Columns = None,
     dt: Dt = None,
@@ -203,15 +205,25 @@ def explore(
     ----------
     data
         a record to explore instead of the simulated experiment.
+    model
+        a plant of your own, your_file.py:plant, beside those of the paper.
     host
         other than loopback only with --allow-remote.
     port
         the next free one is taken where it is busy.
     """
-    from freqid.pages import explore as serve
+    from freqid.pages import Own, explore as serve
 
     record = None if data is None else fq.read(data, input, output, dt)
-    serve(record, host, port, allow_remote)
+    named = {"inputs": input, "outputs": output, "dt": dt}
+    given = "".join(f", {k}={v!r}" for k, v in named.items() if v is not None)
+    plant = None
+    if model is not None:
+        found = model_of(model, 3, None, None)
+        if not isinstance(found, fq.GreyBox):
+            raise InputError(f"--model {model} is no grey box; the explorer moves parameters")
+        plant = Own(found, in_python(model))
+    serve(record, host, port, allow_remote, plant, f"fq.read({str(data)!r}{given})")
 
 
 app = cyclopts.App(

@@ -66,6 +66,15 @@ def model_of(
     return from_file(Path(file), name)
 
 
+def in_python(text: str) -> tuple[str, str]:
+    """How Python comes by the model that ``--model`` names: what it imports, and calls."""
+    file, _, name = text.rpartition(":")
+    if not file:
+        return "", f"fq.{text.replace('-', '_')}()"
+    made = "()" if f"def {name}(" in Path(file).read_text() else ""
+    return "import runpy", f"runpy.run_path({file!r})[{name!r}]{made}"
+
+
 def from_file(path: Path, name: str) -> object:
     """The model called ``name`` in a Python file, or what a function of that name returns."""
     if not path.is_file():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,11 +24,13 @@ class Signals:
     dt: float
     input_dt: float
 
-    def plot(self, ax: Panels | None = None, **options: Any) -> Panels:
+    def plot(
+        self, ax: Panels | None = None, backend: Literal["matplotlib", "plotly"] = "matplotlib"
+    ) -> Panels:
         """Draw input above output in time; see ``freqid.plot_record``."""
         from freqid.plots import plot_record
 
-        return plot_record(self, ax, **options)  # type: ignore[arg-type]
+        return plot_record(self, ax=ax, backend=backend)  # type: ignore[arg-type]
 
     def __add__(self, other: object) -> list[object]:
         """Experiments one after the other, as ``fit`` takes them: ``first + second`` is a list.

@@ -54,7 +54,8 @@ def plot_poles(
     ax: Axes | None = None,
     backend: Backend = "matplotlib",
 ) -> Axes:
-    """Poles in the s plane (rad/s) with their 95 % ellipses. Returns the axes.
+    """Poles in the s plane (rad/s) with their 95 % ellipses. Returns the axes, or, with
+    ``backend="plotly"``, a figure of plotly.
 
     Raises ValueError for labels of another number than estimates.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Literal, ParamSpec, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -12,7 +12,10 @@ from freqid.checks import FloatArray, InputError, choice
 from freqid.plots.style import on_dark
 
 if TYPE_CHECKING:
+    import plotly.graph_objects as go
     from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
 Backend: TypeAlias = Literal["matplotlib", "plotly"]
@@ -51,9 +54,9 @@ def offers_plotly(function: Callable[P, R]) -> Callable[P, R]:
         import matplotlib.pyplot as plt
 
         axes = function(*args, **options)
-        first: Any = np.ravel(np.asarray(axes, dtype=object))[0]
+        first = cast("Axes", np.ravel(np.asarray(axes, dtype=object))[0])
         try:
-            return as_plotly(first)
+            return cast(R, as_plotly(first))
         finally:
             # nobody is to see what it was made from
             plt.close(first.figure)
@@ -61,13 +64,13 @@ def offers_plotly(function: Callable[P, R]) -> Callable[P, R]:
     return drawn
 
 
-def as_plotly(ax: Axes) -> Any:
+def as_plotly(ax: Axes) -> go.Figure:
     """All axes of the figure that ``ax`` belongs to; ValueError without plotly."""
     try:
         import plotly.graph_objects as go
     except ImportError:
         raise InputError("backend='plotly' needs plotly: pip install 'freqid[explore]'") from None
-    source: Any = ax.figure
+    source = cast("Figure", ax.figure)
     source.canvas.draw()
     figure = go.Figure()
     named: set[str] = set()
@@ -91,7 +94,7 @@ def as_plotly(ax: Axes) -> Any:
     return figure
 
 
-def _axes(source: Any, ax: Axes, suffix: str) -> dict[str, Part]:
+def _axes(source: Figure, ax: Axes, suffix: str) -> dict[str, Part]:
     """Both axes of a panel, where it stands and what they say."""
     from matplotlib.transforms import Bbox
 
@@ -121,7 +124,7 @@ def _axes(source: Any, ax: Axes, suffix: str) -> dict[str, Part]:
     return found
 
 
-def _titles(figure: Any, ax: Axes) -> None:
+def _titles(figure: go.Figure, ax: Axes) -> None:
     """The title above a panel, and words at a place of it."""
     box = ax.get_position()
     for where, x, anchor in (("center", (box.x0 + box.x1) / 2, "center"), ("left", box.x0, "left")):
@@ -190,13 +193,13 @@ def _in_data(line: Line2D) -> bool:
     ) == (True, True)
 
 
-def _segments(lines: Any) -> Iterator[Part]:
+def _segments(lines: LineCollection) -> Iterator[Part]:
     """Short lines as one trace, parted by gaps."""
     parts = [np.vstack([s, [[np.nan, np.nan]]]) for s in lines.get_segments() if len(s)]
     if parts:
         x, y = np.concatenate(parts).T
         colour = _colour(lines.get_color()[0], None)
-        width = float(lines.get_linewidth()[0]) * _POINT
+        width = float(np.ravel(lines.get_linewidth())[0]) * _POINT
         yield {"type": "scatter", "x": x, "y": y, "mode": "lines", "name": "",
                "line": {"color": colour, "width": width}, "hoverinfo": "skip"}  # fmt: skip
 
@@ -209,7 +212,7 @@ def _area(corners: FloatArray, colour: object) -> Part:
     }  # fmt: skip
 
 
-def _colour(colour: Any, alpha: float | None) -> str:
+def _colour(colour: object, alpha: float | None) -> str:
     from matplotlib.colors import to_rgba
 
     r, g, b, a = to_rgba(colour, alpha)

@@ -64,5 +64,5 @@ def bode_axes(split: float, ticks: Part) -> Part:
         "xaxis": {"type": "log", "anchor": "y2", "title": {"text": "frequency / Hz"}, **ticks},
         "yaxis": {"type": "log", "domain": [split, 1], "title": {"text": "amplitude"},
                   "exponentformat": "power"},
-        "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}},
+        "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}, "dtick": 90},
     }  # fmt: skip

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 def plot_comparison(
     comparison: Comparison, ax: Panels | None = None, backend: Backend = "matplotlib"
 ) -> Panels:
-    """Measured and simulated above their difference, two axes for each output. Returns the axes."""
+    """Measured and simulated above their difference, two axes for each output.
+
+    Returns the axes, or, with ``backend="plotly"``, a figure of plotly.
+    """
     record = comparison.record
     if isinstance(record, FrequencyResponse):
         shown = dataclasses.replace(record, response=comparison.simulated, variance=None)
@@ -53,7 +56,9 @@ def plot_comparison(
 def plot_residuals(
     table: pd.DataFrame, ax: Panels | None = None, backend: Backend = "matplotlib"
 ) -> Panels:
-    """Correlations in the ``table`` of ``residual_test`` with 99 % limits; one axes for each."""
+    """Correlations in the ``table`` of ``residual_test`` with 99 % limits; one axes for each, or,
+    with ``backend="plotly"``, a figure of plotly.
+    """
     table_with(table, "test", "residual_test")
     curves = table.attrs["correlations"]
     with stacked(ax, len(curves), (7.2, 1.2 + 1.7 * len(curves)), sharex=False) as ax:
@@ -79,7 +84,8 @@ def plot_orders(
 ) -> Axes:
     """Criteria against order, each less its least value; the best order is marked.
 
-    Takes the table of ``select_order`` and returns the axes.
+    Takes the table of ``select_order`` and returns the axes, or, with ``backend="plotly"``, a
+    figure of plotly.
     """
     table_with(table, "mdl", "select_order")
     with drawing(ax) as ax:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from freqid.models import Model, ModelLike, as_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from freqid.plots import Panels
 
 
 # an output that varies by less than this part of its size is constant
@@ -48,11 +50,15 @@ class Comparison:
     fit_percent: FloatArray
     hold: Hold | None
 
-    def plot(self, ax: Sequence[Axes] | None = None, **options: Any) -> Any:
+    def plot(
+        self,
+        ax: Sequence[Axes] | None = None,
+        backend: Literal["matplotlib", "plotly"] = "matplotlib",
+    ) -> Panels:
         """Measured and simulated outputs above their difference; see ``freqid.plot_comparison``."""
         from freqid.plots import plot_comparison
 
-        return plot_comparison(self, ax, **options)
+        return plot_comparison(self, ax=ax, backend=backend)
 
     def __repr__(self) -> str:
         each = ", ".join(

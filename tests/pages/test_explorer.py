@@ -16,7 +16,9 @@ import pytest
 
 import freqid as fq
 from freqid.pages.explorer.page import application, explore, free_port
-from freqid.pages.explorer.state import State, presets, scene
+from freqid.pages.explorer.scene import scene
+from freqid.pages.explorer.state import Own, State, presets
+from freqid.pages.explorer.words import sentence
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -125,6 +127,15 @@ def together(curves):
     return len(estimate) == len(true) and np.abs(estimate / true - 1).max() < 0.02
 
 
+HEIGHTS = """
+return [...document.querySelectorAll('.graph .main-svg')].map(e => e.getBoundingClientRect().height)
+"""
+SLIDERS = """
+return [...document.querySelectorAll('[role=slider]')].map(
+  e => [e.getAttribute('aria-label'), e.getAttribute('aria-valuetext')])
+"""
+
+
 def press(browser, element_id, key, count):
     from selenium.webdriver.common.by import By
 
@@ -138,6 +149,8 @@ def test_the_slider_shows_a_negative_damping_and_the_cure(browser, address):
     from selenium.webdriver.common.keys import Keys
 
     browser.get(address)
+    until(browser, f"{VERDICT}.startsWith('d = -2')", "the phenomenon at once")
+    browser.get(address + "?factor=1")
     until(browser, f"{VERDICT}.includes('true to a tenth')", "the page")
     shot(browser, "explorer_start")
     press(browser, "factor", Keys.ARROW_RIGHT, 9)
@@ -158,6 +171,32 @@ def test_the_slider_shows_a_negative_damping_and_the_cure(browser, address):
     assert not errors(browser)
 
 
+def test_the_address_follows_and_a_reload_keeps_it(browser, address):
+    from selenium.webdriver.common.keys import Keys
+
+    browser.get(address)
+    until(browser, f"{VERDICT}.startsWith('d = -2')", "the page")
+    press(browser, "factor", Keys.ARROW_LEFT, 3)
+    until(browser, "return location.search.includes('factor=7')", "the address")
+    browser.refresh()
+    until(browser, "return document.getElementById('code').textContent.includes('decimate(7)')", "")
+
+
+def test_who_hears_the_page_is_told_names_and_values(browser, address):
+    browser.get(address)
+    until(browser, f"{VERDICT}.startsWith('d = -2')", "the page")
+    named = until(browser, f"const s = (() => {{{SLIDERS}}})(); return s.every(x => x[0]) && s", "")
+    told = dict(named)
+    assert told["keep one sample in"] == "10"
+    assert told["chirp, Hz, from"] == "10.0 Hz"
+    assert told["k = 150000 N m/rad times"] == "1.00 times"
+    verdict = "return document.getElementById('verdict')"
+    assert browser.execute_script(f"{verdict}.getAttribute('aria-live')") == "polite"
+    table = browser.execute_script("return document.getElementById('table').href")
+    assert table.startswith("data:text/csv")
+    assert "frequency" in table
+
+
 @pytest.mark.parametrize("look", ["phone", "dark", "zoom"])
 def test_other_screens(browser, address, look):
     size = {"phone": (390, 844), "dark": (1400, 1200), "zoom": (700, 600)}[look]
@@ -172,10 +211,19 @@ def test_other_screens(browser, address, look):
         until(browser, f"{VERDICT}.startsWith('d = -2')", "the page")
         wide = browser.execute_script("return document.documentElement.scrollWidth")
         assert wide <= size[0] + 2
+        until(browser, "return document.querySelectorAll('.graph .main-svg').length > 4", "figures")
+        assert min(browser.execute_script(HEIGHTS)) > 300
         shot(browser, f"explorer_{look}")
         if look == "dark":
             paper = "return getComputedStyle(document.body).backgroundColor"
             assert browser.execute_script(paper) == "rgb(22, 24, 27)"
+            # what is black on paper, and what sliders run on, is light on dark
+            for selector, what in (("#bode .scatterlayer path.js-line", "stroke"),
+                                   ("#factor .dash-slider-track", "backgroundColor"),
+                                   ("#bode .xtick text", "fill")):  # fmt: skip
+                script = f"return getComputedStyle(document.querySelector('{selector}')).{what}"
+                found = [int(x) for x in re.findall(r"\d+", browser.execute_script(script))[:3]]
+                assert sum(found) > 300, (selector, found)
     finally:
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
@@ -284,9 +332,102 @@ def test_an_own_record_takes_the_place_of_the_simulated_one():
     assert shown.slow.n_samples == 400
     assert shown.estimate["d"] < 0
     # nobody knows what is true of somebody's own record
-    assert all(name.startswith(("nominal", "estimate")) for name in shown.responses())
-    assert "fq.read(" in shown.state.code(record)
+    names = list(shown.responses())
+    assert all(name.startswith(("nominal", "measured", "estimate")) for name in names)
+    told = shown.responses()["measured"]
+    np.testing.assert_allclose(
+        told.response, record_response(shown, told.omega), rtol=0.05, atol=1e-2
+    )
+    assert "fq.read('a.csv')" in shown.state.code(record, "fq.read('a.csv')")
     assert "simulate" not in shown.state.code(record)
+
+
+def record_response(shown, omega):
+    """Of the plant behind the fast hold, which is what the slow record was made by."""
+    return fq.two_mass().frequency_response(omega, fq.ZeroOrderHold(0.5e-3)).response
+
+
+def test_what_is_wrong_is_never_green():
+    for name, state in presets().items():
+        text, doubt = sentence(scene(state))
+        right = name in ("Figure 5: the two-mass plant",)
+        assert doubt != right, (name, text)
+    text, doubt = sentence(scene(presets()["Figure 1: a lag at both rates"]))
+    assert doubt
+    assert "where" in text
+    text, doubt = sentence(scene(State(hold="remembered", noise=0.02)))
+    assert not doubt, text
+
+
+def gimbal(J, k, c):
+    return [[0, 1], [-k / J, -c / J]], [[0], [1 / J]], [[0.0, 1.0]], None
+
+
+GIMBAL = fq.GreyBox(
+    gimbal, [fq.Parameter("J", 0.02), fq.Parameter("k", 3.0), fq.Parameter("c", 0.01)]
+)
+
+
+def test_a_plant_of_ones_own_is_explored_where_its_modes_are():
+    own = Own(GIMBAL, ("from my_plant import gimbal as own", "own"))
+    state = State.first(own)
+    mode = np.sqrt(3.0 / 0.02) / (2 * np.pi)
+    assert state.low < mode < state.high < 0.5 / state.dt / state.factor
+    shown = scene(state)
+    assert shown.estimate is not None
+    assert set(shown.estimate.names) == {"J", "k", "c"}
+    assert State.of(state.query(), state) == state
+    code = state.code()
+    assert code.startswith("import freqid as fq\nfrom my_plant import gimbal as own\n")
+    names = {"own": GIMBAL}
+    exec(compile(code.replace(own.lines[0], ""), "explorer", "exec"), names)
+    assert np.allclose(names["est"].values, shown.estimate.values, rtol=1e-6)
+    moved = scene(State.of("?plant=own&x.k=2&hold=remembered", state))
+    assert moved.estimate["k"] == pytest.approx(6.0, rel=1e-4)
+    two = fq.GreyBox(lambda a: ([[-a]], [[1.0, 2.0]], [[1.0]], None), [fq.Parameter("a", 1.0)])
+    with pytest.raises(ValueError, match="one input and one output; this one has 2 and 1"):
+        application(plant=Own(two))
+
+
+@pytest.mark.parametrize("dt", [1e-4, 0.01, 2.0, 60.0])
+def test_own_records_of_any_rate(dt):
+    u = fq.white_noise(600, seed=0)
+    plant = GIMBAL.with_values(J=0.02 * (dt / 0.01) ** 2, c=0.01 * dt / 0.01)
+    record = fq.simulate(plant, u, dt)
+    record = record.with_noise(0.01 * record.y.std(), seed=1)
+    state = State.first(Own(plant), record)
+    assert 0 < state.low < state.high <= 0.5 / dt
+    shown = scene(state, record)
+    assert shown.estimate is not None, shown.message
+    assert shown.estimate["k"] == pytest.approx(3.0, rel=0.05)
+    _, high = state.band(dt, record.duration)
+    assert high < 0.5 / dt
+    assert shown.response is not None
+
+
+def test_a_record_of_two_outputs_says_what_is_drawn():
+    from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
+
+    u = fq.white_noise(400, seed=0)
+    record = fq.Record(u, np.column_stack([u, 2 * u]), 0.01)
+    shown = scene(State.first(None, record), record)
+    text, doubt = sentence(shown)
+    assert doubt
+    assert "1 inputs and 2 outputs" in text
+    for figure in (bias_figure, bode_figure, nyquist_figure, time_figure):
+        assert "layout" in figure(shown)
+
+
+def test_a_remembered_hold_is_not_drawn_in_the_slow_steps():
+    from freqid.pages.explorer.figures import time_figure
+
+    fast = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 2, 0.5e-3), 0.5e-3)
+    slow = fast.decimate(10)
+    shown = scene(State.first(None, slow), slow)
+    names = [part["name"] for part in time_figure(shown)["data"]]
+    assert "as the converter held it" not in names
+    assert "nominal, ZOH at 0.5 ms" in shown.responses()
+    assert time_figure(scene(State.first(None, fast), fast))["data"][0]["line"]["shape"] == "hv"
 
 
 def test_a_record_of_one_sample_is_no_crash():

@@ -16,7 +16,8 @@ import freqid as fq
 from freqid.pages.explorer.doors import LARGEST
 from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 from freqid.pages.explorer.page import application, free_port
-from freqid.pages.explorer.state import HOLDS, PLANTS, State, scene
+from freqid.pages.explorer.scene import scene
+from freqid.pages.explorer.state import HOLDS, PLANTS, State
 
 RNG = np.random.default_rng(0)
 FREQID = [sys.executable, "-m", "freqid.cli"]

@@ -93,6 +93,7 @@ def fit_many(
 
     fitter_of(model)
     processes(n_jobs)
+    flag("verdicts", verdicts)
     if progress is not None:
         flag("progress", progress)
     path = None if path is None else path_of("path", path)

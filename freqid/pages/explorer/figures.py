@@ -9,13 +9,18 @@ import numpy as np
 from freqid.checks import FloatArray
 from freqid.fitting import Z95
 from freqid.models import simulate
-from freqid.pages.explorer.state import Scene, label_of, rounding_said
+from freqid.pages.explorer.scene import Scene, label_of, rounding_said
 from freqid.plots import COLOURS, Part, Shown, bode_axes, bode_curve, bode_traces, line, trace
+
+# curves that look alike wherever they are
+_STYLES = {"estimate": 2, "measured": 5}
+# part of a parameter below which its axis is linear, as far as it then reaches in tens, and ticks
+_LINEAR, _TICKS = 0.01, (0.01, 0.1, 1.0, 10.0, 100.0)
 
 
 def _curves(scene: Scene) -> Iterator[Shown]:
     for index, (name, frf) in enumerate(scene.responses().items()):
-        yield Shown(frf, name, line(2 if name == "estimate" else index))
+        yield Shown(frf, name, line(_STYLES.get(name, index)))
 
 
 def _band(scene: Scene) -> tuple[float, float]:
@@ -25,7 +30,17 @@ def _band(scene: Scene) -> tuple[float, float]:
 
 def bode_figure(shown: Scene) -> Part:
     """Amplitude above phase, the chirp's band shaded."""
-    data = [part for one in _curves(shown) for part in bode_traces(bode_curve(one))]
+    curves = list(_curves(shown))
+    # one plant's phase begins where the others' does
+    along = curves[0].response
+    data = [
+        part
+        for one in curves
+        for part in bode_traces(
+            bode_curve(one, along, scattered=one.label == "measured"),
+            "markers" if one.label == "measured" else "lines",
+        )
+    ]
     low, high = _band(shown)
     ticks = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
     band = {
@@ -43,7 +58,8 @@ def nyquist_figure(shown: Scene) -> Part:
     for frf, name, style in _curves(shown):
         keep = (frf.frequency >= low) & (frf.frequency <= high)
         G = frf.response[0, 0][keep if keep.sum() > 1 else slice(None)]
-        data.append(trace(G.real, G.imag, name or "", style) | {"showlegend": False})
+        mode = "markers" if name == "measured" else "lines"
+        data.append(trace(G.real, G.imag, name or "", style, mode=mode) | {"showlegend": False})
     layout = _base("Nyquist curve, inside the chirp's band") | {
         "xaxis": {"title": {"text": "real part"}},
         "yaxis": {"title": {"text": "imaginary part"}, "scaleanchor": "x"},
@@ -54,18 +70,26 @@ def nyquist_figure(shown: Scene) -> Part:
 def time_figure(shown: Scene) -> Part:
     """Input and output for a few slow samples: what decimation makes of the steps."""
     fast, slow = shown.fast, shown.slow
-    begin = int(0.62 / slow.dt)
+    begin = min(int(0.62 / slow.dt), max(slow.n_samples - 24, 0) // 2)
     count = int(np.clip(0.15 / slow.dt, 12, 60)) if shown.state.sine else 24
     t0, t1 = begin * slow.dt, (begin + count) * slow.dt
     data = []
-    for record, style, held, seen, y, mode in (
-        (fast, line(0), "as the converter held it", "measured", fast.outputs[:, 0], "lines"),
-        (slow, line(1), "as the slow hold has it", "slow steps", simulate_slow(shown),
-         "lines+markers"),
-    ):  # fmt: skip
+    drawn = [(fast, line(0), "as the converter held it", "measured", fast.outputs[:, 0], "lines")]
+    # a hold that is shorter than the samples cannot be drawn from them
+    told = shown.held > 0.999 * fast.input_dt
+    if not told:
+        drawn = [(fast, line(0), "samples", "measured", fast.outputs[:, 0], "lines+markers")]
+    if not shown.measured or shown.state.factor > 1:
+        drawn.append((slow, line(1), "as the slow hold has it", "slow steps", simulate_slow(shown),
+                      "lines+markers"))  # fmt: skip
+    for record, style, held, seen, y, mode in drawn:
         inside = (record.time >= t0 - 1e-12) & (record.time <= t1)
         t, u = record.time[inside], record.inputs[:: record.factor, 0][inside]
-        data.append(trace(t, u, held, style, shape="hv"))
+        steps = told or record is not fast
+        data.append(
+            trace(t, u, held, style, shape="hv") if steps
+            else trace(t, u, held, style, mode="markers")
+        )  # fmt: skip
         data.append(trace(t, y[inside], seen, style, axis=2, mode=mode))
     layout = _base("Input and output, a few samples") | {
         "xaxis": {"title": {"text": "time / s"}, "anchor": "y2", "range": [t0, t1]},
@@ -91,27 +115,44 @@ def bias_figure(shown: Scene) -> Part:
         return {"data": [], "layout": _base(f"Parameters: {note}")}
     ratio = [est[n] / truth[n] for n in est.names]
     std = np.sqrt(np.diag(est.covariance_matrix)) / np.abs([truth[n] for n in est.names])
-    bars = {"type": "data", "array": (Z95 * std).tolist(), "color": "#7f7f7f"}
-    colours = [COLOURS[3] if abs(r - 1) < 0.02 else COLOURS[2] for r in ratio]
-    text = [f"{est[n]:.4g}" for n in est.names]
-    data = [{"type": "bar", "x": list(est.names), "y": (np.array(ratio) - 1).tolist(),
-             "text": text, "textposition": "outside", "marker": {"color": colours},
+    away, half = np.array(ratio) - 1, Z95 * std
+    at, low, high = (_spread(v) for v in (away, away - half, away + half))
+    bars = {"type": "data", "symmetric": False, "array": (high - at).tolist(),
+            "arrayminus": (at - low).tolist(), "color": "#7f7f7f"}  # fmt: skip
+    # good is what a hundredth, or the error bar, explains
+    good = np.abs(away) <= np.maximum(2 * _LINEAR, half)
+    data = [{"type": "bar", "x": list(est.names), "y": at.tolist(),
+             "text": [f"{est[n]:.4g}" for n in est.names], "textposition": "outside",
+             "marker": {"color": [COLOURS[3] if g else COLOURS[2] for g in good]},
              "error_y": bars, "cliponaxis": False, "showlegend": False}]  # fmt: skip
-    reach = max(1.25 * max(abs(r - 1) for r in ratio), 0.05)
+    reach = float(np.abs([low, high]).max())
+    # those that would lie on one another at zero are left out
+    ticks = [t for t in _TICKS if 0.15 * reach <= _spread(t) <= 1.3 * reach] or [_LINEAR]
     layout = _base(f"Parameters: estimate over {shown.truth} value, less one") | {
-        "yaxis": {"title": {"text": "relative error"}, "tickformat": ".0%",
-                  "range": [-reach, reach]},
+        "yaxis": {"title": {"text": "relative error"}, "range": [-1.35 * reach, 1.35 * reach],
+                  "tickvals": [float(_spread(v)) for v in (*(-t for t in ticks), 0.0, *ticks)],
+                  "ticktext": [f"{100 * v:g} %" for v in (*(-t for t in ticks), 0.0, *ticks)]},
     }  # fmt: skip
     return {"data": data, "layout": layout}
 
 
+def _spread(x: FloatArray | float) -> FloatArray:
+    """Errors on an axis that is linear near zero and logarithmic far from it, so that thousands of
+    per cent do not hide tens.
+    """
+    return np.asarray(np.arcsinh(np.asarray(x) / _LINEAR))
+
+
 def _base(title: str) -> Part:
     return {
-        "title": {"text": title, "font": {"size": 14}, "x": 0.02},
-        "margin": {"l": 62, "r": 12, "t": 58, "b": 46},
+        "title": {"text": title, "font": {"size": 14}, "x": 0.02, "y": 0.97},
+        "margin": {"l": 62, "r": 34, "t": 74, "b": 46},
+        # beside the curves, not on the title
+        "modebar": {"orientation": "v", "bgcolor": "rgba(0,0,0,0)"},
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "font": {"size": 11}},
-        "paper_bgcolor": "rgba(255,255,255,0.97)",
-        "plot_bgcolor": "#ffffff",
+        # the page's paper, light or dark
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
         "uirevision": "same",
         "font": {"color": "#1a1a1a"},
     }

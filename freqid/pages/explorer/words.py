@@ -1,0 +1,83 @@
+"""What the explorer says of a fit in a sentence, and what it gives to take away."""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+import numpy as np
+
+from freqid.fitting import Z95
+from freqid.pages.explorer.scene import Scene, label_of, rounding_said
+
+# part by which a number may be off and is right
+_RIGHT = 0.02
+
+
+def sentence(shown: Scene) -> tuple[str, bool]:
+    """What the reader should see, in words, and whether it is a doubt."""
+    est = shown.estimate
+    if shown.measured and not shown.alone:
+        m, p = shown.slow.n_inputs, shown.slow.n_outputs
+        return (
+            f"The record has {m} inputs and {p} outputs; only the first of each is drawn, and the "
+            "plants here have one: select(...) one of each",
+            True,
+        )
+    if est is None:
+        return f"No fit: {shown.message}", True
+    if label_of(shown.state) == "black box, ZOH":
+        return _of_black_box(shown)
+    truth = shown.state.model()
+    std = dict(zip(est.names, np.sqrt(np.diag(est.covariance_matrix)), strict=True))
+    away = {n: est[n] / truth[n] - 1 for n in est.names if truth[n]}
+    # a sign that is impossible says more than any percentage
+    worst = min(away, key=lambda n: (est[n] * truth[n] > 0, -abs(away[n])))
+    text = (
+        f"{worst} = {est[worst]:.4g} where {truth[worst]:.4g} is {shown.truth}"
+        if abs(away[worst]) > 1e-3
+        else f"Every parameter is {shown.truth} to a tenth of a per cent"
+    )
+    # beside one's own record the plant is a guess, and no estimate is wrong for leaving it
+    wrong = not shown.measured and any(
+        abs(part) > max(_RIGHT, Z95 * std[n] / abs(truth[n])) for n, part in away.items()
+    )
+    fitted = f"{est.fit_percent:.4g} % explained" if shown.measured else ""
+    said = ". ".join(part for part in (text, fitted, shown.message) if part)
+    return said, bool(est.signs) or wrong
+
+
+def _of_black_box(shown: Scene) -> tuple[str, bool]:
+    """How far its response is off that of the plant, where it was excited."""
+    est = shown.estimate
+    assert est is not None
+    text = f"Black box: {est.fit_percent:.1f} % explained"
+    if shown.measured:
+        return ". ".join(part for part in (text, shown.message) if part), bool(est.signs)
+    responses = shown.responses()
+    true, found = next(iter(responses.values())), responses["estimate"]
+    inside = (true.frequency >= shown.state.low) & (true.frequency <= shown.state.high)
+    if not inside.any():
+        return text, bool(est.signs)
+    off = np.abs(found.response[0, 0] / true.response[0, 0] - 1)[inside]
+    worst, f = float(off.max()), float(true.frequency[inside][off.argmax()])
+    text += f"; its response is off by up to {100 * worst:.3g} %, at {f:.3g} Hz"
+    return text, bool(est.signs) or worst > _RIGHT
+
+
+def table(shown: Scene) -> str:
+    """The responses that are drawn, as CSV."""
+    with rounding_said():
+        curves = {n: r for n, r in shown.responses().items() if n != "measured"}
+    first = next(iter(curves.values()))
+    columns = {"frequency [Hz]": first.frequency}
+    for name, frf in curves.items():
+        columns[f"{name}: real"] = frf.response[0, 0].real
+        columns[f"{name}: imaginary"] = frf.response[0, 0].imag
+    rows = np.column_stack(list(columns.values()))
+    head = ",".join(f'"{name}"' for name in columns)
+    return "\n".join([head, *(",".join(f"{v:.9g}" for v in row) for row in rows)]) + "\n"
+
+
+def as_link(text: str, kind: str) -> str:
+    """A text as the address of itself, for a link that saves it."""
+    return f"data:{kind};charset=utf-8,{quote(text)}"

@@ -1,0 +1,72 @@
+"""Pictures of what was measured: records in time, and the coherence of their channels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import InputError, an, choice
+from freqid.data import FrequencyResponse, Record
+from freqid.plots.curves import UNITS
+from freqid.plots.interactive import Backend, offers_plotly
+from freqid.plots.style import Panels, drawing, line, stacked
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@offers_plotly
+def plot_record(
+    record: Record, ax: Panels | None = None, backend: Backend = "matplotlib"
+) -> Panels:
+    """Input above output of a ``record`` in time, a zero-order hold as steps; returns the two axes,
+    or, with ``backend="plotly"``, a figure of plotly.
+
+    Raises ValueError for anything but one record.
+
+    >>> import freqid as fq
+    >>> axes = fq.plot_record(fq.Record([0.0, 1.0], [0.0, 0.5], dt=0.1))
+    """
+    if not isinstance(record, Record):
+        raise InputError(f"record={type(record).__name__} is not a Record; draw several one by one")
+    with stacked(ax, 2) as ax:
+        steps = "steps-post" if record.hold.constant else "default"
+        for axis, what, names, time, signals, drawn in (
+            (ax[0], "input", record.input_names, record.input_time, record.inputs, steps),
+            (ax[1], "output", record.output_names, record.time, record.outputs, "default"),
+        ):
+            for index, (name, values) in enumerate(zip(names, signals.T, strict=True)):
+                axis.plot(time, values, label=name, drawstyle=drawn, **line(index))
+            unit = (record.units or {}).get(names[0], "")
+            name = names[0] if len(names) == 1 else what
+            axis.set_ylabel(f"{name} / {unit}" if unit else name)
+            if len(names) > 1:
+                axis.legend()
+        ax[1].set_xlabel("time / s")
+    return ax
+
+
+@offers_plotly
+def plot_coherence(
+    frf: FrequencyResponse,
+    ax: Axes | None = None,
+    unit: str = "Hz",
+    backend: Backend = "matplotlib",
+) -> Axes:
+    """Coherence of the response ``frf`` against frequency, in the ``unit`` "Hz" or "rad/s".
+
+    Returns the axes, or, with ``backend="plotly"``, a figure of plotly. Raises ValueError where it
+    has none.
+    """
+    choice("unit", unit, list(UNITS))
+    an("frf", frf, FrequencyResponse)
+    if frf.coherence is None:
+        raise InputError("frf has no coherence; an average over segments or repeats has one")
+    with drawing(ax) as ax:
+        for index, pair in enumerate(np.ndindex(frf.response.shape[:2])):
+            name = f"{(frf.input_names or 'u')[pair[1]]} to {(frf.output_names or 'y')[pair[0]]}"
+            ax.plot(frf.frequency * UNITS[unit], frf.coherence[pair], label=name, **line(index))
+        ax.set(ylim=(0, 1.02), ylabel="coherence", xlabel=f"frequency / {unit}", xscale="log")
+        ax.legend()
+    return ax
