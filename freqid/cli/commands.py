@@ -231,6 +231,8 @@ app = cyclopts.App(
     help="Physical parameters from chirp experiments, whatever the input did between the samples.",
     version=fq.__version__,
     result_action="return_value",
+    # a list has no opposite: no --empty-band
+    default_parameter=cyclopts.Parameter(negative_iterable=()),
 )
 for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_model, bias, explore):
     app.command(command, name="show" if command is show_file else None)

@@ -11,6 +11,7 @@ from freqid.cli.options import Band, Columns, Dt, Hold, Limits, Texts, hold_of
 from freqid.cli.plants import TEMPLATE, model_of, pairs, texts, with_options
 from freqid.cli.terminal import PICTURES, may_write, progress, show, write_picture
 from freqid.data import whole_file
+from freqid.fitting import in_digits
 
 
 def fit(
@@ -139,7 +140,7 @@ def fit(
         estimate.report(report, title=f"{model} from {data.name}", validation=other)
     if plot is not None:
         write_picture(plot, fq.compare(estimate, record, band=band).plot())
-    show(f"{model}, {estimate.hold!r}", estimate.parameters.reset_index())
+    show(f"{model}, {estimate.hold!r}", in_digits(estimate.parameters).reset_index())
     print(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"

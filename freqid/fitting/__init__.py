@@ -6,6 +6,7 @@ It may import checks, lti, data, excitation, models and frf; inside, ``cost`` st
 
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.digits import in_digits, of_error, rounded
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Z95, Estimate
 from freqid.fitting.findings import Evidence, findings

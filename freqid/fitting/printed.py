@@ -6,6 +6,8 @@ import dataclasses
 from html import escape
 from typing import TYPE_CHECKING
 
+from freqid.fitting.digits import in_digits, of_error, rounded
+
 if TYPE_CHECKING:
     from freqid.fitting.estimate import Estimate
 
@@ -57,10 +59,11 @@ def as_text(est: Estimate) -> str:
     lines = [f"<Estimate: {est.fit_percent:.2f} % fit, cost {est.cost:.4g}, {est.hold!r}"]
     wide = _widened(est)
     for name, row in est.parameters.iterrows():
-        value = f"  {name} = {row['value']:.6g} ± {row['std']:.2g} {row['unit']}".rstrip()
+        value = rounded(row["value"], row["std"])
+        value = f"  {name} = {value} ± {of_error(row['std'])} {row['unit']}".rstrip()
         more = wide.get(str(name), 0.0) > row["std"]
         lines.append(
-            f"{value} (± {wide[str(name)]:.2g} as the experiments differ)" if more else value
+            f"{value} (± {of_error(wide[str(name)])} as the experiments differ)" if more else value
         )
     lines += [f"  {line}" for line in _said(est)]
     return "\n".join(lines) + ">"
@@ -73,4 +76,4 @@ def as_html(est: Estimate) -> str:
     table, wide = est.parameters, _widened(est)
     if wide:
         table = table.assign(widened=[wide.get(str(n), s) for n, s in table["std"].items()])
-    return f"<p>{head}</p>{table.to_html(escape=True)}<ul>{notes}</ul>"
+    return f"<p>{head}</p>{in_digits(table).to_html(escape=True)}<ul>{notes}</ul>"

@@ -86,8 +86,12 @@ def shown(
 
 
 def common_hold(things: Sequence[Drawable]) -> Hold | None:
-    """The hold through which the first measured response was seen."""
+    """The hold through which the first measured response was seen, or that of the first sampled
+    model, which has one inside.
+    """
     held = [t.hold for t in things if isinstance(t, FrequencyResponse) and t.hold is not None]
+    models = [as_model(t) for t in things if isinstance(t, Model | Estimate)]
+    held += [m.own_hold for m in models if m.own_hold is not None]
     return held[0] if held and isinstance(held[0], PeriodicHold) else None
 
 

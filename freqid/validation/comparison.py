@@ -78,7 +78,8 @@ def compare(
 ) -> Comparison:
     """Simulate a model with a record's input, and set the two side by side.
 
-    A FrequencyResponse is compared with the model's own, through the same hold.
+    A FrequencyResponse, or one of ``control``, is compared with the model's own, through the same
+    hold.
 
     Args:
         model: an Estimate, a GreyBox, a rational model or a control system.
@@ -96,6 +97,8 @@ def compare(
     >>> bool(fq.compare(fq.first_order(), record).fit_percent[0] > 99.999)
     True
     """
+    if hasattr(record, "frdata"):
+        record = FrequencyResponse.from_control(record)
     if isinstance(record, FrequencyResponse):
         return _with_response(model, record, hold, band)
     if not isinstance(record, Record):

@@ -252,6 +252,31 @@ def test_the_report_opens_offline(browser, plant, slow, tmp_path):
         unplug(browser, False)
 
 
+def test_a_report_stays_in_order_when_narrowed_and_prints_on_two_pages(
+    browser, plant, slow, tmp_path
+):
+    import base64
+
+    est = fq.fit(plant, slow.with_noise(0.3, seed=1), band=(10, 80))
+    est.report(tmp_path / "report.html")
+    browser.get((tmp_path / "report.html").as_uri())
+    until(browser, "return document.querySelectorAll('.plot .main-svg').length >= 4", "plots")
+    boxes = """return [...document.querySelectorAll('.plot')].map(
+        p => [p, p.querySelector('.main-svg')].map(e => e.getBoundingClientRect().height))"""
+    whole = browser.execute_script(boxes)
+    size = browser.get_window_size()
+    try:
+        browser.set_window_size(600, 1200)
+        time.sleep(0.8)
+        assert browser.execute_script(boxes) == whole
+        assert all(box >= drawn for box, drawn in whole)
+    finally:
+        browser.set_window_size(size["width"], size["height"])
+    paper = {"paperWidth": 8.27, "paperHeight": 11.69, "marginTop": 0.4, "marginBottom": 0.4}
+    pdf = base64.b64decode(browser.execute_cdp_cmd("Page.printToPDF", paper)["data"])
+    assert len(re.findall(rb"/Type\s*/Page[^s]", pdf)) <= 2
+
+
 def test_names_are_escaped_in_the_report(browser, tmp_path):
     evil = "<img src=x onerror=\"document.title='pwned'\">"
     model = fq.GreyBox(

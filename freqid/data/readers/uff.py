@@ -50,5 +50,7 @@ def read_uff(path: Path) -> pd.DataFrame:
                 "pyuff and given to Record.from_logs"
             )
     if not arrays:
-        raise InputError("holds no time responses (data sets 58 of function type 1)")
+        others = any(s.get("type") == 58 and s.get("func_type") == 4 for s in sets)
+        cure = "; it holds frequency responses, which read_response reads" if others else ""
+        raise InputError(f"holds no time responses (data sets 58 of function type 1){cure}")
     return columns_of(arrays)

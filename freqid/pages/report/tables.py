@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.fitting import Estimate
+from freqid.fitting import Estimate, of_error, rounded
 from freqid.pages.report.figures import records
 from freqid.validation import residual_test
 
@@ -33,12 +33,22 @@ def parameters(est: Estimate, bias: Mapping[str, float]) -> Table:
         columns.insert(3, "bias")
     rows = []
     for name, p in est.parameters.head(_ROWS).iterrows():
-        row = [str(name), _number(p["value"], 7), _number(p["std"], 2), _number(p["lower"], 6),
-               _number(p["upper"], 6), _number(p["nominal"], 6), str(p["unit"])]  # fmt: skip
+        value, lower, upper = (_rounded(p[c], p["std"]) for c in ("value", "lower", "upper"))
+        row = [str(name), value, _error(p["std"]), lower, upper, _number(p["nominal"], 6),
+               str(p["unit"])]  # fmt: skip
         if bias:
             row.insert(3, _number(bias.get(str(name), np.nan), 3))
         rows.append(row)
     return Table(columns, rows, max(len(est.names) - _ROWS, 0))
+
+
+def _rounded(x: float, std: float) -> str:
+    """To the digits that its error leaves."""
+    return rounded(x, std) if np.isfinite(x) else _number(x, 2)
+
+
+def _error(std: float) -> str:
+    return of_error(std) if np.isfinite(std) else _number(std, 2)
 
 
 def _number(x: float, digits: int) -> str:
