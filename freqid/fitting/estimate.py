@@ -223,10 +223,18 @@ class Estimate(Questioned, Shown):
         return derived(model, function, self.covariance_matrix[np.ix_(at, at)])
 
     def modes(self) -> pd.DataFrame:
-        """Natural frequency (Hz) and damping ratio of each mode, with standard errors."""
+        """Natural frequency (Hz) and damping ratio of each mode, with standard errors.
+
+        ``in_band`` says whether what was fitted reaches a mode; one outside is what the parameters
+        make of it, not what was seen.
+        """
         # those of an estimate that was kept were written down
         known: pd.DataFrame | None = self.__dict__.get("known_modes")
-        return modes(*self._unknowns) if known is None else known
+        if known is not None:
+            return known
+        low, high = self.band or (0.0, 0.5 / self.dt if self.dt else np.inf)
+        found = modes(*self._unknowns)
+        return found.assign(in_band=found["frequency"].between(low, high))
 
     def pole_scatter(self) -> tuple[ComplexArray, FloatArray]:
         """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""

@@ -48,8 +48,9 @@ def write_uff(path, data):
     write_uff_channels(path, {n: (data["time"], data[n]) for n in ("motor", "angle")})
 
 
-def write_uff_channels(path, channels):
-    """Channels (times, samples) by name."""
+def write_uff_channels(path, channels, func_type=1, labels=None):
+    """Channels (times, samples) by name, with labels of units."""
+    labels = labels or {}
     units = {
         f"{axis}_{what}": value
         for axis in ("abscissa", "ordinate", "orddenom", "z_axis")
@@ -60,11 +61,12 @@ def write_uff_channels(path, channels):
     }  # fmt: skip
     sets = [
         pyuff.prepare_58(
-            func_type=1, ver_num=0, load_case_id=0, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1,
+            func_type=func_type, ver_num=0, load_case_id=0, rsp_node=1, rsp_dir=1, ref_node=1,
+            ref_dir=1,
             rsp_ent_name="NONE", ref_ent_name="NONE", ord_data_type=4, num_pts=len(x), data=y,
             x=x, id1=name, id2="NONE", id3="NONE", id4="NONE", id5="NONE", binary=0,
             abscissa_inc=x[1] - x[0], abscissa_spacing=1, abscissa_min=0.0, z_axis_value=0.0,
-            **units,
+            **{**units, "ordinate_axis_units_lab": labels.get(name, "NONE")},
         )
         for name, (x, y) in channels.items()
     ]  # fmt: skip
@@ -195,3 +197,20 @@ def test_check_record_names_bad_channels(rng):
     }  # fmt: skip
     assert found.set_index("channel").loc["coarse", "value"] == pytest.approx(0.1)
     assert len(fq.check_record(fq.Record(good, good, 1e-3))) == 0
+
+
+def test_units_of_a_uff_are_kept(tmp_path, record):
+    data = columns(record)
+    channels = {n: (data["time"], data[n]) for n in ("motor", "angle")}
+    write_uff_channels(tmp_path / "a.uff", channels, labels={"motor": "N", "angle": "m/s2"})
+    back = fq.read(tmp_path / "a.uff", inputs="motor", outputs="angle")
+    assert back.units == {"motor": "N", "angle": "m/s2"}
+    assert (back.input_names, back.output_names) == (("motor",), ("angle",))
+
+
+def test_a_uff_of_responses_is_sent_to_its_reader(tmp_path, record):
+    data = columns(record)
+    channels = {n: (data["time"], data[n]) for n in ("motor", "angle")}
+    write_uff_channels(tmp_path / "a.uff", channels, func_type=4)
+    with pytest.raises(ValueError, match="which read_response reads"):
+        fq.read(tmp_path / "a.uff")

@@ -147,3 +147,17 @@ def test_records_with_more_than_their_samples_are_left_to_a_fit():
     slow = [r.decimate(2, keep_input=True) for r in records]
     known = [r.with_conditions(q=1.0) for r in records]
     assert minima(plant, slow + known, {}) == [None] * 6
+
+
+def test_a_mode_that_samples_cannot_see_is_left_to_a_search():
+    """Sampled at 10 ms a mode of 70 Hz looks like one of 30 Hz: both explain the data alike."""
+
+    def axis(w, g):
+        return [[0, 1], [-(w**2), -0.05 * w]], [[0], [g * w**2]], [[1.0, 0]], None
+
+    true = fq.GreyBox(axis, [fq.Parameter("w", 2 * np.pi * 30), fq.Parameter("g", 1.0)])
+    r = fq.simulate(true, fq.white_noise(500, seed=0), 0.01)
+    r = r.with_noise(0.02 * r.y.std(), seed=0)
+    above = minima(true, [r], {"start": {"w": 2 * np.pi * 70.3}})[0]
+    assert above is None or above.values["w"] < 2 * np.pi * 50
+    assert minima(true, [r], {"start": {"w": 2 * np.pi * 31}})[0] is not None

@@ -113,3 +113,13 @@ def test_nothing_at_all_is_drawn_as_nothing():
     nothing = fq.FrequencyResponse([1.0, 2.0], np.zeros(2), variance=np.ones(2))
     axes = fq.bode(nothing, ax=Figure().subplots(3))
     axes[0].figure.canvas.draw()
+
+
+def test_beside_a_sampled_model_a_plant_is_seen_through_its_hold(plant):
+    record = fq.simulate(plant, fq.chirp(10, 80, 5, 1e-3), 1e-3)
+    black = fq.fit(fq.OutputError(3), record)
+    amplitude, phase = fq.bode(plant, black, labels=["plant", "black box"], unit="Hz")
+    (f, own), (at, sampled) = curves(phase)
+    inside = (f > 12) & (f < 78)
+    assert np.abs(own - np.interp(f, at, sampled))[inside].max() < 0.1
+    assert amplitude.get_legend().get_title().get_text() == "through a zero-order hold of 1 ms"

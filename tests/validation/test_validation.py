@@ -291,3 +291,16 @@ def test_the_bias_bar(plant, slow):
 def test_short_records_are_named(plant, short):
     with pytest.raises(ValueError, match="25 lags need 100"):
         fq.residual_test(plant, short.slice(0, 0.1))
+
+
+def test_a_response_of_control_is_compared_as_one_of_ours():
+    import control
+
+    plant = fq.first_order()
+    omega = np.geomspace(1, 1000, 40)
+    frd = control.frd(plant.to_control(), omega)
+    assert fq.compare(plant, frd).fit_percent[0] > 99.999
+    own = fq.compare(plant.with_values(a=80.0), fq.FrequencyResponse.from_control(frd))
+    theirs = fq.compare(plant.with_values(a=80.0), frd)
+    assert theirs.fit_percent == pytest.approx(own.fit_percent)
+    assert own.fit_percent[0] < 95

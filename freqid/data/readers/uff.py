@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# what stands for no unit
+_NO_UNIT = {"", "NONE", "UNKNOWN"}
 # part of the length by which the times of two channels may differ by rounding
 _AGREE = 1e-6
 
@@ -33,6 +35,7 @@ def read_uff(path: Path) -> pd.DataFrame:
         raise damaged("UFF58", error) from None
     sets = [sets] if isinstance(sets, dict) else list(sets)
     arrays: dict[str, Array] = {}
+    units: dict[str, str] = {}
     for number, s in enumerate(sets):
         if s.get("type") != 58 or s.get("func_type") != 1:
             continue
@@ -42,6 +45,8 @@ def read_uff(path: Path) -> pd.DataFrame:
         if name in arrays:
             raise InputError(f"holds two channels called {name!r}; rename one of them")
         arrays[name] = np.real(s["data"])
+        if (unit := str(s.get("ordinate_axis_units_lab") or "").strip()).upper() not in _NO_UNIT:
+            units[name] = unit
         times = arrays.setdefault("time", np.asarray(s["x"], dtype=float))
         own = np.asarray(s["x"], dtype=float)
         if own.shape != times.shape or np.abs(own - times).max() > _AGREE * np.ptp(times):
@@ -53,4 +58,4 @@ def read_uff(path: Path) -> pd.DataFrame:
         others = any(s.get("type") == 58 and s.get("func_type") == 4 for s in sets)
         cure = "; it holds frequency responses, which read_response reads" if others else ""
         raise InputError(f"holds no time responses (data sets 58 of function type 1){cure}")
-    return columns_of(arrays)
+    return columns_of({f"{n} [{units[n]}]" if n in units else n: x for n, x in arrays.items()})

@@ -59,7 +59,8 @@ class Left:
     @np.errstate(all="ignore")
     def certain(self) -> BoolArray:
         """Of which records nothing is in doubt, (S,): every parameter is told and physical, and
-        what is left is white noise of which poles of their own would explain no more.
+        what is left is white noise of which poles of their own would explain no more; and no mode
+        lies where samples cannot see it.
         """
         s = self.costs.structure
         physical = np.array([p.physical for p in s.parameters]).T / s.scale
@@ -68,7 +69,20 @@ class Left:
         told = (self.std <= _OPEN * np.abs(self.x)).all(axis=1)
         noisy = self.at.cost > _EXACT * self.costs.energy
         even = levels_of_evenness(self._lines()).min(axis=-1) >= _LEVEL
-        return np.asarray(inside & told & noisy & even & (self._level() >= _LEVEL))
+        return np.asarray(inside & told & noisy & even & self._seen & (self._level() >= _LEVEL))
+
+    @cached_property
+    def _poles(self) -> ComplexArray:
+        """Those of the plants in rad/s, (S, n)."""
+        s = self.costs.structure
+        A = s.model.linearise_many(self.x * s.scale, s.physical_names).at.A
+        return np.linalg.eigvals(A).astype(complex)
+
+    @property
+    def _seen(self) -> BoolArray:
+        """Whether all modes lie below the Nyquist frequency of the hold, (S,)."""
+        assert isinstance(self.e.hold, PeriodicHold)
+        return np.asarray((self._poles.imag <= np.pi / self.e.hold.period).all(axis=1))
 
     def _lines(self) -> ComplexArray:
         """Residuals (S, outputs, K)."""
@@ -82,8 +96,7 @@ class Left:
         """
         s, hold = self.costs.structure, self.e.hold
         assert isinstance(hold, PeriodicHold)
-        A = s.model.linearise_many(self.x * s.scale, s.physical_names).at.A
-        phi = np.exp(np.linalg.eigvals(A) * hold.period)[..., None]
+        phi = np.exp(self._poles * hold.period)[..., None]
         z = self.e.points.z
         one, other = 1 / (z - phi), 1 / (z - phi.conj())
         # a pair of poles has real coefficients of a sum and of a difference
@@ -92,7 +105,7 @@ class Left:
             for a, b in ((one, other), (one**2, other**2))
         ]
         if hold.reaches_next or s.model.state_space().D.any():
-            shapes.append(np.ones((len(A), 1, len(z)), complex))
+            shapes.append(np.ones((len(phi), 1, len(z)), complex))
         gain, count = self._explained(np.concatenate(shapes, axis=1))
         more = np.maximum(count - self.x.shape[1], 0)
         below = np.maximum(self.freedom - more, 1)

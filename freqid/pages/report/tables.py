@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from freqid.checks import InputError
 from freqid.fitting import Estimate, of_error, rounded
 from freqid.pages.report.figures import records
 from freqid.validation import residual_test
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # rows of a table that a page can carry
 _ROWS = 500
@@ -85,10 +88,18 @@ def modes(est: Estimate) -> Table:
              "time_constant_std"]  # fmt: skip
     found = est.modes()
     rows = [
-        [str(i + 1), *(_number(float(mode[n]), 2 if n.endswith("std") else 6) for n in named)]
+        [
+            f"{i + 1}{_outside(mode)}",
+            *(_number(float(mode[n]), 2 if n.endswith("std") else 6) for n in named),
+        ]
         for i, (_, mode) in enumerate(found.head(_ROWS).iterrows())
     ]
     return Table(columns, rows, max(len(found) - _ROWS, 0))
+
+
+def _outside(mode: pd.Series) -> str:
+    """What is said of a mode that the data did not reach."""
+    return "" if mode.get("in_band", True) else ", outside the band"
 
 
 def spread(est: Estimate) -> Table:
