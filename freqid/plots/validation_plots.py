@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import table_with
+from freqid.checks import FloatArray, InputError, flag, table_with
 from freqid.data import FrequencyResponse
 from freqid.plots.bode_nyquist import bode
 from freqid.plots.interactive import Backend, offers_plotly
@@ -19,37 +19,82 @@ if TYPE_CHECKING:
 
     from freqid.validation import Comparison
 
+# samples of the stretch that is looked at closely
+_FEW, _MANY = 40, 80
+
 
 @offers_plotly
 def plot_comparison(
-    comparison: Comparison, ax: Panels | None = None, backend: Backend = "matplotlib"
+    comparison: Comparison,
+    ax: Panels | None = None,
+    zoom: bool = False,
+    backend: Backend = "matplotlib",
 ) -> Panels:
     """Measured and simulated above their difference, two axes for each output.
 
-    Returns the axes, or, with ``backend="plotly"``, a figure of plotly.
+    With ``zoom`` two more for each: the stretch in which the difference is largest, sample by
+    sample, and the spectra of the output and of the difference. Returns the axes, or, with
+    ``backend="plotly"``, a figure of plotly. Raises ValueError for too few axes, or a ``zoom`` into
+    a response.
     """
     record = comparison.record
+    flag("zoom", zoom)
     if isinstance(record, FrequencyResponse):
+        if zoom:
+            raise InputError("zoom=True shows samples; a response has none")
         shown = dataclasses.replace(record, response=comparison.simulated, variance=None)
         return bode(record, shown, labels=["measured", "model"], ax=ax)
-    count = record.n_outputs
+    count, rows = record.n_outputs, 4 if zoom else 2
     simulated = comparison.simulated.reshape(len(comparison.simulated), -1)
     residuals = comparison.residuals.reshape(simulated.shape)
     time = record.time[: len(simulated)]
-    with stacked(ax, 2 * count, (7.2, 4.2 * count), [2.5, 1] * count) as ax:
+    heights = [2.5, 1, 2, 1.5] if zoom else [2.5, 1]
+    size = 7.2, (7.8 if zoom else 4.2) * count
+    with stacked(ax, rows * count, size, heights * count, sharex=not zoom) as ax:
         for o, name in enumerate(record.output_names):
             unit = (record.units or {}).get(name, "")
             label = f"{name} / {unit}" if unit else name
-            above, below = ax[2 * o], ax[2 * o + 1]
-            above.plot(time, comparison.measured[:, o], label="measured", **line(0))
+            above, below = ax[rows * o], ax[rows * o + 1]
+            measured = comparison.measured[:, o]
+            above.plot(time, measured, label="measured", **line(0))
             text = f"simulated, {comparison.fit_percent[o]:.1f} %"
             above.plot(time, simulated[:, o], label=text, **line(2))
             above.set_ylabel(label)
             above.legend(loc="upper right", ncols=2)
             below.plot(time, residuals[:, o], color=ink(1), linewidth=0.8)
             below.set_ylabel("difference")
-        ax[-1].set_xlabel("time / s")
+            if zoom:
+                worst = _worst(residuals[:, o], record.dt)
+                near, spectra = ax[rows * o + 2], ax[rows * o + 3]
+                for values, style in ((measured, line(0)), (simulated[:, o], line(2))):
+                    near.plot(time[worst], values[worst], marker=".", markersize=3, **style)
+                near.set(ylabel=label, xlabel="time / s, where the difference is largest")
+                above.axvspan(time[worst][0], time[worst][-1], color=ink(6), alpha=0.25, lw=0)
+                _draw_spectra(spectra, measured, residuals[:, o], record.dt)
+        if not zoom:
+            ax[-1].set_xlabel("time / s")
     return ax
+
+
+def _worst(residual: FloatArray, dt: float) -> slice:
+    """The stretch of some dozens of samples, or of a second, that holds most of what is left."""
+    N = len(residual)
+    length = int(np.clip(1 / dt, min(_FEW, N), max(min(_MANY, N), 1)))
+    power = np.concatenate([[0.0], np.cumsum(residual**2)])
+    first = int(np.argmax(power[length:] - power[:-length]))
+    return slice(first, first + length)
+
+
+def _draw_spectra(ax: Axes, measured: FloatArray, residual: FloatArray, dt: float) -> None:
+    """Amplitudes of what was measured and of what is left, over frequency."""
+    f = np.fft.rfftfreq(len(measured), dt)[1:]
+    for values, style, label in (
+        (measured, line(0), "measured"), (residual, line(1), "difference"),
+    ):  # fmt: skip
+        amplitude = 2 * np.abs(np.fft.rfft(values - values.mean()))[1:] / len(values)
+        ax.plot(f, amplitude, label=label, **(style | {"linewidth": 0.8}))
+    ax.set(xscale="log", yscale="log", xlabel="frequency / Hz", ylabel="amplitude")
+    ax.legend(loc="upper right", ncols=2)
 
 
 @offers_plotly

@@ -53,12 +53,17 @@ class Comparison:
     def plot(
         self,
         ax: Sequence[Axes] | None = None,
+        zoom: bool = False,
         backend: Literal["matplotlib", "plotly"] = "matplotlib",
     ) -> Panels:
-        """Measured and simulated outputs above their difference; see ``freqid.plot_comparison``."""
+        """Measured and simulated outputs above their difference, two axes for each output.
+
+        With ``zoom`` two more: the stretch in which the difference is largest, and the spectra of
+        output and difference; ``backend="plotly"`` makes a figure of plotly.
+        """
         from freqid.plots import plot_comparison
 
-        return plot_comparison(self, ax=ax, backend=backend)
+        return plot_comparison(self, ax=ax, zoom=zoom, backend=backend)
 
     def __repr__(self) -> str:
         each = ", ".join(

@@ -110,3 +110,27 @@ def test_noise_turns_no_phase_away_from_its_model():
             along = np.interp(f, model.get_xdata(), model.get_ydata())
             assert np.abs(measured.get_ydata() - along).max() < 181
             plt.close("all")
+
+
+def test_a_comparison_zooms_into_its_worst_stretch(plant, slow):
+    wrong = slow.outputs.copy()
+    wrong[700:720] += 5.0
+    record = fq.Record(slow.u, wrong[:, 0], slow.dt, hold=slow.hold, output_names=["speed"])
+    comparison = fq.compare(plant, record)
+    axes = comparison.plot(zoom=True)
+    assert len(axes) == 4
+    near = axes[2].get_lines()[0].get_xdata()
+    assert near[0] <= record.time[700]
+    assert near[-1] >= record.time[719]
+    assert 40 <= len(near) <= 80
+    f, amplitude = axes[3].get_lines()[1].get_data()
+    assert f[-1] == pytest.approx(record.nyquist)
+    # Parseval: half of the squares of the amplitudes is the variance, but for the last line
+    left = comparison.residuals.ravel()[: len(record.y)]
+    assert (amplitude**2).sum() / 2 == pytest.approx(np.var(left), rel=0.01)
+    assert len(comparison.plot()) == 2
+    with pytest.raises(ValueError, match="a response has none"):
+        fq.compare(plant, fq.etfe(slow, band=(10, 80))).plot(zoom=True)
+    with pytest.raises(ValueError, match="ax holds 2 axes; expected 4"):
+        comparison.plot(ax=plt.subplots(2, 1)[1], zoom=True)
+    plt.close("all")
