@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Real
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,8 @@ IntArray = npt.NDArray[np.int64]
 
 
 T = TypeVar("T")
+R = TypeVar("R")
+P = ParamSpec("P")
 # what a pickle keeps of an object
 State = dict[str, Any]
 # processes that may be asked for; samples that a signal may have: 64 GiB of them
@@ -220,3 +223,19 @@ def channel_names(
     if len(names) != count:
         raise InputError(f"{argument}={list(names)} names {len(names)} of {count} channels")
     return names
+
+
+def had_elsewhere(**cures: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function that says of arguments it does not have where they are had, by name."""
+
+    def told(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def checked(*args: P.args, **options: P.kwargs) -> R:
+            for name in options:
+                if name in cures:
+                    raise InputError(f"{name} is no argument of {function.__name__}: {cures[name]}")
+            return function(*args, **options)
+
+        return checked
+
+    return told

@@ -8,7 +8,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from freqid.checks import InputError, choice, flag, listed, named_values, whole
+from freqid.checks import (
+    InputError,
+    choice,
+    flag,
+    had_elsewhere,
+    listed,
+    named_values,
+    whole,
+)
 from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
@@ -20,6 +28,7 @@ from freqid.fitting.fitters import Near, SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
+from freqid.fitting.printed import call_of
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
 from freqid.fitting.stamped import check_stamped
@@ -34,6 +43,13 @@ _LOG = logging.getLogger(__name__)
 _KNOWN = (grey_box, black_box)
 
 
+@had_elsewhere(
+    bounds="they are the model's; model.with_bounds(k=(1e4, 1e6))",
+    prior="it is the model's; model.with_prior(k=(1.5e5, 1e4))",
+    fix="what is known is the model's; model.fix('k')",
+    fixed="what is known is the model's; model.fix('k')",
+    method="there is one; start, n_starts and weights are what can be chosen",
+)
 @in_one_blas_thread
 def fit(
     model: object,
@@ -184,7 +200,7 @@ def fit(
         "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
         "error": error,
     }  # fmt: skip
-    call = _call(model, len(sets), given)
+    call = call_of(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings, share)
     est = dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
@@ -270,22 +286,3 @@ def _noise_models(weights: object, data: object, sets: Sequence[DataSet]) -> lis
     if len(given) != len(sets):
         raise InputError(f"weights has {len(given)} entries for {len(sets)} experiments")
     return [as_noise_model(w, d) for w, d in zip(given, sets, strict=True)]
-
-
-def _call(model: object, count: int, given: Mapping[str, object]) -> str:
-    """The call of ``fit`` as a user would type it, arguments at their defaults left out."""
-    usual = {
-        "initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency",
-        "reference": "auto", "loss": "linear", "error": "linear",
-    }  # fmt: skip
-    shown = []
-    for name, value in given.items():
-        if value is None or (name in usual and isinstance(value, type(usual[name]))
-                             and value == usual[name]):  # fmt: skip
-            continue
-        if name == "start":
-            value = dict(value)  # type: ignore[call-overload]
-        text = repr(value) if not hasattr(value, "shape") else f"<array {value.shape}>"
-        shown.append(f"{name}={text}")
-    data = "data" if count == 1 else f"[{count} data sets]"
-    return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"

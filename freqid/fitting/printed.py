@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -77,3 +78,22 @@ def as_html(est: Estimate) -> str:
     if wide:
         table = table.assign(widened=[wide.get(str(n), s) for n, s in table["std"].items()])
     return f"<p>{head}</p>{in_digits(table).to_html(escape=True)}<ul>{notes}</ul>"
+
+
+def call_of(model: object, count: int, given: Mapping[str, object]) -> str:
+    """The call of ``fit`` as a user would type it, arguments at their defaults left out."""
+    usual = {
+        "initial_state": "estimate", "n_starts": "auto", "seed": 0, "domain": "frequency",
+        "reference": "auto", "loss": "linear", "error": "linear",
+    }  # fmt: skip
+    shown = []
+    for name, value in given.items():
+        if value is None or (name in usual and isinstance(value, type(usual[name]))
+                             and value == usual[name]):  # fmt: skip
+            continue
+        if name == "start":
+            value = dict(value)  # type: ignore[call-overload]
+        text = repr(value) if not hasattr(value, "shape") else f"<array {value.shape}>"
+        shown.append(f"{name}={text}")
+    data = "data" if count == 1 else f"[{count} data sets]"
+    return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"

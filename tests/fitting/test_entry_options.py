@@ -219,3 +219,14 @@ def test_a_fit_says_what_it_does_to_those_who_listen(caplog, capsys):
     assert "gone: " in caplog.text
     # nobody listens: nothing is printed
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("option", "cure"), [("bounds", "with_bounds"), ("prior", "with_prior"), ("fix", "fix")]
+)
+def test_what_belongs_to_the_model_is_said(option, cure):
+    record = fq.simulate(fq.first_order(), fq.white_noise(50), 1e-3)
+    with pytest.raises(ValueError, match=rf"{option} is no argument of fit: .*model\.{cure}"):
+        fq.fit(fq.first_order(), record, **{option: {"a": (1, 2)}})
+    with pytest.raises(TypeError, match="boundz"):
+        fq.fit(fq.first_order(), record, boundz=1)
