@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, positive, real, unknown
+from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
 from freqid.data.regular_time import on_a_grid
 from freqid.data.remembered import (
@@ -47,8 +48,11 @@ def record_of(
     resample: bool,
 ) -> Record:
     """The record of that kind that a frame holds: columns to channels, time to periods."""
-    if not hasattr(frame, "columns"):
-        raise InputError(f"frame is a {type(frame).__name__}; expected a pandas.DataFrame")
+    frame, own_units, own_step, own_inputs = as_pandas(frame)
+    units = own_units if units is None else units
+    dt = own_step if dt is None else dt
+    if own_inputs is not None and inputs is None and outputs is None:
+        inputs, outputs = own_inputs, [c for c in frame.columns if c not in own_inputs]
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]

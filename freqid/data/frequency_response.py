@@ -211,6 +211,8 @@ class FrequencyResponse:
     def from_frame(cls, frame: pd.DataFrame) -> FrequencyResponse:
         """A response from what ``to_frame`` gives, or from a table as ``read_response`` takes it.
 
+        A table of pandas, polars or another library that narwhals knows.
+
         ValueError, with the columns, for a frame that holds none.
 
         >>> FrequencyResponse.from_frame(FrequencyResponse([1.0], [1j]).to_frame()).response

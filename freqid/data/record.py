@@ -237,7 +237,7 @@ class Record(Signals):
         units: Mapping[str, str] | None = None,
         resample: bool = False,
     ) -> Record:
-        """A record from the columns of a DataFrame.
+        """A record from a DataFrame (pandas, polars, …), an xarray.Dataset, or u, y, sampling_time.
 
         The time is a column ``time`` or an index of numbers (s), times or timedeltas called
         ``time``; it must be uniform. ``dt`` (s) is for frames without one. Where neither inputs

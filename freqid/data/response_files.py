@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, numbers, path_of
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
+from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.remembered import kept_of_response
 from freqid.data.tables import frame_of
@@ -71,12 +72,11 @@ def read_response(
 
 def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> FrequencyResponse:
     """The response that a table holds; ValueError, with its columns, where that is none."""
-    if not hasattr(frame, "columns"):
-        raise InputError(f"frame is a {type(frame).__name__}; expected a pandas.DataFrame")
+    frame, own_units, *_ = as_pandas(frame)
     names = [str(c) for c in frame.columns]
     if {"frequency", "output", "input", "real", "imag"} <= set(names):
         return _long(frame)
-    told = dict(units or {})
+    told = dict(units or own_units)
     at = _one(names, FREQUENCY, told) or names[0]
     f = _numbers(frame, at) * in_hertz(at, told.get(at, ""))
     rest = [n for n in names if n != at]

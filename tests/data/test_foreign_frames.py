@@ -1,0 +1,88 @@
+"""Tables of polars, pyarrow, xarray and nonlinear_benchmarks are records and responses."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+import xarray as xr
+
+import freqid as fq
+
+T = np.arange(40) * 5e-3
+U, Y = np.sin(T * 100), np.cos(T * 70)
+
+
+def tables():
+    columns = {"time": T, "torque": U, "speed": Y}
+    at = ("time", T)
+    return {
+        "pandas": pd.DataFrame(columns),
+        "polars": pl.DataFrame(columns),
+        "pyarrow": pa.table(columns),
+        "xarray": xr.Dataset({"torque": ("time", U), "speed": ("time", Y)}, {"time": T}),
+        "xarray, an array": xr.DataArray(
+            np.c_[U, Y], [at, ("channel", ["torque", "speed"])], name="axis"
+        ),
+    }
+
+
+@pytest.mark.parametrize("library", tables())
+def test_each_library_gives_the_same_record(library):
+    record = fq.Record.from_frame(tables()[library], inputs="torque", outputs="speed")
+    assert record.dt == 5e-3
+    assert record.input_names == ("torque",)
+    assert record.output_names == ("speed",)
+    np.testing.assert_array_equal(record.u, U)
+    np.testing.assert_array_equal(record.y, Y)
+
+
+def test_stamps_of_polars_are_times():
+    start = np.datetime64("2026-01-05T08:00:00", "us")
+    stamps = start + np.round(T * 1e6).astype("timedelta64[us]")
+    frame = pl.DataFrame({"time": stamps, "u": U, "y": Y})
+    assert fq.Record.from_frame(frame).dt == pytest.approx(5e-3, rel=1e-12)
+
+
+def test_units_of_xarray_are_kept():
+    data = xr.Dataset({"u": ("time", U, {"units": "Nm"}), "y": ("time", Y)}, {"time": T})
+    assert dict(fq.Record.from_frame(data).units) == {"u": "Nm"}
+
+
+def test_a_benchmark_data_set_brings_its_sample_time_and_its_channels():
+    data = SimpleNamespace(u=np.c_[U, Y], y=Y, sampling_time=2e-3)
+    record = fq.Record.from_frame(data)
+    assert record.dt == 2e-3
+    assert record.input_names == ("u1", "u2")
+    assert record.output_names == ("y",)
+
+
+def test_a_response_in_polars():
+    frf = fq.FrequencyResponse([1.0, 2.0], [1j, 0.5])
+    back = fq.FrequencyResponse.from_frame(pl.from_pandas(frf.to_frame()))
+    np.testing.assert_array_equal(back.response, frf.response)
+    table = pl.DataFrame({"Frequency [Hz]": [1.0, 2.0], "Mag [dB]": [20.0, 0.0], "Phase": [0, 90]})
+    found = fq.FrequencyResponse.from_frame(table)
+    np.testing.assert_allclose(found.response[0, 0], [10, 1j], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("frame", "says"),
+    [
+        (pl.DataFrame({"u": [1.0]}).lazy(), "LazyFrame; collect"),
+        ([1.0, 2.0], "list; expected a DataFrame"),
+        (xr.Dataset({"u": (("a", "b"), np.ones((2, 3)))}), "dimensions"),
+        (xr.DataArray([1.0, 2.0]), "DataArray of the dimensions"),
+        (SimpleNamespace(u=np.ones((2, 2, 2)), y=[1.0], sampling_time=1), "frame.u has the shape"),
+        (SimpleNamespace(u=[1.0, 2.0], y=[1.0, 2.0], sampling_time=None), "give dt"),
+        (
+            SimpleNamespace(u=[1.0, 2.0], y=[1.0], sampling_time=1.0),
+            "different lengths, {'u': 2, 'y': 1}",
+        ),
+    ],
+)
+def test_what_is_no_table_is_named(frame, says):
+    with pytest.raises(ValueError, match=says):
+        fq.Record.from_frame(frame)
