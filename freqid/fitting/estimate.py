@@ -19,6 +19,7 @@ from freqid.fitting.findings import Finding, Inquired
 from freqid.fitting.questioned import Questioned
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.shown import Shown
+from freqid.fitting.tied import with_tied
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.profiles import profile_intervals
@@ -143,12 +144,15 @@ class Estimate(Questioned, Shown):
 
     @cached_property
     def parameters(self) -> pd.DataFrame:
-        """Value, standard error, 95 % interval, nominal value and unit of each free parameter."""
+        """Value, standard error, 95 % interval, nominal value and unit of each parameter.
+
+        The free ones in the order of ``names``, then those tied to them.
+        """
         import pandas as pd
 
         std = np.sqrt(np.diag(self.covariance_matrix))
         lower, upper = self._limits(std)
-        return pd.DataFrame(
+        free = pd.DataFrame(
             {
                 "value": self.values,
                 "std": std,
@@ -159,6 +163,7 @@ class Estimate(Questioned, Shown):
             },
             index=pd.Index(list(self.names), name="parameter"),
         )
+        return with_tied(free, self, Z95)
 
     def _limits(self, std: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends of 95 % intervals, inside the bounds."""

@@ -13,11 +13,12 @@ import numpy as np
 from freqid.checks import InputError, path_of
 from freqid.data import DataSet, Record, whole_file
 from freqid.fitting.clock_offset import NAME, behind_offset
-from freqid.fitting.estimate import Estimate
+from freqid.fitting.estimate import Z95, Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.grades import Verdict
 from freqid.fitting.met import data_digest, remembered
 from freqid.fitting.search.verdict import Witness
+from freqid.fitting.tied import with_tied
 from freqid.models import GreyBox, hold_of_dict, hold_to_dict, model_of_dict, model_to_dict
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def written(est: Estimate) -> Written:
     """Everything that is kept of an estimate."""
     import freqid
 
-    table, (said, step) = est.parameters, remembered(est)
+    table, (said, step) = est.parameters.loc[list(est.names)], remembered(est)
     return {
         **est.to_dict(),
         "schema": SCHEMA,
@@ -157,7 +158,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         verdict=Verdict(verdict["grade"], list(verdict["reasons"])),
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"])
                   for w in kept["findings"]],
-        parameters=table,
+        parameters=with_tied(table, est, Z95),
         digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip

@@ -40,7 +40,11 @@ def derived(
         down = np.asarray(function(model.with_values(**{p.name: p.value - step})), dtype=float)
         slope.append((up - down) / (2 * step))
     J = np.stack(slope, axis=-1)
-    return at, np.sqrt(np.einsum("...a,ab,...b->...", J, covariance, J))
+    # what the data do not tell has an infinite variance, and says nothing of what is not of it
+    moved = J[..., :, None] * J[..., None, :]
+    parts = np.where(moved != 0, moved * np.where(moved != 0, covariance, 0), 0)
+    # rounding may leave a variance of nothing below zero
+    return at, np.sqrt(np.maximum(parts.sum(axis=(-2, -1)), 0))
 
 
 def modes(structure: EstimatedStructure, x: FloatArray, spread: Spread) -> pd.DataFrame:
