@@ -52,3 +52,14 @@ def test_plants_whose_black_box_was_lost_itself(studies, case):
     est = fq.fit(plant, record, start=plants.moved(plant, rng, 3.0))
     from_truth = fq.fit(plant, record, n_starts=1)
     assert est.cost <= from_truth.cost * (1 + studies[0].WORSE)
+
+
+def test_a_valley_without_an_end_is_not_unanimity(studies):
+    """Every start of a dozen drifts along it, to one cost, and the minimum is elsewhere."""
+    from search import plants
+
+    plant, record, _, rng = plants.random_experiment(1180)
+    slow = fq.Record(record.u[::5], record.y[::5], 5 * record.dt, hold="zoh")
+    est = fq.fit(plant, slow, start=plants.moved(plant, rng, 3.0))
+    best = fq.fit(plant, slow, n_starts=100)
+    assert est.cost <= best.cost * (1 + studies[0].WORSE)

@@ -168,11 +168,11 @@ class StopRule:
             # the model lacks something, or this is not its minimum
             return found.n_agreed >= (_DOUBTED if both else _ALIKE)
         level = self.bound.level(cost)
-        wanted = agreement(level)
-        if not self.determined(found):
+        wanted, determined = agreement(level), self.determined(found)
+        if not determined:
             # along what the data leave open no two starts need end alike
             wanted = 1 if both and level > _RARE else _DOUBTED
         # a gap that is hardly chance is not believed before both kinds of starts were tried, unless
-        # nearly all of the first kind have ended alike
-        one = found.n_agreed >= max(_ALIKE, _UNANIMOUS * found.n_starts)
+        # nearly all of the first kind have ended alike, and not because a valley has no end
+        one = determined and found.n_agreed >= max(_ALIKE, _UNANIMOUS * found.n_starts)
         return found.n_agreed >= wanted and (both or one or level > _RARE)
