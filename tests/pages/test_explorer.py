@@ -9,12 +9,14 @@ import subprocess
 import sys
 import time
 import urllib.request
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.pages.explorer import answers
 from freqid.pages.explorer.page import application, explore, free_port
 from freqid.pages.explorer.scene import scene
 from freqid.pages.explorer.state import Own, State, presets
@@ -357,9 +359,9 @@ def test_an_own_record_takes_the_place_of_the_simulated_one():
     assert shown.slow.n_samples == 400
     assert shown.estimate["d"] < 0
     # nobody knows what is true of somebody's own record
-    names = list(shown.responses())
+    names = list(shown.responses)
     assert all(name.startswith(("nominal", "measured", "estimate")) for name in names)
-    told = shown.responses()["measured"]
+    told = shown.responses["measured"]
     np.testing.assert_allclose(
         told.response, record_response(shown, told.omega), rtol=0.05, atol=1e-2
     )
@@ -451,7 +453,7 @@ def test_a_remembered_hold_is_not_drawn_in_the_slow_steps():
     shown = scene(State.first(None, slow), slow)
     names = [part["name"] for part in time_figure(shown)["data"]]
     assert "as the converter held it" not in names
-    assert "nominal, ZOH at 0.5 ms" in shown.responses()
+    assert "nominal, ZOH at 0.5 ms" in shown.responses
     assert time_figure(scene(State.first(None, fast), fast))["data"][0]["line"]["shape"] == "hv"
 
 
@@ -477,3 +479,29 @@ def test_only_loopback_unless_told_otherwise():
         taken.listen()
         port = taken.getsockname()[1]
         assert free_port("127.0.0.1", port) > port
+
+
+def test_a_setting_is_worked_out_once(monkeypatch):
+    """The page asks for its first one as it opens, after the server has begun with it."""
+    asked = []
+
+    def counted(state, record=None):
+        asked.append(state.factor)
+        return scene(state, record)
+
+    monkeypatch.setattr(answers, "scene", counted)
+    known = answers.Answers(State.first(), None, "")
+    first = known.of(known.first)
+    assert known.of(replace(known.first, factor=5)) != first
+    assert known.of(known.first) == first
+    assert asked == [known.first.factor, 5]
+
+
+def test_settings_are_forgotten_one_by_one(monkeypatch):
+    monkeypatch.setattr(answers, "_KEPT", 2)
+    known = answers.Answers(State.first(), None, "")
+    worked = []
+    monkeypatch.setattr(known, "_worked_out", lambda state: worked.append(state.factor) or ())
+    for factor in (2, 3, 2, 4, 2, 3):
+        known.of(replace(known.first, factor=factor))
+    assert worked == [2, 3, 4, 3]

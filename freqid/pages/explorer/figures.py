@@ -19,7 +19,7 @@ _LINEAR, _TICKS = 0.01, (0.01, 0.1, 1.0, 10.0, 100.0)
 
 
 def _curves(scene: Scene) -> Iterator[Shown]:
-    for index, (name, frf) in enumerate(scene.responses().items()):
+    for index, (name, frf) in enumerate(scene.responses.items()):
         yield Shown(frf, name, line(_STYLES.get(name, index)))
 
 

@@ -6,6 +6,7 @@ Built on Dash, an extra. The page listens on the loopback address only, unless t
 from __future__ import annotations
 
 import socket
+import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from types import ModuleType
@@ -13,13 +14,11 @@ from typing import TYPE_CHECKING
 
 from freqid.checks import InputError, whole
 from freqid.data import Record
+from freqid.pages.explorer.answers import Answers
 from freqid.pages.explorer.doors import guard
-from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 from freqid.pages.explorer.layout import layout, log_of, parameter
 from freqid.pages.explorer.look import PAGE
-from freqid.pages.explorer.scene import scene
 from freqid.pages.explorer.state import Own, State, presets
-from freqid.pages.explorer.words import as_link, sentence, table
 from freqid.plots import Part
 
 if TYPE_CHECKING:
@@ -57,7 +56,10 @@ def explore(
         print(f"port {port} is busy; using {free}")
     print(f"freqid explorer: http://{host}:{free}/  (stop with Ctrl-C)", flush=True)
     allowed = None if allow_remote else _LOOPBACK
-    application(record, allowed, plant, source).run(host=host, port=str(free), debug=False)
+    app, answers = _built(record, allowed, plant, source)
+    # while the browser opens: what it asks first is then known, and the libraries are loaded
+    threading.Thread(target=answers.of, args=(answers.first,), daemon=True).start()
+    app.run(host=host, port=str(free), debug=False)
 
 
 def free_port(host: str, port: int) -> int:
@@ -87,6 +89,12 @@ def application(
     the page through the reader's browser; None lets all pass. So are bodies above 1 MiB. Raises
     ValueError for a plant of several inputs or outputs.
     """
+    return _built(record, hosts, plant, source)[0]
+
+
+def _built(
+    record: Record | None, hosts: Sequence[str] | None, plant: Own | None, source: str
+) -> tuple[Dash, Answers]:
     try:
         import dash
     except ImportError:
@@ -102,14 +110,16 @@ def application(
         suppress_callback_exceptions=True, index_string=PAGE,
     )  # fmt: skip
     app.layout = layout(dash, first, record)
-    _wire(dash, app, first, record, source)
+    answers = Answers(first, record, source)
+    _wire(dash, app, answers)
     guard(app.server, hosts)
-    return app
+    return app, answers
 
 
-def _wire(dash: ModuleType, app: Dash, first: State, record: Record | None, source: str) -> None:
+def _wire(dash: ModuleType, app: Dash, answers: Answers) -> None:
     from dash import ALL, Input, Output, State as Kept
 
+    first = answers.first
     plants = first.plants()
 
     @app.callback(Output("sliders", "children"), Input("plant", "value"), Kept("url", "search"))
@@ -157,14 +167,7 @@ def _wire(dash: ModuleType, app: Dash, first: State, record: Record | None, sour
             first, plant=plant, factor=int(factor), hold=hold, low=low, high=high,
             noise=noise / 100, sine=sine or 0.0, factors=scale,
         ).valid()  # fmt: skip
-        shown = scene(state, record)
-        text, doubt = sentence(shown)
-        code = state.code(record, source)
-        return (
-            bode_figure(shown), nyquist_figure(shown), time_figure(shown), bias_figure(shown),
-            text, "verdict doubt" if doubt else "verdict", code, state.query(), state.query(),
-            as_link(table(shown), "text/csv"), as_link(code, "text/x-python"),
-        )  # fmt: skip
+        return answers.of(state)
 
     # the address follows, and one step back leaves the page
     app.clientside_callback(

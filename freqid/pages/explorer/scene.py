@@ -70,6 +70,7 @@ class Scene:
             frf.frequency[::step], frf.response[..., ::step], dt=frf.dt, hold=frf.hold
         )
 
+    @cached_property
     def responses(self) -> dict[str, FrequencyResponse]:
         """True plant at both rates and the estimate, up to the slow Nyquist limit, and what one's
         own record tells.

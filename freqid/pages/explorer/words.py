@@ -53,7 +53,7 @@ def _of_black_box(shown: Scene) -> tuple[str, bool]:
     text = f"Black box: {est.fit_percent:.1f} % explained"
     if shown.measured:
         return ". ".join(part for part in (text, shown.message) if part), bool(est.signs)
-    responses = shown.responses()
+    responses = shown.responses
     true, found = next(iter(responses.values())), responses["estimate"]
     inside = (true.frequency >= shown.state.low) & (true.frequency <= shown.state.high)
     if not inside.any():
@@ -67,7 +67,7 @@ def _of_black_box(shown: Scene) -> tuple[str, bool]:
 def table(shown: Scene) -> str:
     """The responses that are drawn, as CSV."""
     with rounding_said():
-        curves = {n: r for n, r in shown.responses().items() if n != "measured"}
+        curves = {n: r for n, r in shown.responses.items() if n != "measured"}
     first = next(iter(curves.values()))
     columns = {"frequency [Hz]": first.frequency}
     for name, frf in curves.items():
