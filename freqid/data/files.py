@@ -16,6 +16,7 @@ from freqid.data.readers.kinds import LOGS, WRITERS
 from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
+from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
 from freqid.lti import Hold
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _REPAIR = "cut the record there with slice() or repair the samples first"
 
 
+@that_reads
 def read(
     path: str | Path,
     inputs: Sequence[str] | str | None = None,

@@ -15,6 +15,7 @@ from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchs
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.remembered import kept_of_response
+from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ _PHASE = r"(phase|ph|phi|angle|arg|deg|degrees|∠)"
 _SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db)"
 
 
+@that_reads
 def read_response(
     path: str | Path,
     *,

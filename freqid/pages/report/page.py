@@ -11,7 +11,8 @@ from freqid.data import Record, whole_file
 from freqid.fitting import Estimate
 from freqid.models import GreyBox
 from freqid.pages.report.figures import figures
-from freqid.pages.report.sentences import bias, data, verdict, versions
+from freqid.pages.report.recipe import recipe
+from freqid.pages.report.sentences import bias, data, verdict
 from freqid.pages.report.tables import correlations, modes, parameters, spread, tests
 
 
@@ -51,8 +52,7 @@ def write_report(
         figures=[{"data": f.data, "layout": f.layout} for f in drawn],
         tests=tests(est),
         data=data(est),
-        call=est.call or "(made without fit)",
-        versions=versions(),
+        call=recipe(est),
         plotly=_plotly() if drawn else "",
     )
     with whole_file(path) as beside:

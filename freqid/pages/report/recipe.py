@@ -1,0 +1,113 @@
+"""How an estimate is got again: lines of Python that read the data, make the plant and fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from freqid.data import DataSet, source
+from freqid.fitting import Estimate, data_digest
+from freqid.models import GreyBox, Parameter, model_to_dict
+from freqid.pages.report.sentences import versions
+
+# beyond so many parameters and records the lines are no longer read
+_MOST = 100
+
+
+def recipe(est: Estimate) -> str:
+    """The lines; what no file or module holds stands there as ``...`` with what it was."""
+    if not est.call:
+        return "(made without fit)"
+    today = datetime.datetime.now(datetime.UTC).date()
+    call, _, told = est.call.partition("\n# model = ")
+    if len(est.names) > _MOST or len(est.data) > _MOST:
+        return f"# {today}, {versions()}\n{est.call}"
+    imports, plant = _grey_box(est) if isinstance(est.model, GreyBox) else ([], _black_box(told))
+    data = [_data(d) for d in est.data]
+    if len(data) > 1:
+        call = call.replace(f"[{len(data)} data sets]", "data", 1)
+        lines = ["data = [", *(f"    {code},  # {said}" for code, said in data), "]"]
+    else:
+        lines = [f"data = {code}  # {said}" for code, said in data]
+    return "\n".join(
+        [f"# {today}, {versions()}", *imports, "import freqid as fq", "",
+         f"model = {plant or f'...  # {told}'}", *lines, f"est = {call}"]
+    )  # fmt: skip
+
+
+def _data(data: DataSet) -> tuple[str, str]:
+    """What reads the data, and what is said of them."""
+    call, digest = source(data), f"SHA-256 {data_digest(data)[:12]}"
+    return ("...", f"{data!r}, {digest}") if call is None else (call, digest)
+
+
+def _black_box(told: str) -> str | None:
+    """A model without parameters of its own, which its words make again."""
+    import freqid
+
+    names = re.findall(r"\b([A-Z]\w*)\(", told)
+    if not names or not all(hasattr(freqid, name) for name in names):
+        return None
+    return re.sub(r"\b([A-Z]\w*\()", r"fq.\1", told)
+
+
+def _grey_box(est: Estimate) -> tuple[list[str], str | None]:
+    """What is to be imported, and the plant as the fit began with it; None for a function that no
+    module holds.
+    """
+    model = est.model
+    written = model_to_dict(model)
+    paths = {key: written[key] for key in ("matrices", "jacobian")}
+    if paths["matrices"] is None or (model.jacobian is not None and paths["jacobian"] is None):
+        return [], None
+    imports, names = [], {}
+    for key, path in paths.items():
+        if path is None:
+            continue
+        module, _, name = path["function"].partition(":")
+        imports.append(f"from {module} import {name.partition('.')[0]}")
+        given = [tuple(a) if isinstance(a, list) else a for a in path.get("arguments", ())]
+        names[key] = f"partial({', '.join([name, *map(repr, given)])})" if given else name
+    if any(name.startswith("partial(") for name in names.values()):
+        imports.insert(0, "from functools import partial")
+    began = dict(zip(est.names, est.nominal, strict=True))
+    rows = [_parameter(p, began.get(p.name, p.value)) for p in model.parameters]
+    if any(re.search(r"\binf\b", row.partition(", ")[2]) for row in rows):
+        imports.insert(0, "from math import inf")
+    fields = {f.name: f.default for f in dataclasses.fields(model) if f.init}
+    more = [
+        f"    {name}={names.get(name) or repr(_plain(getattr(model, name)))},"
+        for name, usual in fields.items()
+        if name not in ("matrices", "parameters")
+        and getattr(model, name) != usual
+        and getattr(model, name) not in ({}, None)
+    ]
+    lines = ["fq.GreyBox(", f"    {names['matrices']},", "    ["]
+    lines += [f"        {row}," for row in rows] + ["    ],", *more, ")"]
+    return imports, "\n".join(lines)
+
+
+def _plain(value: object) -> object:
+    """What is written as it is read: mappings as dictionaries."""
+    return dict(value) if isinstance(value, Mapping) else value
+
+
+def _parameter(p: Parameter, began: float) -> str:
+    """A parameter where the search began, what is as usual left out."""
+    value = float(began) if math.isfinite(began) and p.lower <= began <= p.upper else p.value
+    usual = Parameter(p.name, value)
+    own = {f.name: getattr(p, f.name) for f in dataclasses.fields(p)[2:]}
+    said = [f"{k}={_number(v)}" for k, v in own.items() if v != getattr(usual, k)]
+    return f"fq.Parameter({', '.join([repr(p.name), repr(value), *said])})"
+
+
+def _number(value: object) -> str:
+    """Numbers of numpy as Python writes them."""
+    if isinstance(value, tuple):
+        return f"({', '.join(_number(v) for v in value)})"
+    return repr(value.item() if isinstance(value, np.generic) else value)

@@ -1,0 +1,107 @@
+"""A report's recipe runs as it stands, and gives the same numbers."""
+
+import html
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("recipe") / "axis.csv"
+    u = fq.chirp(10, 80, 4, 1e-3)
+    record = fq.simulate(fq.two_mass(), u, 1e-3).with_noise(0.05)
+    path.write_text(record.to_frame().to_csv(sep=";", decimal=","))
+    return path
+
+
+def lines(est, tmp_path):
+    est.report(tmp_path / "axis.html")
+    page = (tmp_path / "axis.html").read_text(encoding="utf-8")
+    return html.unescape(re.search(r'<pre id="call">(.*?)</pre>', page, re.S)[1])
+
+
+def again(code, folder):
+    """The parameters that the lines print in a process of their own."""
+    code += "\nprint(*est.values.tolist(), sep='\\n')\n"
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return np.array(run.stdout.split(), dtype=float)
+
+
+OWN = """
+import freqid as fq
+
+
+def lag(a, b):
+    return [[-a]], [[b]], [[1.0]], None
+
+
+plant = fq.GreyBox(lag, [fq.Parameter("a", 20.0, lower=0.1), fq.Parameter("b", 900.0)], name="lag")
+"""
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        fq.two_mass().fix("d"),
+        fq.two_mass().tie(Ja="1e4 * Jm").with_bounds(k=(1e4, np.inf)),
+        fq.drivetrain(2),
+        fq.OutputError(3),
+        fq.TransferFunction(2, 3),
+    ],
+    ids=["fixed", "tied and bounded", "with arguments", "output error", "transfer function"],
+)
+def test_it_runs_and_gives_the_same_numbers(model, file, tmp_path):
+    est = fq.fit(model, fq.read(file, inputs="u"), band=(10, 80))
+    code = lines(est, tmp_path)
+    np.testing.assert_allclose(again(code, tmp_path), est.values, rtol=1e-9)
+
+
+def test_of_several_records_and_a_start(file, tmp_path):
+    data = [fq.read(file, stop=2.0), fq.read(file, start=2.0)]
+    est = fq.fit(fq.two_mass(), data, band=(10, 80), start={"k": 1.4e5})
+    np.testing.assert_allclose(again(lines(est, tmp_path), tmp_path), est.values, rtol=1e-9)
+
+
+def test_of_an_own_plant_in_a_file(file, tmp_path):
+    (tmp_path / "my_plant.py").write_text(OWN)
+    run = subprocess.run(
+        [sys.executable, "-m", "freqid.cli", "fit", str(file), "--model", "my_plant.py:plant",
+         "--band", "10", "30", "--report", "axis.html", "--out", "axis.json"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (tmp_path / "axis.html").exists(), run.stderr
+    page = (tmp_path / "axis.html").read_text(encoding="utf-8")
+    code = html.unescape(re.search(r'<pre id="call">(.*?)</pre>', page, re.S)[1])
+    values = fq.load(tmp_path / "axis.json", model=_own(tmp_path)).values
+    np.testing.assert_allclose(again(code, tmp_path), values, rtol=1e-9)
+
+
+def _own(folder):
+    found = {"__name__": "my_plant"}
+    exec((folder / "my_plant.py").read_text(), found)
+    return found["plant"]
+
+
+def test_what_no_file_holds_is_said(tmp_path):
+    plant = fq.GreyBox(lambda a: ([[-a]], [[a]], [[1.0]], None), [fq.Parameter("a", 20.0)])
+    record = fq.simulate(plant, fq.white_noise(300), 1e-3).with_noise(0.01)
+    code = lines(fq.fit(plant, record), tmp_path)
+    assert re.search(r"^model = \.\.\.  # <GreyBox", code, re.M)
+    assert re.search(r"^data = \.\.\.  # <Record .*SHA-256 [0-9a-f]{12}$", code, re.M)
+    compile(code, "recipe", "exec")
+
+
+def test_data_that_were_changed_were_not_read(file):
+    from freqid.data import source
+
+    record = fq.read(file)
+    assert source(record) == f"fq.read({str(file)!r})"
+    assert source(record.slice(0, 1)) is None
