@@ -51,6 +51,8 @@ def _state_scale(at: StateSpace) -> FloatArray:
     bordered[:n, :n] = at.A
     bordered[:n, n] = np.abs(at.B).sum(axis=1)
     bordered[n, :n] = np.abs(at.C).sum(axis=0)
+    if not np.isfinite(bordered).all():
+        return np.ones(n)  # LAPACK would write to the terminal by itself
     _, _, _, scale, _ = scipy.linalg.lapack.dgebal(bordered, scale=1, permute=0)
     return scale[:n]
 
