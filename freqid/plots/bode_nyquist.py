@@ -26,7 +26,7 @@ from freqid.plots.curves import (
     shown,
 )
 from freqid.plots.interactive import Backend, offers_plotly
-from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, stacked
+from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -201,8 +201,9 @@ def nyquist(
 ) -> Axes:
     """Responses in the complex plane, with dots at the frequencies ``ticks`` (in ``unit``).
 
-    Where a response has a variance its dots lie in discs that hold 95 % of it. Takes what ``bode``
-    takes; returns the axes. Raises ValueError for an unknown unit.
+    Where a response has a variance its dots lie in discs that hold 95 % of it. Of several channels
+    each pair has a colour, named in the legend. Takes what ``bode`` takes; returns the axes. Raises
+    ValueError for an unknown unit.
 
     >>> import freqid as fq
     >>> ax = fq.nyquist(fq.first_order())
@@ -213,10 +214,11 @@ def nyquist(
     curves = shown(responses, labels, omega, styles)
     with drawing(ax) as ax:
         for index, (frf, label, style) in enumerate(curves):
-            colour = style.get("color")
             for pair in np.ndindex(frf.response.shape[:2]):
                 G = frf.response[pair]
-                ax.plot(G.real, G.imag, label=None if any(pair) else label, **style)
+                name, look = _of_pair(frf, label, style, pair, styles is None)
+                colour = look.get("color")
+                ax.plot(G.real, G.imag, label=name, **look)
                 for tick in ticks or ():
                     f = tick / UNITS[unit]
                     if not frf.frequency[0] <= f <= frf.frequency[-1]:
@@ -237,9 +239,23 @@ def nyquist(
                     )  # fmt: skip
         ax.set(xlabel="real part", ylabel="imaginary part")
         ax.set_aspect("equal", adjustable="datalim")
-        if any(one.label for one in curves):
+        several = any(one.response.response[..., 0].size > 1 for one in curves)
+        if several or any(one.label for one in curves):
             ax.legend()
     return ax
+
+
+def _of_pair(
+    frf: FrequencyResponse, label: str | None, style: Style, pair: tuple[int, ...], free: bool
+) -> tuple[str | None, Style]:
+    """Name and look of one curve: each of several channel pairs has a colour, where it may."""
+    p, m = frf.response.shape[:2]
+    if p * m == 1:
+        return label, style
+    o, i = pair
+    name = f"{frf.input_names[i]} to {frf.output_names[o]}"
+    look = style | {"color": line(o * m + i)["color"]} if free else style
+    return (name if label is None else f"{label}, {name}"), look
 
 
 def _in_decibel(x: FloatArray) -> FloatArray:

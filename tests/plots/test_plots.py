@@ -134,3 +134,15 @@ def test_a_comparison_zooms_into_its_worst_stretch(plant, slow):
     with pytest.raises(ValueError, match="ax holds 2 axes; expected 4"):
         comparison.plot(ax=plt.subplots(2, 1)[1], zoom=True)
     plt.close("all")
+
+
+def test_nyquist_curves_of_several_channels_can_be_told_apart():
+    plant = fq.drivetrain(2, outputs=("motor velocity", "arm velocity"))
+    ax = fq.nyquist(plant, plant.with_values(d1=20.0), labels=["before", "after"])
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert len(told) == len(set(told)) == len(ax.lines) == 4
+    assert told[0].startswith("before, torque to ")
+    colours, dashes = ([getattr(c, f"get_{of}")() for c in ax.lines] for of in ("color", "ls"))
+    assert colours[:2] == colours[2:]
+    assert colours[0] != colours[1]
+    assert dashes[0] == dashes[1] != dashes[2]
