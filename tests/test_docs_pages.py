@@ -1,5 +1,6 @@
 """Every Python example of the pages runs as it stands, in the page's own order."""
 
+import importlib.util
 import logging
 import re
 from pathlib import Path
@@ -71,3 +72,26 @@ def test_examples_of_a_page_run(page, tmp_path, monkeypatch):
         if page == "howto.md":
             # each of its sections begins with the reader's own
             names.update({key: own[key] for key in ("record", "plant", "est")})
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: fq.two_mass().with_values(j=1.0),
+        lambda: fq.Record([1.0, np.nan], [1.0, 2.0], dt=1e-3),
+        lambda: fq.read("/nowhere/axis.csv"),
+        lambda: fq.chirp(10, 80, 1.0, -1e-3),
+        lambda: fq.bode(),
+        lambda: fq.fit(fq.two_mass(), fq.Record([1.0, 2.0], [1.0, 2.0], dt=1e-3), band=(600, 700)),
+    ],
+)
+def test_what_is_raised_is_on_the_page_of_messages(wrong):
+    spec = importlib.util.spec_from_file_location("messages", DOCS / "hooks" / "messages.py")
+    hook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hook)
+    listed = re.findall(r"^- `(.*)`$", hook.listed(), re.M)
+    assert len(listed) > 400
+    with pytest.raises((ValueError, FileNotFoundError)) as raised:
+        wrong()
+    text = str(raised.value).replace("`", "'")
+    assert any(re.fullmatch(re.escape(t).replace("…", ".*"), text, re.S) for t in listed), text
