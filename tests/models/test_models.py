@@ -45,7 +45,8 @@ def test_bad_drivetrains_are_named():
 def test_ties_hold_during_the_fit(plant, fast):
     tied = plant.tie(Ja="11 / 9e-4 * Jm", d="sqrt(k) * 10 / sqrt(1.5e5)")
     est = fq.fit(tied, fast, band=BAND, start={"Jm": 1.1e-3, "k": 1.2e5})
-    assert list(est.parameters.index) == ["Jm", "k", "fm"]
+    assert list(est.names) == ["Jm", "k", "fm"]
+    assert list(est.parameters.index) == ["Jm", "k", "fm", "Ja", "d"]
     assert est["Ja"] == pytest.approx(11, rel=1e-8)
     assert est["d"] == pytest.approx(10, rel=1e-8)
 
