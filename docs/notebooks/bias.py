@@ -22,17 +22,17 @@ import freqid as fq
 plant, converter = fq.two_mass(), fq.ZeroOrderHold(0.5e-3)
 
 # %% [markdown]
-# Chirps from 10 Hz up to 30 … 95 Hz, logged at every second to every tenth sample, under three
+# Chirps from 10 Hz up to 30 … 90 Hz, logged at every second to every tenth sample, under three
 # assumptions: a ZOH at the slow rate, a FOH at the slow rate, and what the converter did.
 
 # %%
-chirps = {f"10-{upper}": fq.ChirpSpectrum(10, upper) for upper in range(30, 96, 5)}
+chirps = {f"10-{upper}": fq.ChirpSpectrum(10, upper) for upper in range(30, 91, 10)}
 table = fq.bias_map(plant, chirps, [2, 3, 4, 5, 8, 10], ["zoh", "foh", None], base_dt=0.5e-3)
 shown = table.query("spectrum == '10-80' and parameter == 'd'")
 shown[["factor", "hold", "true", "estimate", "relative_bias"]].round(3)
 
 # %% [markdown]
-# The damping $d$ over all of them. What is marked is the paper's experiment:
+# The damping `d` over all of them. What is marked is the paper's experiment:
 
 # %%
 axes = fq.plot_bias_map(table, "d", mark=["10-80"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 
 
 class Bar:
@@ -23,7 +24,9 @@ class Bar:
         )
 
         self.console = Console(stderr=True)
-        live = self.console.is_terminal or self.console.is_jupyter
+        # a notebook without ipywidgets cannot redraw a bar, and rich would warn of it
+        widgets = self.console.is_jupyter and find_spec("ipywidgets") is not None
+        live = widgets or (self.console.is_terminal and not self.console.is_jupyter)
         self.lines = bool(wanted) and not live
         self.total, self.done, self.what = total, done, what
         self.progress = Progress(
