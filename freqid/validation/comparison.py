@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -71,6 +72,29 @@ class Comparison:
             for n, f in zip(self.record.output_names, self.fit_percent, strict=True)
         )
         return f"<Comparison: {each}, input held by {self.hold!r}>"
+
+    def _repr_html_(self) -> str:
+        p = len(self.record.output_names)
+        # of a response the outputs come first, of a record last
+        first = isinstance(self.record, FrequencyResponse)
+        errors = abs(self.residuals.reshape(p, -1) if first else self.residuals.reshape(-1, p).T)
+        rows = zip(
+            self.record.output_names,
+            self.fit_percent,
+            np.sqrt(np.mean(errors**2, axis=1)),
+            errors.max(axis=1),
+            strict=True,
+        )
+        cells = "".join(
+            f"<tr><td>{escape(str(name))}</td><td>{fit:.2f} %</td><td>{rms:.3g}</td>"
+            f"<td>{most:.3g}</td></tr>"
+            for name, fit, rms, most in rows
+        )
+        heads = "".join(f"<th>{h}</th>" for h in ("output", "fit", "rms error", "largest error"))
+        return (
+            f"<p>Comparison, input held by {escape(repr(self.hold))}</p>"
+            f"<table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table>"
+        )
 
 
 def compare(

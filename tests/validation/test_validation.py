@@ -1,7 +1,9 @@
 """Noise weights, error bars and validation against simulation and closed forms."""
 
 import dataclasses
+import re
 
+import control
 import numpy as np
 import pytest
 import scipy.signal
@@ -304,3 +306,18 @@ def test_a_response_of_control_is_compared_as_one_of_ours():
     theirs = fq.compare(plant.with_values(a=80.0), frd)
     assert theirs.fit_percent == pytest.approx(own.fit_percent)
     assert own.fit_percent[0] < 95
+
+
+def test_a_notebook_shows_a_comparison_as_a_table():
+    two = control.ss([[-5.0]], [[1.0]], [[1.0], [20.0]], [[0.0], [0.0]])
+    u = fq.chirp(1, 50, 4, 2e-3)
+    record = fq.simulate(two, u, 2e-3, output_names=["angle", "<arm>"]).with_noise(1e-2, seed=1)
+    frf = fq.etfe(record, band=(2, 40))
+    plain, response = fq.compare(two, record), fq.compare(two, frf)
+    for comparison, errors in ((plain, plain.residuals.T), (response, response.residuals[:, 0])):
+        cells = re.findall("<td>(.*?)</td>", comparison._repr_html_())
+        assert cells[0::4] == ["angle", "&lt;arm&gt;"]
+        assert cells[1::4] == [f"{percent:.2f} %" for percent in comparison.fit_percent]
+        rms = np.sqrt(np.mean(abs(errors) ** 2, axis=1))
+        np.testing.assert_allclose([float(c) for c in cells[2::4]], rms, rtol=6e-3)
+        np.testing.assert_allclose([float(c) for c in cells[3::4]], abs(errors).max(1), rtol=6e-3)
