@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import (
-    Array,
     ComplexArray,
     FloatArray,
     InputError,
@@ -25,16 +24,15 @@ from freqid.checks import (
 )
 from freqid.data.band import Band, chosen
 from freqid.data.conditions import as_conditions
+from freqid.data.entries import frozen, shaped
 from freqid.data.remembered import response_columns
+from freqid.data.units import as_units, quotient
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
     import control
     import pandas as pd
     import xarray
-
-# by how much a coherence may pass one
-_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -54,6 +52,7 @@ class FrequencyResponse:
         reach: lines on each side of one whose noise goes together with its own, as that of local
             models does, which share their windows.
         conditions: what was set for this experiment, numbers by name.
+        units: unit of each channel by name.
 
     Raises ValueError for shapes that disagree, frequencies that do not increase, or values that
     are not finite.
@@ -74,6 +73,7 @@ class FrequencyResponse:
     output_names: tuple[str, ...]
     reach: int
     conditions: Mapping[str, float]
+    units: Mapping[str, str]
 
     # written by hand: fields hold what was checked, which is less than what may be given
     def __init__(
@@ -89,6 +89,7 @@ class FrequencyResponse:
         output_names: Sequence[str] | None = None,
         reach: int = 0,
         conditions: Mapping[str, float] | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> None:
         f = numbers("frequency", frequency)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
@@ -107,23 +108,26 @@ class FrequencyResponse:
         if finite("dt", dt) < 0:
             raise InputError(f"dt={dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape
+        u_names = channel_names("input_names", input_names, m, "u")
+        y_names = channel_names("output_names", output_names, p, "y")
         self.__dict__.update(
             frequency=frozen(f),
             response=frozen(G),
             dt=dt,
             hold=hold,
-            variance=_shaped("variance", variance, G.shape),
-            coherence=_shaped("coherence", coherence, G.shape, most=1.0),
-            input_spectrum=_shaped("input_spectrum", input_spectrum, (m, K)),
-            input_names=channel_names("input_names", input_names, m, "u"),
-            output_names=channel_names("output_names", output_names, p, "y"),
+            variance=shaped("variance", variance, G.shape),
+            coherence=shaped("coherence", coherence, G.shape, most=1.0),
+            input_spectrum=shaped("input_spectrum", input_spectrum, (m, K)),
+            input_names=u_names,
+            output_names=y_names,
             reach=whole("reach", reach, least=0),
             conditions=as_conditions(conditions),
+            units=as_units(units, (*u_names, *y_names)),
         )
 
     def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"reach": 0, "conditions": {}} | sealed(state))
+        self.__dict__.update({"reach": 0, "conditions": {}, "units": {}} | sealed(state))
 
     @property
     def omega(self) -> FloatArray:
@@ -139,6 +143,15 @@ class FrequencyResponse:
     def phase(self) -> FloatArray:
         """Unwrapped phase in degrees, (outputs, inputs, K)."""
         return np.rad2deg(np.unwrap(np.angle(self.response), axis=-1))
+
+    def unit(self, output: int = 0, input: int = 0) -> str:
+        """The unit of the response from one input to one output, empty where it has none.
+
+        >>> FrequencyResponse([1.0], [1j], units={"y": "rad/s", "u": "N m"}).unit()
+        '(rad/s)/(N m)'
+        """
+        of, by = self.output_names[output], self.input_names[input]
+        return quotient(self.units.get(of, ""), self.units.get(by, ""))
 
     def select(self, limits: tuple[float, float]) -> FrequencyResponse:
         """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""
@@ -248,6 +261,10 @@ class FrequencyResponse:
                 columns[name] = getattr(self, name).ravel()
         if self.input_spectrum is not None:
             columns["input_spectrum"] = np.tile(self.input_spectrum.ravel(), p)
+        for end, names in (("output", self.output_names), ("input", self.input_names)):
+            if any(n in self.units for n in names):
+                told = {n: self.units.get(n, "") for n in names}
+                columns[f"{end} unit"] = [told[n] for n in columns[end]]
         return pd.DataFrame(columns | response_columns(self))
 
     def to_xarray(self) -> xarray.DataArray:
@@ -274,27 +291,3 @@ class FrequencyResponse:
 
     def _repr_html_(self) -> str:
         return f"<p>{escape(repr(self)[1:-1])}</p>" + self.to_frame().head(8).to_html(index=False)
-
-
-def _shaped(
-    name: str, values: ArrayLike | None, shape: tuple[int, ...], most: float = np.inf
-) -> FloatArray | None:
-    """Values of a shape between 0 and ``most``, read-only; ValueError for others."""
-    if values is None:
-        return None
-    array = numbers(name, values)
-    if array.size != np.prod(shape):
-        raise InputError(f"{name} has shape {array.shape}; expected {shape}")
-    bad = ~((array >= 0) & (array <= most * (1 + _ROUNDING)))
-    if bad.any():
-        above = f"between 0 and {most:g}" if np.isfinite(most) else "zero or above"
-        raise InputError(
-            f"{name} has {int(bad.sum())} values that cannot be, the first {array[bad][0]:g}; "
-            f"expected numbers {above}"
-        )
-    return frozen(array.reshape(shape))
-
-
-def frozen(array: Array) -> Array:
-    array.flags.writeable = False
-    return array

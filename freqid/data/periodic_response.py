@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import ComplexArray, InputError, numbers, whole
-from freqid.data.frequency_response import FrequencyResponse, frozen
+from freqid.data.entries import frozen
+from freqid.data.frequency_response import FrequencyResponse
 
 
 class PeriodicResponse(FrequencyResponse):
@@ -42,6 +43,7 @@ class PeriodicResponse(FrequencyResponse):
         output_names: Any = None,
         reach: int = 0,
         conditions: Any = None,
+        units: Any = None,
         inputs: Any = None,
         outputs: Any = None,
         noise: Any = None,
@@ -49,7 +51,7 @@ class PeriodicResponse(FrequencyResponse):
     ) -> None:
         super().__init__(
             frequency, response, dt, hold, variance, coherence, input_spectrum, input_names,
-            output_names, reach, conditions,
+            output_names, reach, conditions, units,
         )  # fmt: skip
         p, m, K = self.response.shape
         U, Y = numbers("inputs", inputs, complex), numbers("outputs", outputs, complex)

@@ -15,11 +15,9 @@ from freqid.checks import (
     State,
     channel_names,
     finite,
-    named_values,
     positive,
     samples,
     sealed,
-    unknown,
     whole,
 )
 from freqid.data.conditions import as_conditions
@@ -29,6 +27,7 @@ from freqid.data.printed import as_html, as_text
 from freqid.data.sampling import check_rates, less_trend, noise_sizes, sample_at
 from freqid.data.selection import as_holds, channel, selected, with_input
 from freqid.data.signals import Signals
+from freqid.data.units import as_units
 from freqid.lti import Hold, ZeroOrderHold
 
 if TYPE_CHECKING:
@@ -105,9 +104,6 @@ class Record(Signals):
         both = (*u_names, *y_names)
         if len(set(both)) < len(both):
             raise InputError(f"channel names {list(both)} hold a name twice; names must differ")
-        for name in named_values("units", units):
-            if name not in (*both, "reference"):
-                raise InputError(unknown("units", name, both))
         commanded = None if reference is None else samples("reference", reference)
         if commanded is not None and len(commanded) != len(slow):
             raise InputError(
@@ -115,7 +111,8 @@ class Record(Signals):
             )
         self.__dict__.update(
             u=fast, y=slow, dt=dt, hold=between, input_dt=step, input_names=u_names,
-            output_names=y_names, units=dict(units or {}), reference=commanded, notes=notes,
+            output_names=y_names, reference=commanded, notes=notes,
+            units=as_units(units, both, ("reference",)),
             aliased=finite("aliased", aliased), conditions=as_conditions(conditions),
             clocks_apart=None if clocks_apart is None else finite("clocks_apart", clocks_apart),
         )  # fmt: skip

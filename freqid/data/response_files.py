@@ -125,7 +125,13 @@ def _long(frame: pd.DataFrame) -> FrequencyResponse:
         if len({len(s) for s in spectra}) > 1:
             raise InputError("column 'input_spectrum' has another number of rows for each input")
         fields["input_spectrum"] = np.array(spectra)
-    names = {"input_names": inputs, "output_names": outputs}
+    units = {
+        str(name): str(unit)
+        for end in ("output", "input") if f"{end} unit" in frame.columns
+        for name, unit in zip(frame[end], frame[f"{end} unit"], strict=True)
+        if isinstance(unit, str) and unit
+    }  # fmt: skip
+    names = {"input_names": inputs, "output_names": outputs, "units": units}
     kept = kept_of_response(frame, [str(n) for n in inputs])
     return FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
 

@@ -17,6 +17,7 @@ from freqid.data import (
     chosen,
     references_of,
 )
+from freqid.frf.measured import units_of
 from freqid.frf.noise_of_means import FREEDOM, means
 
 # part of the strongest line's amplitude below which a line is not excited
@@ -266,4 +267,5 @@ def _packed(
         input_spectrum=(np.abs(U) ** 2).mean(axis=1),
         input_names=first.input_names, output_names=first.output_names,
         inputs=U, outputs=Y, noise=C, freedom=freedom, conditions=first.conditions,
+        units=units_of(first),
     )  # fmt: skip

@@ -34,4 +34,11 @@ def measured(
         output_names=record.output_names,
         reach=reach,
         conditions=record.conditions,
+        units=units_of(record),
     )
+
+
+def units_of(record: Record | Stream) -> dict[str, str]:
+    """Units of its channels; a stream has none."""
+    own = record.units if isinstance(record, Record) else {}
+    return {n: unit for n, unit in own.items() if n in (*record.input_names, *record.output_names)}

@@ -5,7 +5,7 @@ It may import all packages but ``paper``, ``pages`` and ``cli``.
 
 from freqid.plots.bias_plots import plot_bias, plot_bias_curves, plot_bias_map
 from freqid.plots.bode_nyquist import bode, nyquist
-from freqid.plots.curves import Shown, bode_curve, resonances
+from freqid.plots.curves import Shown, amplitude_label, bode_curve, resonances, unit_of
 from freqid.plots.design_plots import plot_design
 from freqid.plots.estimate_plots import plot_parameters, plot_poles, plot_response, plot_spectrogram
 from freqid.plots.fleet_plots import alarms, plot_fleet

@@ -19,11 +19,13 @@ from freqid.plots.curves import (
     BodeCurve,
     Drawable,
     Shown,
+    amplitude_label,
     bode_curve,
     common_hold,
     frequency_label,
     heard,
     shown,
+    unit_of,
 )
 from freqid.plots.interactive import Backend, offers_plotly
 from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, line, stacked
@@ -104,7 +106,7 @@ def bode(
             for i, j in np.ndindex(outputs, inputs):
                 draw((i, j), grid[2 * i, j], grid[2 * i + 1, j])
                 _ticks(grid[2 * i, j], grid[2 * i + 1, j])
-            _name_channels(grid, curves[0].response, unit, decibel)
+            _name_channels(grid, [one.response for one in curves], unit, decibel)
             if named:
                 figure = grid[0, 0].figure
                 figure.legend(title=through, loc="outside upper center", ncols=len(curves))
@@ -114,7 +116,9 @@ def bode(
         for i, j in np.ndindex(outputs, inputs):
             draw((i, j), amplitude, phase)
         _ticks(amplitude, phase)
-        amplitude.set_ylabel("amplitude / dB" if decibel else "amplitude")
+        # channels of several units share one axis only where it was given
+        of = unit_of([one.response for one in curves]) if outputs * inputs == 1 else ""
+        amplitude.set_ylabel(amplitude_label(of, decibel))
         phase.set(ylabel="phase / degrees", xlabel=frequency_label(unit))
         if named:
             amplitude.legend(title=through)
@@ -135,16 +139,25 @@ def _channels(curves: Sequence[Shown]) -> tuple[int, int]:
     return shapes[0]
 
 
-def _name_channels(ax: Grid, frf: FrequencyResponse, unit: str, decibel: bool) -> None:
+def _name_channels(
+    ax: Grid, responses: Sequence[FrequencyResponse], unit: str, decibel: bool
+) -> None:
     """Inputs above the columns, outputs beside the rows, units at the edges alone."""
+    frf = responses[0]
     p, m = frf.response.shape[:2]
     inputs = frf.input_names or [f"u{j}" for j in range(m)]
     outputs = frf.output_names or [f"y{i}" for i in range(p)]
     for j in range(m):
         ax[0, j].set_title(f"from {inputs[j]}", fontsize="medium")
         ax[-1, j].set_xlabel(frequency_label(unit))
+    for i, j in np.ndindex(p, m):
+        of = unit_of(responses, (i, j))
+        # one unit of a row stands beside its name, others at their own axes
+        told = (f" / dB re 1 {of}" if of else " / dB") if decibel else f" in {of}" * bool(of)
+        name = f"to {outputs[i]}" if j == 0 else ""
+        if j == 0 or of != unit_of(responses, (i, 0)):
+            ax[2 * i, j].set_ylabel((name + told).strip())
     for i in range(p):
-        ax[2 * i, 0].set_ylabel(f"to {outputs[i]}" + (" / dB" if decibel else ""))
         ax[2 * i + 1, 0].set_ylabel("phase / °")
 
 
@@ -240,6 +253,9 @@ def nyquist(
         ax.set(xlabel="real part", ylabel="imaginary part")
         ax.set_aspect("equal", adjustable="datalim")
         several = any(one.response.response[..., 0].size > 1 for one in curves)
+        of = "" if several else unit_of([one.response for one in curves])
+        if of:
+            ax.set(xlabel=f"real part in {of}", ylabel=f"imaginary part in {of}")
         if several or any(one.label for one in curves):
             ax.legend()
     return ax

@@ -53,6 +53,18 @@ def frequency_label(unit: str) -> str:
     return f"frequency / {'Hz' if unit == 'Hz' else '(rad/s)'}"
 
 
+def amplitude_label(unit: str, decibel: bool = False) -> str:
+    """What stands beside an amplitude axis."""
+    if decibel:
+        return f"amplitude / dB re 1 {unit}" if unit else "amplitude / dB"
+    return f"amplitude in {unit}" if unit else "amplitude"
+
+
+def unit_of(responses: Sequence[FrequencyResponse], pair: tuple[int, int] = (0, 0)) -> str:
+    """The unit of a channel pair (output, input), empty where no response has one."""
+    return next((u for u in (frf.unit(*pair) for frf in responses) if u), "")
+
+
 class Shown(NamedTuple):
     """A response with the name and the look of its curves."""
 

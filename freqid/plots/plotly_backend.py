@@ -58,11 +58,11 @@ def bode_traces(curve: BodeCurve, mode: str = "lines") -> list[Part]:
     return traces
 
 
-def bode_axes(split: float, ticks: Part) -> Part:
-    """Axes of amplitude above phase; the amplitude begins at ``split`` of the height."""
+def bode_axes(split: float, ticks: Part, amplitude: str = "amplitude") -> Part:
+    """Axes of ``amplitude`` above phase, which begins at ``split`` of the height."""
     return {
         "xaxis": {"type": "log", "anchor": "y2", "title": {"text": "frequency / Hz"}, **ticks},
-        "yaxis": {"type": "log", "domain": [split, 1], "title": {"text": "amplitude"},
+        "yaxis": {"type": "log", "domain": [split, 1], "title": {"text": escape(amplitude)},
                   "exponentformat": "power"},
         "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}, "dtick": 90},
     }  # fmt: skip

@@ -70,7 +70,7 @@ def plot_comparison(
                     near.plot(time[worst], values[worst], marker=".", markersize=3, **style)
                 near.set(ylabel=label, xlabel="time / s, where the difference is largest")
                 above.axvspan(time[worst][0], time[worst][-1], color=ink(6), alpha=0.25, lw=0)
-                _draw_spectra(spectra, measured, residuals[:, o], record.dt)
+                _draw_spectra(spectra, measured, residuals[:, o], record.dt, unit)
         if not zoom:
             ax[-1].set_xlabel("time / s")
     return ax
@@ -85,7 +85,9 @@ def _worst(residual: FloatArray, dt: float) -> slice:
     return slice(first, first + length)
 
 
-def _draw_spectra(ax: Axes, measured: FloatArray, residual: FloatArray, dt: float) -> None:
+def _draw_spectra(
+    ax: Axes, measured: FloatArray, residual: FloatArray, dt: float, unit: str
+) -> None:
     """Amplitudes of what was measured and of what is left, over frequency."""
     f = np.fft.rfftfreq(len(measured), dt)[1:]
     for values, style, label in (
@@ -93,7 +95,8 @@ def _draw_spectra(ax: Axes, measured: FloatArray, residual: FloatArray, dt: floa
     ):  # fmt: skip
         amplitude = 2 * np.abs(np.fft.rfft(values - values.mean()))[1:] / len(values)
         ax.plot(f, amplitude, label=label, **(style | {"linewidth": 0.8}))
-    ax.set(xscale="log", yscale="log", xlabel="frequency / Hz", ylabel="amplitude")
+    ax.set(xscale="log", yscale="log", xlabel="frequency / Hz",
+           ylabel=f"amplitude / {unit}" if unit else "amplitude")  # fmt: skip
     ax.legend(loc="upper right", ncols=2)
 
 

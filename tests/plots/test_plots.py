@@ -22,6 +22,32 @@ def test_bode_takes_everything(plant, slow):
     assert "dB" in axes[0].get_ylabel()
 
 
+def test_amplitudes_have_the_units_of_their_channels(plant, slow, tmp_path):
+    told = {"torque": "N m", "speed": "rad/s"}
+    record = fq.Record(slow.u, slow.y, slow.dt, slow.hold, input_names=["torque"],
+                       output_names=["speed"], units=told)  # fmt: skip
+    for frf in (fq.etfe(record, band=(10, 80)), fq.h1(record, segment=500),
+                fq.local_rational(record, band=(10, 80)).select((20, 40))):  # fmt: skip
+        assert frf.units == told
+        assert fq.bode(plant, frf)[0].get_ylabel() == "amplitude in (rad/s)/(N m)"
+        assert frf.with_conditions(q=1.0).units == told
+    assert fq.bode(frf, decibel=True)[0].get_ylabel() == "amplitude / dB re 1 (rad/s)/(N m)"
+    assert fq.nyquist(frf).get_xlabel() == "real part in (rad/s)/(N m)"
+    assert fq.bode(plant)[0].get_ylabel() == "amplitude"
+    same = fq.FrequencyResponse([1.0], [1j], units={"u": "V", "y": "V"})
+    assert fq.bode(same)[0].get_ylabel() == "amplitude"
+    both = fq.FrequencyResponse([1.0, 2.0], np.ones((1, 2, 2)), output_names=["a"],
+                                units={"u1": "N", "u2": "A", "a": "m"})  # fmt: skip
+    grid = fq.bode(both)
+    assert [grid[0, 0].get_ylabel(), grid[0, 1].get_ylabel()] == ["to a in m/N", "in m/A"]
+    back = fq.FrequencyResponse.from_frame(both.to_frame())
+    assert back.units == both.units
+    (tmp_path / "frf.csv").write_text(both.to_frame().to_csv(index=False))
+    assert fq.read_response(tmp_path / "frf.csv").units == both.units
+    with pytest.raises(ValueError, match="units"):
+        fq.FrequencyResponse([1.0], [1j], units={"torque": "N m"})
+
+
 def test_phases_lie_next_to_each_other():
     omega = np.linspace(1, 10, 50)
     one = fq.FrequencyResponse(omega, np.exp(-1j * omega / 5))

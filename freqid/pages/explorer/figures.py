@@ -10,7 +10,18 @@ from freqid.checks import FloatArray
 from freqid.fitting import Z95
 from freqid.models import simulate
 from freqid.pages.explorer.scene import Scene, label_of, rounding_said
-from freqid.plots import COLOURS, Part, Shown, bode_axes, bode_curve, bode_traces, line, trace
+from freqid.plots import (
+    COLOURS,
+    Part,
+    Shown,
+    amplitude_label,
+    bode_axes,
+    bode_curve,
+    bode_traces,
+    line,
+    trace,
+    unit_of,
+)
 
 # curves that look alike wherever they are
 _STYLES = {"estimate": 2, "measured": 5}
@@ -47,7 +58,11 @@ def bode_figure(shown: Scene) -> Part:
         "type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1,
         "fillcolor": COLOURS[5], "opacity": 0.12, "line": {"width": 0}, "layer": "below",
     }  # fmt: skip
-    layout = _base("Frequency response") | bode_axes(0.48, {"tickvals": ticks})
+    layout = _base("Frequency response") | bode_axes(
+        0.48,
+        {"tickvals": ticks},
+        amplitude_label(unit_of([one.response for one in curves])),
+    )
     return {"data": data, "layout": layout | {"shapes": [] if shown.state.sine else [band]}}
 
 

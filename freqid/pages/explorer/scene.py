@@ -67,8 +67,9 @@ class Scene:
             return None
         step = -(-len(frf.frequency) // _POINTS)
         return FrequencyResponse(
-            frf.frequency[::step], frf.response[..., ::step], dt=frf.dt, hold=frf.hold
-        )
+            frf.frequency[::step], frf.response[..., ::step], dt=frf.dt, hold=frf.hold,
+            input_names=frf.input_names, output_names=frf.output_names, units=frf.units,
+        )  # fmt: skip
 
     @cached_property
     def responses(self) -> dict[str, FrequencyResponse]:

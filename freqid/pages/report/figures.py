@@ -12,7 +12,17 @@ from freqid.data import FrequencyResponse, Record
 from freqid.fitting import Estimate
 from freqid.frf import etfe
 from freqid.lti import PeriodicHold
-from freqid.plots import COLOURS, Part, Shown, Style, bode_axes, bode_curve, bode_traces, trace
+from freqid.plots import (
+    COLOURS,
+    Part,
+    Shown,
+    Style,
+    amplitude_label,
+    bode_axes,
+    bode_curve,
+    bode_traces,
+    trace,
+)
 from freqid.validation import compare
 
 # points of a curve that a page can carry
@@ -75,7 +85,8 @@ def _responses(est: Estimate) -> list[Figure]:
             + bode_traces(bode_curve(fitted, model, (o, i))),
             520,
             1.08,
-            bode_axes(0.46, _decades(low, high)) | {"hovermode": "x unified"},
+            bode_axes(0.46, _decades(low, high), amplitude_label(measured.unit(o, i)))
+            | {"hovermode": "x unified"},
         )
         for o, i in np.ndindex(*measured.response.shape[:2])
     ]
