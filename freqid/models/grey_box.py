@@ -18,6 +18,7 @@ from freqid.models.delays import delay_names, given_delays
 from freqid.models.matrices import Jacobian, Matrices, MatrixFunction, without
 from freqid.models.model import Model
 from freqid.models.parameter import Parameter
+from freqid.models.portable import arrived, carried
 from freqid.models.ties import Ties
 
 
@@ -105,9 +106,13 @@ class GreyBox(Model):
         )
         object.__setattr__(self, "inputs", channel_names("inputs", self.inputs, at.B.shape[1], "u"))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a pickle takes: functions that no module holds by their code."""
+        return carried(self.__dict__, "matrices", "jacobian")
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"conditions": {}} | state)
+        self.__dict__.update({"conditions": {}} | arrived(state))
 
     @property
     def delay_sources(self) -> tuple[float | str, ...]:

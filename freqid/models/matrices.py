@@ -13,6 +13,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.lti import Linearisation, StateSpace
+from freqid.models.portable import arrived, carried
 from freqid.models.shaped import as_dense, shaped
 from freqid.models.ties import Ties
 
@@ -77,9 +78,13 @@ class MatrixFunction:
         self._carries: dict[tuple[str, ...], bool] = {}
         self._believed: set[tuple[str, ...]] = set()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a pickle takes: functions that no module holds by their code."""
+        return carried(self.__dict__, "matrices", "jacobian")
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"conditions": {}} | state)
+        self.__dict__.update({"conditions": {}} | arrived(state))
 
     def under(self, conditions: Mapping[str, float]) -> MatrixFunction:
         """The same function where other conditions are set."""
