@@ -150,8 +150,11 @@ class FrequencyResponse:
         >>> FrequencyResponse([1.0], [1j], units={"y": "rad/s", "u": "N m"}).unit()
         '(rad/s)/(N m)'
         """
-        of, by = self.output_names[output], self.input_names[input]
-        return quotient(self.units.get(of, ""), self.units.get(by, ""))
+        p, m = self.response.shape[:2]
+        if whole("output", output, least=0) >= p or whole("input", input, least=0) >= m:
+            raise InputError(f"output={output}, input={input}: there are {p} and {m}, from 0 on")
+        ends = self.output_names[output], self.input_names[input]
+        return quotient(*(self.units.get(name, "") for name in ends))
 
     def select(self, limits: tuple[float, float]) -> FrequencyResponse:
         """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""

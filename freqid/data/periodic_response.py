@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class PeriodicResponse(FrequencyResponse):
         output_names: Any = None,
         reach: int = 0,
         conditions: Any = None,
-        units: Any = None,
+        units: Mapping[str, str] | None = None,
         inputs: Any = None,
         outputs: Any = None,
         noise: Any = None,

@@ -14,10 +14,11 @@ from freqid.fitting.fitters import FITTERS, Near, SearchOptions, fitter_of
 from freqid.fitting.grades import Verdict
 from freqid.fitting.grey_box import fit_grey_box
 from freqid.fitting.kept import load
-from freqid.fitting.many import Bar, TableStore, fit_many, unordered
+from freqid.fitting.many import TableStore, fit_many, unordered
 from freqid.fitting.met import data_digest, met, remembered
 from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order
+from freqid.fitting.progress import Bar
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_at_stamps, line_errors
 from freqid.fitting.search.batched import Answers, descend

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, choice, finite, unknown
+from freqid.checks import ComplexArray, FloatArray, InputError, choice, finite, flag, unknown
 from freqid.data import DataSet, FrequencyResponse
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -245,22 +245,26 @@ class Estimate(Questioned, Shown):
         """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
         return pole_scatter(*self._unknowns)
 
-    def intervals(self, method: str = "linear", level: float = 0.95) -> pd.DataFrame:
+    def intervals(
+        self, method: str = "linear", level: float = 0.95, progress: bool = False
+    ) -> pd.DataFrame:
         """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.
 
-        Raises ValueError for an unknown method or a level outside (0, 1).
+        ``progress`` shows how many ends of profiles are found. Raises ValueError for an unknown
+        method or a level outside (0, 1).
         """
         import pandas as pd
         from scipy.stats import norm
 
         choice("method", method, ("linear", "profile"))
+        flag("progress", progress)
         if not 0 < finite("level", level) < 1:
             raise InputError(f"level={level!r} must lie between 0 and 1")
         if method == "profile":
             if not isinstance(self.model, GreyBox) or self.scatter.given is not None:
                 raise InputError("profile intervals need a grey-box estimate from data")
             std = np.sqrt(np.diag(self.covariance_matrix))
-            return profile_intervals(self.minimum, self.scatter.change, std, level)
+            return profile_intervals(self.minimum, self.scatter.change, std, level, progress)
         half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
         return pd.DataFrame(
             {"lower": self.values - half, "upper": self.values + half},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from freqid.data import FrequencyResponse, Record, channel_counts
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.progress import Bar
 from freqid.fitting.reading import Reading
 from freqid.lti import Hold, Plane, in_one_blas_thread
 from freqid.models import OutputError
@@ -35,6 +37,7 @@ def select_order(
     criterion: str = "mdl",
     delays: Iterable[int] = (0,),
     stable: bool = False,
+    progress: bool = False,
 ) -> pd.DataFrame:
     """Fit OutputError of each order and compare.
 
@@ -45,9 +48,9 @@ def select_order(
     initial state fitted to the other three. ``feedthrough=None`` tries both; ``delays`` are whole
     samples by which the inputs may come late. An order that cannot be fitted has its reason in
     ``error``. ``attrs["best"]`` is the order with the least ``criterion``: ``"aic"``, ``"mdl"`` or
-    ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]`` go with it. Other
-    arguments as in ``fit``. Raises ValueError for no orders, or one that is not a whole number, or
-    where none can be fitted.
+    ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]`` go with it. With
+    ``progress`` the screen shows how many orders are done. Other arguments as in ``fit``. Raises
+    ValueError for no orders, or one that is not a whole number, or where none can be fitted.
 
     >>> import freqid as fq
     >>> record = fq.simulate(fq.first_order(), fq.chirp(2, 40, 2, 1e-3), 1e-3).with_noise(0.01)
@@ -62,6 +65,7 @@ def select_order(
     if feedthrough is not None:
         flag("feedthrough", feedthrough)
     flag("stable", stable)
+    flag("progress", progress)
     given = [orders] if isinstance(orders, int) else listed("orders", orders)
     wanted = [whole("orders", n) for n in given]
     if not wanted:
@@ -73,12 +77,12 @@ def select_order(
     reading = Reading.of(data, hold, band, initial_state=initial_state)  # type: ignore[arg-type]
     n_inputs = channel_counts(data)[1]
     through = [False, True] if feedthrough is None else [feedthrough]
-    rows = [
-        _row(OutputError(order, direct, stable), q, in_step(reading, (q,) * n_inputs, max(late)))
-        for q in late
-        for direct in through
-        for order in wanted
-    ]
+    rows = []
+    with Bar(progress, len(late) * len(through) * len(wanted), 0, "orders") as advance:
+        for q, direct, order in product(late, through, wanted):
+            seen = in_step(reading, (q,) * n_inputs, max(late))
+            rows.append(_row(OutputError(order, direct, stable), q, seen))
+            advance(1)
     table = pd.DataFrame(rows)
     scores = table[criterion].to_numpy()
     if np.isnan(scores).all():

@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, channel_names, listed, named_values, unknown
+from freqid.checks import (
+    FloatArray,
+    InputError,
+    State,
+    channel_names,
+    listed,
+    named_values,
+    unknown,
+)
 from freqid.data import as_conditions
 from freqid.lti import Linearisation, StateSpace
 from freqid.models.delays import delay_names, given_delays
@@ -106,11 +114,11 @@ class GreyBox(Model):
         )
         object.__setattr__(self, "inputs", channel_names("inputs", self.inputs, at.B.shape[1], "u"))
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> State:
         """What a pickle takes: functions that no module holds by their code."""
         return carried(self.__dict__, "matrices", "jacobian")
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
         self.__dict__.update({"conditions": {}} | arrived(state))
 

@@ -7,11 +7,11 @@ import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, State
 from freqid.lti import Linearisation, StateSpace
 from freqid.models.portable import arrived, carried
 from freqid.models.shaped import as_dense, shaped
@@ -78,11 +78,11 @@ class MatrixFunction:
         self._carries: dict[tuple[str, ...], bool] = {}
         self._believed: set[tuple[str, ...]] = set()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> State:
         """What a pickle takes: functions that no module holds by their code."""
         return carried(self.__dict__, "matrices", "jacobian")
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
         self.__dict__.update({"conditions": {}} | arrived(state))
 

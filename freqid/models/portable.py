@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pickle
-from typing import Any
+from collections.abc import Callable
+
+from freqid.checks import State
 
 
 class Portable:
@@ -13,14 +15,14 @@ class Portable:
     where it is read: like any pickle, it is for those who trust each other.
     """
 
-    def __init__(self, function: Any) -> None:
+    def __init__(self, function: Callable[..., object]) -> None:
         self.function = function
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Portable:
+    def __deepcopy__(self, memo: object) -> Portable:
         # a copy in the same process calls the same function
         return self
 
-    def __reduce__(self) -> tuple[Any, tuple[Any]]:
+    def __reduce__(self) -> tuple[object, tuple[object]]:
         try:
             pickle.dumps(self.function)
         except (pickle.PicklingError, AttributeError, TypeError):
@@ -34,11 +36,11 @@ def _from_code(code: bytes) -> Portable:
     return Portable(pickle.loads(code))
 
 
-def carried(state: dict[str, Any], *names: str) -> dict[str, Any]:
+def carried(state: State, *names: str) -> State:
     """What a pickle takes of an object's fields, of which those ``names`` are functions."""
     return state | {n: Portable(state[n]) for n in names if callable(state.get(n))}
 
 
-def arrived(state: dict[str, Any]) -> dict[str, Any]:
+def arrived(state: State) -> State:
     """The fields from what a pickle took of them."""
     return {k: v.function if isinstance(v, Portable) else v for k, v in state.items()}

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, an, listed, whole
+from freqid.checks import FloatArray, InputError, an, flag, listed, whole
 from freqid.data import Record
-from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
+from freqid.fitting import Bar, Estimate, Near, Weights, fit, uninterrupted
 from freqid.models import GreyBox
 from freqid.validation.comparison import compare
 
@@ -89,11 +89,14 @@ def _mode_values(est: Estimate) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index", columns=["value", "std"])
 
 
-def cross_validate(model: object, records: Sequence[Record], **options: Any) -> pd.DataFrame:
+def cross_validate(
+    model: object, records: Sequence[Record], *, progress: bool = False, **options: Any
+) -> pd.DataFrame:
     """Fit a model to all repeats but one, and compare with that one, each in turn.
 
-    ``options`` go to ``fit``. Returns a DataFrame with one row a repeat: ``held_out``, the fit in
-    per cent of each output, and the parameters. Raises ValueError for fewer than two records.
+    ``options`` go to ``fit``; with ``progress`` the screen shows how many are done. Returns a
+    DataFrame with one row a repeat: ``held_out``, the fit in per cent of each output, and the
+    parameters. Raises ValueError for fewer than two records.
     """
     import pandas as pd
 
@@ -102,22 +105,30 @@ def cross_validate(model: object, records: Sequence[Record], **options: Any) -> 
     if len(sets) < 2:
         raise InputError(f"records holds {len(sets)}; cross-validation needs two or more repeats")
     rows = []
-    for i, held_out in enumerate(sets):
-        est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
-        uninterrupted(est.message)
-        fits = compare(est, held_out).fit_percent
-        named = {f"fit {n}": float(v) for n, v in zip(held_out.output_names, fits, strict=True)}
-        rows.append({"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))})
+    with Bar(flag("progress", progress), len(sets), 0, "repeats held out") as advance:
+        for i, held_out in enumerate(sets):
+            est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
+            uninterrupted(est.message)
+            fits = compare(est, held_out).fit_percent
+            named = {f"fit {n}": float(v) for n, v in zip(held_out.output_names, fits, strict=True)}
+            rows.append({"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))})
+            advance(1)
     return pd.DataFrame(rows)
 
 
 def bootstrap(
-    model: object, records: Sequence[Record], n: int = 200, seed: int = 0, **options: Any
+    model: object,
+    records: Sequence[Record],
+    n: int = 200,
+    seed: int = 0,
+    *,
+    progress: bool = False,
+    **options: Any,
 ) -> pd.DataFrame:
     """Estimates from repeats drawn again with replacement: their scatter without a noise model.
 
     ``options`` go to ``fit``; ``seed`` is that of the ``n`` resamples, each of which starts from
-    the estimate of all repeats. Returns a
+    the estimate of all repeats; with ``progress`` the screen shows how many are done. Returns a
     DataFrame (n, parameters) whose ``describe`` and ``quantile`` give error bars. Raises ValueError
     for fewer than three records.
 
@@ -129,6 +140,7 @@ def bootstrap(
     sets, count = listed("records", records), whole("n", n)
     if len(sets) < 3:
         raise InputError(f"records holds {len(sets)}; a bootstrap needs three or more repeats")
+    flag("progress", progress)
     rng = np.random.default_rng(whole("seed", seed, least=0))
     whole_fit = fit(model, sets, **options)
     uninterrupted(whole_fit.message)
@@ -138,11 +150,13 @@ def bootstrap(
     # few repeats have few resamples: of four there are 35, in whatever order they were drawn
     known: dict[tuple[int, ...], FloatArray] = {}
     rows = []
-    for _ in range(count):
-        drawn = tuple(sorted(rng.integers(0, len(sets), len(sets)).tolist()))
-        if drawn not in known:
-            est = fit(model, [sets[i] for i in drawn], **options)
-            uninterrupted(est.message)
-            known[drawn] = est.values
-        rows.append(known[drawn])
+    with Bar(progress, count, 0, "resamples") as advance:
+        for _ in range(count):
+            drawn = tuple(sorted(rng.integers(0, len(sets), len(sets)).tolist()))
+            if drawn not in known:
+                est = fit(model, [sets[i] for i in drawn], **options)
+                uninterrupted(est.message)
+                known[drawn] = est.values
+            rows.append(known[drawn])
+            advance(1)
     return pd.DataFrame(rows, columns=list(whole_fit.names))

@@ -18,10 +18,10 @@ from freqid.data import DataSet, FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import Near, fitter_of
 from freqid.fitting.many.identity import at_conditions, fingerprint
-from freqid.fitting.many.progress import Bar
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
 from freqid.fitting.many.together import Done, minima
+from freqid.fitting.progress import Bar
 from freqid.fitting.search.descent import uninterrupted
 from freqid.models import GreyBox
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Structure
+from freqid.fitting.progress import Bar
 from freqid.fitting.search.descent import minimise
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Realisation
@@ -21,7 +23,11 @@ _REACH, _LIMIT = 10.0, 60
 
 
 def profile_intervals(
-    minimum: Minimum, scale: FloatArray, std: FloatArray, level: float = 0.95
+    minimum: Minimum,
+    scale: FloatArray,
+    std: FloatArray,
+    level: float = 0.95,
+    progress: bool = False,
 ) -> pd.DataFrame:
     """Lower and upper end of each parameter's interval by profile likelihood.
 
@@ -29,7 +35,7 @@ def profile_intervals(
     exceeds the least by no more than σ² χ²(level); where weights leave the noise coloured the
     threshold is widened as its standard error is. ``scale`` and ``std`` (P,) are the size of each
     unknown and the standard error of each parameter. Infinite where nothing holds the parameter
-    within ten standard errors.
+    within ten standard errors. ``progress`` shows how many ends are found.
 
     Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
     """
@@ -38,16 +44,22 @@ def profile_intervals(
     noise, own = minimum.noise_variance, std / scale
     white = noise * np.diag(minimum.determined.inverse)
     quantile = float(scipy.stats.chi2.ppf(level, 1))
-    rows = []
-    for i, x in enumerate(minimum.x):
-        if not np.isfinite(own[i]):
-            rows.append((-np.inf, np.inf))
-        elif own[i] == 0:
-            rows.append((x, x))
-        else:
-            inflated = max(own[i] ** 2 / white[i], 1e-12)
-            rise = noise * inflated * quantile
-            rows.append((_end(minimum, i, -own[i], rise), _end(minimum, i, own[i], rise)))
+    rows: list[list[float]] = []
+
+    def ends_of(i: int, x: float) -> Iterator[float]:
+        if not np.isfinite(own[i]) or own[i] == 0:
+            yield from (-np.inf, np.inf) if own[i] else (x, x)
+            return
+        rise = noise * max(own[i] ** 2 / white[i], 1e-12) * quantile
+        for step in (-own[i], own[i]):
+            yield _end(minimum, i, step, rise)
+
+    with Bar(progress, 2 * len(minimum.x), 0, "ends of profiles") as advance:
+        for i, x in enumerate(minimum.x):
+            rows.append([])
+            for end in ends_of(i, x):
+                rows[-1].append(end)
+                advance(1)
     ends = np.array(rows) * scale[:, None]
     index = pd.Index(minimum.structure.names, name="parameter")
     return pd.DataFrame(ends, columns=["lower", "upper"], index=index)
