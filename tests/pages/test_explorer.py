@@ -17,10 +17,14 @@ import pytest
 
 import freqid as fq
 from freqid.pages.explorer import answers
+from freqid.pages.explorer.bias_cells import cells_figure, cells_of, clicked
+from freqid.pages.explorer.figures import left_figure
+from freqid.pages.explorer.layout import layout
 from freqid.pages.explorer.page import application, explore, free_port
 from freqid.pages.explorer.scene import scene
 from freqid.pages.explorer.state import Own, State, presets
-from freqid.pages.explorer.words import sentence
+from freqid.pages.explorer.subjects import Subjects
+from freqid.pages.explorer.words import believed, sentence
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -141,7 +145,9 @@ return [...document.querySelectorAll('[role=slider]')].map(
 def press(browser, element_id, key, count):
     from selenium.webdriver.common.by import By
 
-    handle = browser.find_element(By.CSS_SELECTOR, f"#{element_id} [role=slider]")
+    place = f"#{element_id} [role=slider]"
+    until(browser, f"return document.querySelector('{place}') !== null", "the slider")
+    handle = browser.find_element(By.CSS_SELECTOR, place)
     for _ in range(count):
         handle.send_keys(key)
 
@@ -197,6 +203,67 @@ def test_who_hears_the_page_is_told_names_and_values(browser, address):
     table = browser.execute_script("return document.getElementById('table').href")
     assert table.startswith("data:text/csv")
     assert "frequency" in table
+
+
+DROP = """
+const [text, name] = arguments, files = new DataTransfer();
+files.items.add(new File([text], name));
+const more = {dataTransfer: files, bubbles: true, cancelable: true};
+document.dispatchEvent(new DragEvent('drop', more));
+"""
+SAID = "return document.getElementById('dropped').textContent"
+
+
+def test_a_file_dropped_on_the_page_is_read_as_read_does(browser, address, slow, tmp_path):
+    from selenium.webdriver.common.by import By
+
+    browser.get(address)
+    until(browser, f"{VERDICT}.startsWith('d = -2')", "the page")
+    # larger than any request may be, with a decimal comma and another channel
+    rows = np.column_stack([slow.time, slow.u, slow.y, slow.y**2])
+    lines = "\n".join(";".join(f"{v:.17f}".replace(".", ",") for v in row) for row in rows)
+    text = f"t [s];torque [N m];speed [rad/s];other\n{lines}\n{'# rest' + ' ' * 70}\n" * 1
+    text += "# a long comment\n" * 70_000
+    assert len(text) > 2**20
+    browser.execute_script(DROP, "no table at all", "evil.html")
+    until(browser, f"{SAID}.includes('suffix')", "the reason")
+    browser.execute_script(DROP, text, "../my run.csv")
+    until(browser, f"{SAID}.includes('name them')", "the question")
+    names = browser.find_elements(By.CSS_SELECTOR, "#channels select")
+    assert [n.text.split() for n in names] == [["torque", "speed", "other"]] * 2
+    browser.find_element(By.CSS_SELECTOR, "#channels button").click()
+    until(browser, "return location.search.includes('data=')", "its address")
+    until(browser, f"{VERDICT}.includes('explained')", "the fit")
+    code = browser.execute_script("return document.getElementById('code').textContent")
+    assert "fq.read('my run.csv', inputs='torque', outputs='speed')" in code
+    # a plant that does not fit is no good news: the samples were held for a tenth of their time
+    until(browser, "return document.getElementById('verdict').className.includes('doubt')", "doubt")
+    until(browser, "return document.getElementById('believed').textContent.includes('Hold')", "why")
+    shot(browser, "explorer_dropped")
+    browser.get(address + "?data=0123456789abcdef")
+    until(browser, f"{SAID}.includes('drop it again')", "what became of it")
+    assert not errors(browser)
+
+
+def test_the_map_of_bias_is_clicked_into(browser, address):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.by import By
+
+    browser.get(address)
+    until(
+        browser, "return document.querySelectorAll('#cells .heatmap-label text').length > 20", "map"
+    )
+    until(browser, "return document.getElementById('believed').textContent.includes('Hold')", "why")
+    # the fourth of eight columns, the lowest of ten rows: a tenth of the map from its corner
+    place = browser.find_element(By.CSS_SELECTOR, "#cells .nsewdrag")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", place)
+    width, height = place.size["width"], place.size["height"]
+    ActionChains(browser).move_to_element_with_offset(
+        place, int(width * (3.5 / 8 - 0.5)), int(height * 0.45)
+    ).click().perform()
+    until(browser, "return location.search.includes('factor=5')", "the factor")
+    until(browser, "return location.search.includes('hold=foh')", "the hold")
+    assert not errors(browser)
 
 
 @pytest.mark.parametrize("look", ["phone", "dark", "zoom"])
@@ -353,8 +420,10 @@ def test_every_preset_and_every_code_runs(tmp_path, monkeypatch):
 
 def test_an_own_record_takes_the_place_of_the_simulated_one():
     record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 2, 0.5e-3), 0.5e-3)
-    app = application(record)
-    assert repr(record)[1:-1] in str(app.layout)
+    import dash
+
+    subject, state = Subjects(None, record, "").linked("")
+    assert repr(record)[1:-1] in str(layout(dash, state, subject.record))
     shown = scene(State(factor=10), record)
     assert shown.slow.n_samples == 400
     assert shown.estimate["d"] < 0
@@ -490,18 +559,66 @@ def test_a_setting_is_worked_out_once(monkeypatch):
         return scene(state, record)
 
     monkeypatch.setattr(answers, "scene", counted)
-    known = answers.Answers(State.first(), None, "")
-    first = known.of(known.first)
-    assert known.of(replace(known.first, factor=5)) != first
-    assert known.of(known.first) == first
-    assert asked == [known.first.factor, 5]
+    known, begin = answers.Answers(Subjects(None, None, "")), State.first()
+    first = known.of(begin)
+    assert known.of(replace(begin, factor=5)) != first
+    assert known.of(begin) == first
+    assert asked == [begin.factor, 5]
 
 
 def test_settings_are_forgotten_one_by_one(monkeypatch):
     monkeypatch.setattr(answers, "_KEPT", 2)
-    known = answers.Answers(State.first(), None, "")
+    known = answers.Answers(Subjects(None, None, ""))
     worked = []
     monkeypatch.setattr(known, "_worked_out", lambda state: worked.append(state.factor) or ())
     for factor in (2, 3, 2, 4, 2, 3):
-        known.of(replace(known.first, factor=factor))
+        known.of(replace(State.first(), factor=factor))
     assert worked == [2, 3, 4, 3]
+
+
+def test_the_map_of_bias_is_that_of_bias_map():
+    state = State.first()
+    cells = cells_of(state, None)
+    table = fq.bias_map(fq.two_mass(), {"": fq.ChirpSpectrum(10, 80)}, cells.factors,
+                        ["zoh", "foh"], 0.5e-3, progress=False)  # fmt: skip
+    for (hold, name), errors in zip(cells.rows, cells.errors, strict=True):
+        own = table[(table["hold"] == hold) & (table["parameter"] == name)]
+        assert np.allclose(own.sort_values("factor")["relative_bias"], errors)
+    figure = cells_figure(cells, state)
+    assert len(figure["layout"]["shapes"]) == 1
+    assert cells_figure(cells, replace(state, sine=8.0))["data"] == []
+    point = {"points": [{"x": "1 in 5", "y": "FOH: d"}]}
+    assert (clicked(state, point).factor, clicked(state, point).hold) == (5, "foh")
+    odd_points = [
+        {"x": "1 in 6", "y": "ZOH: d"},
+        {"x": 5, "y": None},
+        {"x": ["1 in 5"], "y": "FOH"},
+    ]
+    for odd in (None, {}, {"points": 3}, {"points": []}, *({"points": [p]} for p in odd_points)):
+        assert clicked(state, odd) == state
+
+
+def test_the_map_of_a_record_holds_inputs_as_its_converter_did(slow):
+    state = State.first(None, slow)
+    cells = cells_of(state, slow)
+    exact = fq.asymptotic_fit(
+        fq.two_mass(), fq.ChirpSpectrum(state.low, state.high), 5e-3, "zoh",
+        fq.ZeroOrderHold(0.5e-3),
+    )  # fmt: skip
+    row = cells.rows.index(("zoh", "d"))
+    assert cells.errors[row][0] == pytest.approx(exact["d"] / 10 - 1, rel=1e-3)
+
+
+def test_what_is_left_is_drawn_and_believed_as_the_verdict_says(slow):
+    noisy = slow.with_noise(0.5, seed=2)
+    state = State.first(None, noisy)
+    shown = scene(state, noisy)
+    measured, left = left_figure(shown)["data"]
+    level = 2 * 0.5 * np.sqrt(1 / noisy.n_samples)
+    assert np.median(left["y"]) == pytest.approx(level, rel=0.5)
+    assert max(measured["y"]) > 20 * level
+    said, trusted = believed(shown)
+    assert trusted == shown.estimate.verdict.trusted
+    assert shown.estimate.witness.sentence in said[-1]
+    wrong = scene(replace(state, hold="zoh"), noisy)
+    assert not believed(wrong)[1]

@@ -57,7 +57,8 @@ def test_crafted_requests(client):
         "plant": "first-order", "factor": 2, "hold": "zoh", "band": [0.5, 1.5], "noise": 0,
     }  # fmt: skip
     valid = {
-        "output": draw["output"], "changedPropIds": [], "state": [[]],
+        "output": draw["output"], "changedPropIds": [],
+        "state": [[], {"id": "url", "property": "search", "value": ""}],
         "outputs": [
             {"id": o.rpartition(".")[0], "property": o.rpartition(".")[2]}
             for o in draw["output"].strip(".").split("...")
@@ -82,6 +83,38 @@ def test_crafted_requests(client):
         }  # fmt: skip
         answer = client.post(at, json=body)
         assert answer.status_code in (200, 204, 400, 404, 405), (i, answer.status_code)
+
+
+def test_files_come_in_order_and_stay_in_their_folder(client, tmp_path):
+    """Pieces of files: keys, places, sizes and names that are none are refused, in words."""
+    key = "0123456789abcdef"
+    table = b"t;u;y\n" + b"".join(b"%d;%d;%d\n" % (i, i % 5, i % 7) for i in range(300))
+
+    def piece(data, **asked):
+        at = {"key": key, "name": "a.csv", "at": 0} | asked
+        return client.post("/piece", query_string=at, data=data)
+
+    def read(**asked):
+        return client.post("/read", query_string={"key": key, "name": "a.csv"} | asked).get_json()
+
+    assert piece(b"x" * (LARGEST + 1)).status_code == 413
+    assert piece(b"x", headers={}).status_code == 200
+    evil = client.post(
+        "/piece", query_string={"key": key}, headers={"Origin": "http://evil.example"}
+    )
+    assert evil.status_code == 403
+    for odd in ("", "..", "0123", "../../../etc/pas", "0123456789ABCDEF", "g" * 16):
+        assert "hexadecimal" in piece(b"x", key=odd).get_json()["error"]
+        assert "hexadecimal" in read(key=odd)["error"]
+    assert "at byte 0" in piece(b"again").get_json()["error"]
+    assert piece(b"", at="x").get_json()["error"]
+    other = "f" * 16
+    assert "does not exist" in read(key=other)["error"]
+    for part in range(0, len(table), 100):
+        assert piece(table[part : part + 100], key=other, at=part).get_json()["error"] is None
+    assert read(key=other) == {"error": None, "channels": []}
+    lost = client.post("/read", query_string={"key": "e" * 16, "name": "../../etc/passwd"})
+    assert "etc" not in lost.get_json()["error"].replace("etc_passwd", "")
 
 
 def test_links_and_records_of_any_kind():

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, InputError
 from freqid.fitting import Z95
 from freqid.models import simulate
 from freqid.pages.explorer.scene import Scene, label_of, rounding_said
@@ -22,9 +22,12 @@ from freqid.plots import (
     trace,
     unit_of,
 )
+from freqid.validation import compare
 
 # curves that look alike wherever they are
 _STYLES = {"estimate": 2, "measured": 5}
+# lines of a spectrum that are drawn
+_LINES = 500
 # part of a parameter below which its axis is linear, as far as it then reaches in tens, and ticks
 _LINEAR, _TICKS = 0.01, (0.01, 0.1, 1.0, 10.0, 100.0)
 
@@ -58,7 +61,7 @@ def bode_figure(shown: Scene) -> Part:
         "type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1,
         "fillcolor": COLOURS[5], "opacity": 0.12, "line": {"width": 0}, "layer": "below",
     }  # fmt: skip
-    layout = _base("Frequency response") | bode_axes(
+    layout = base("Frequency response") | bode_axes(
         0.48,
         {"tickvals": ticks},
         amplitude_label(unit_of([one.response for one in curves])),
@@ -75,7 +78,7 @@ def nyquist_figure(shown: Scene) -> Part:
         G = frf.response[0, 0][keep if keep.sum() > 1 else slice(None)]
         mode = "markers" if name == "measured" else "lines"
         data.append(trace(G.real, G.imag, name or "", style, mode=mode) | {"showlegend": False})
-    layout = _base("Nyquist curve, inside the chirp's band") | {
+    layout = base("Nyquist curve, inside the chirp's band") | {
         "xaxis": {"title": {"text": "real part"}},
         "yaxis": {"title": {"text": "imaginary part"}, "scaleanchor": "x"},
     }
@@ -106,7 +109,7 @@ def time_figure(shown: Scene) -> Part:
             else trace(t, u, held, style, mode="markers")
         )  # fmt: skip
         data.append(trace(t, y[inside], seen, style, axis=2, mode=mode))
-    layout = _base("Input and output, a few samples") | {
+    layout = base("Input and output, a few samples") | {
         "xaxis": {"title": {"text": "time / s"}, "anchor": "y2", "range": [t0, t1]},
         "yaxis": {"domain": [0.55, 1], "title": {"text": "input"}},
         "yaxis2": {"domain": [0, 0.45], "title": {"text": "output"}},
@@ -127,7 +130,7 @@ def bias_figure(shown: Scene) -> Part:
     est, truth = shown.estimate, shown.state.model()
     if est is None or label_of(shown.state) == "black box, ZOH":
         note = "a black box has no physical parameters" if est is not None else "no fit"
-        return {"data": [], "layout": _base(f"Parameters: {note}")}
+        return {"data": [], "layout": base(f"Parameters: {note}")}
     ratio = [est[n] / truth[n] for n in est.names]
     std = np.sqrt(np.diag(est.covariance_matrix)) / np.abs([truth[n] for n in est.names])
     away, half = np.array(ratio) - 1, Z95 * std
@@ -142,13 +145,51 @@ def bias_figure(shown: Scene) -> Part:
              "error_y": bars, "cliponaxis": False, "showlegend": False}]  # fmt: skip
     reach = float(np.abs([low, high]).max())
     # those that would lie on one another at zero are left out
-    ticks = [t for t in _TICKS if 0.15 * reach <= _spread(t) <= 1.3 * reach] or [_LINEAR]
-    layout = _base(f"Parameters: estimate over {shown.truth} value, less one") | {
+    ticks = [t for t in _TICKS if 0.15 * reach <= _spread(t) <= 1.3 * reach] or [
+        float(10 ** np.floor(np.log10(_LINEAR * np.sinh(max(reach, 1e-9)))))
+    ]
+    layout = base(f"Parameters: estimate over {shown.truth} value, less one") | {
         "yaxis": {"title": {"text": "relative error"}, "range": [-1.35 * reach, 1.35 * reach],
                   "tickvals": [float(_spread(v)) for v in (*(-t for t in ticks), 0.0, *ticks)],
                   "ticktext": [f"{100 * v:g} %" for v in (*(-t for t in ticks), 0.0, *ticks)]},
     }  # fmt: skip
     return {"data": data, "layout": layout}
+
+
+def left_figure(shown: Scene) -> Part:
+    """Amplitudes, over frequency, of what was measured and of what the fit leaves of it."""
+    est, title = shown.estimate, "What the fit leaves of the output"
+    if est is None:
+        return {"data": [], "layout": base(f"{title}: no fit")}
+    low, high = shown.state.band(shown.slow.dt, shown.slow.duration)
+    try:
+        beside = compare(est, shown.slow, band=(low, high), hold=shown.hold)
+    except InputError as error:
+        return {"data": [], "layout": base(f"{title}: {error}")}
+    measured = beside.measured[:, 0]
+    left = beside.residuals.reshape(len(measured), -1)[:, 0]
+    data = [
+        trace(*_peaks(y, shown.slow.dt, (low, high)), name, line(look))
+        for y, name, look in ((measured, "measured", 0), (left, "left", 2))
+    ]
+    layout = base(title) | {
+        "xaxis": {"type": "log", "title": {"text": "frequency / Hz"}},
+        "yaxis": {"type": "log", "title": {"text": "amplitude"}, "exponentformat": "power",
+                  "dtick": 1},
+    }  # fmt: skip
+    return {"data": data, "layout": layout}
+
+
+def _peaks(y: FloatArray, dt: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Amplitudes at the lines of a band; of many lines the largest of each short stretch."""
+    f = np.fft.rfftfreq(len(y), dt)
+    amplitude = 2 * np.abs(np.fft.rfft(y)) / len(y)
+    inside = (f >= band[0]) & (f <= band[1]) & (f > 0)
+    f, amplitude = f[inside], amplitude[inside]
+    if len(f) <= _LINES:
+        return f, amplitude
+    stretches = np.unique(np.searchsorted(f, np.geomspace(f[0], f[-1], _LINES)))
+    return f[stretches], np.maximum.reduceat(amplitude, stretches)
 
 
 def _spread(x: FloatArray | float) -> FloatArray:
@@ -158,7 +199,7 @@ def _spread(x: FloatArray | float) -> FloatArray:
     return np.asarray(np.arcsinh(np.asarray(x) / _LINEAR))
 
 
-def _base(title: str) -> Part:
+def base(title: str) -> Part:
     return {
         "title": {"text": title, "font": {"size": 14}, "x": 0.02, "y": 0.97},
         "margin": {"l": 62, "r": 34, "t": 74, "b": 46},

@@ -15,8 +15,16 @@ if TYPE_CHECKING:
     from dash.development.base_component import Component
 
 
-def layout(dash: ModuleType, start: State, record: Record | None) -> Component:
-    """Controls beside figures, and under them what makes these; it opens at ``start``."""
+def outside(dash: ModuleType) -> Component:
+    """The page before it knows what its address asks for."""
+    return dash.html.Div([dash.dcc.Location(id="url", refresh=False), dash.html.Div(id="page")])
+
+
+def layout(dash: ModuleType, start: State, record: Record | None, lost: bool = False) -> Component:
+    """Controls beside figures, and under them what makes these; it opens at ``start``.
+
+    ``lost`` says that the file of the address is not known any more.
+    """
     html, dcc = dash.html, dash.dcc
 
     def control(label: str, element: Component) -> Component:
@@ -49,20 +57,22 @@ def layout(dash: ModuleType, start: State, record: Record | None) -> Component:
         ),
         control(
             "output noise, % of its rms",
-            _slider(dash, "noise", (0, 20), 0.5, 0, {0: "0", 20: "20"}),
+            _slider(dash, "noise", (0, 20), 0.5, 100 * start.noise, {0: "0", 20: "20"}),
         ),
         html.Details(
             [html.Summary("the true plant" if record is None else "where the fit begins"),
              html.Div(id="sliders")], open=False, id="true",
         ),
     ]  # fmt: skip
+    controls.append(_drop(dash, lost))
     kept = []
     if record is not None:
         # what belongs to simulated experiments alone
         kept = [controls.pop(5), controls.pop(0)]
         controls.insert(0, html.P(repr(record)[1:-1], className="hint"))
     hidden = html.Div(style={"display": "none"}, children=[
-        *kept, dcc.Store(id="sine", data=0.0), html.Div(id="address"),
+        *kept, dcc.Store(id="sine", data=start.sine), dcc.Store(id="settled"),
+        html.Div(id="address"),
     ])  # fmt: skip
     config = {
         "displaylogo": False, "toImageButtonOptions": {"format": "png", "scale": 2},
@@ -77,14 +87,25 @@ def layout(dash: ModuleType, start: State, record: Record | None) -> Component:
 
     return html.Main(
         [
-            dcc.Location(id="url", refresh=False),
             html.H1("What decimation does to an identified model"),
             html.P(id="verdict", className="verdict", role="status", **{"aria-live": "polite"}),
             html.Div(
                 [
                     html.Section(controls, className="controls"),
                     html.Section(
-                        [graph("bode"), graph("nyquist"), graph("time"), graph("bias")],
+                        [
+                            graph("bode"),
+                            graph("nyquist"),
+                            graph("time"),
+                            graph("bias"),
+                            graph("left"),
+                            html.Div(
+                                [html.H2("May it be believed?"), html.Div(id="believed")],
+                                className="graph words",
+                                role="status",
+                            ),
+                            html.Div(graph("cells"), className="wide"),
+                        ],
                         className="graphs",
                     ),
                 ],
@@ -106,6 +127,21 @@ def layout(dash: ModuleType, start: State, record: Record | None) -> Component:
             hidden,
         ]
     )
+
+
+def _drop(dash: ModuleType, lost: bool) -> Component:
+    """Where a file is dropped, or chosen; drop.js does both, and shows what ``read`` says."""
+    html = dash.html
+    said = "The file of this address is not here any more; drop it again." if lost else ""
+    return html.Div(
+        [
+            html.Span("a record of your own", className="label"),
+            html.Button("choose a file, or drop one here", id="choose", type="button"),
+            html.P(said, id="dropped", className="hint", role="status"),
+            html.Div(id="channels"),
+        ],
+        id="drop", className="control",
+    )  # fmt: skip
 
 
 def parameter(dash: ModuleType, p: Parameter, factor: float) -> Component:

@@ -1,6 +1,8 @@
 """The page around the explorer: its colours, light and dark, and what is heard of its sliders."""
 
-PAGE = """<!doctype html>
+from importlib import resources
+
+_PAGE = """<!doctype html>
 <html lang="en"><head>{%metas%}<meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{%title%}</title>{%favicon%}{%css%}<style>
 :root { color-scheme: light dark; --ink: #1a1a1a; --paper: #ffffff; --faint: #5f6368;
@@ -14,7 +16,7 @@ body { font: 15px/1.45 system-ui, sans-serif; color: var(--ink); background: var
 h1 { font-size: 1.3rem; margin: 0.2rem 0; } h2 { font-size: 1.05rem; }
 .verdict { border-left: 0.4rem solid var(--good); background: var(--tint); padding: 0.5rem 0.8rem;
            height: 3.6em; overflow-y: auto; margin: 0.4rem 0 0.8rem; }
-.verdict.doubt { border-color: var(--bad); }
+.verdict.doubt { border-color: var(--bad); } .verdict.waiting { border-color: var(--rail); }
 .columns { display: grid; grid-template-columns: minmax(16rem, 21rem) 1fr; gap: 1rem; }
 .graphs { display: grid; grid-template-columns: 1fr 1fr; gap: 0.7rem; }
 .graph, .graph.dash-graph { height: 23rem !important; min-width: 0; }
@@ -24,7 +26,8 @@ h1 { font-size: 1.3rem; margin: 0.2rem 0; } h2 { font-size: 1.05rem; }
 pre { background: var(--tint); padding: 0.7rem; overflow-x: auto; } .code { position: relative; }
 .code > div { position: absolute; top: 0.5rem; right: 0.7rem; cursor: pointer; }
 a { color: inherit; } .links a { margin-right: 1.2rem; }
-.graph text { fill: var(--ink) !important; } .graph .gridlayer path, .graph .zerolinelayer path {
+.graph text:not(.heatmap-label *) { fill: var(--ink) !important; }
+.graph .gridlayer path, .graph .zerolinelayer path {
   stroke: var(--grid) !important; }
 .graph .modebar-btn path { fill: var(--faint) !important; }
 .graph path[style*="stroke: rgb(0, 0, 0)"] { stroke: var(--ink) !important; }
@@ -44,6 +47,14 @@ a { color: inherit; } .links a { margin-right: 1.2rem; }
 #hold label, #plant label, .controls [class*=slider] [class*=mark], .controls summary {
   color: var(--ink) !important; }
 .controls .dash-dropdown, .controls .dash-dropdown * { color: #1a1a1a !important; }
+.wide { grid-column: 1 / -1; } .graph.words { overflow-y: auto; height: 23rem; }
+.words h2 { margin: 0.2rem 0 0.4rem; font-size: 0.95rem; font-weight: 600; }
+.words ul { padding-left: 1.1rem; margin: 0.3rem 0; } .words p { margin: 0.3rem 0; }
+#drop { border: 2px dashed var(--rail); border-radius: 0.4rem; padding: 0.6rem; }
+#drop.over { border-color: var(--blue); background: var(--tint); }
+#drop button, #drop select { font: inherit; color: var(--ink); background: var(--tint);
+  border: 1px solid var(--rail); border-radius: 0.3rem; padding: 0.3rem 0.6rem; max-width: 100%; }
+#drop p { margin: 0.4rem 0 0; min-height: 1.2em; } #drop label { display: block; margin: 0.3rem 0; }
 @media (max-width: 62rem) { .columns, .graphs { grid-template-columns: minmax(0, 1fr); } }
 </style><script>
 // values of the sliders of frequencies and of factors are logarithms
@@ -62,4 +73,10 @@ const name = () => document.querySelectorAll("[role=slider]").forEach(one => {
 });
 new MutationObserver(name).observe(document.documentElement,
   {childList: true, subtree: true, attributes: true, attributeFilter: ["aria-valuenow"]});
-</script></head><body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}</footer></body></html>"""
+{drop}</script></head><body>{%app_entry%}<footer>{%config%}{%scripts%}{%renderer%}</footer></body></html>"""
+
+
+def page() -> str:
+    """The page as Dash fills it in, with the script that takes files."""
+    script = resources.files("freqid.pages.explorer").joinpath("drop.js")
+    return _PAGE.replace("{drop}", script.read_text(encoding="utf-8"))

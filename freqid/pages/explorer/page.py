@@ -15,10 +15,13 @@ from typing import TYPE_CHECKING
 from freqid.checks import InputError, whole
 from freqid.data import Record
 from freqid.pages.explorer.answers import Answers
+from freqid.pages.explorer.bias_cells import clicked
 from freqid.pages.explorer.doors import guard
-from freqid.pages.explorer.layout import layout, log_of, parameter
-from freqid.pages.explorer.look import PAGE
-from freqid.pages.explorer.state import Own, State, presets
+from freqid.pages.explorer.layout import layout, log_of, outside, parameter
+from freqid.pages.explorer.look import page
+from freqid.pages.explorer.state import Own, presets
+from freqid.pages.explorer.subjects import Subjects
+from freqid.pages.explorer.upload import receive
 from freqid.plots import Part
 
 if TYPE_CHECKING:
@@ -58,7 +61,7 @@ def explore(
     allowed = None if allow_remote else _LOOPBACK
     app, answers = _built(record, allowed, plant, source)
     # while the browser opens: what it asks first is then known, and the libraries are loaded
-    threading.Thread(target=answers.of, args=(answers.first,), daemon=True).start()
+    threading.Thread(target=answers.of, args=(answers.subjects.first.first,), daemon=True).start()
     app.run(host=host, port=str(free), debug=False)
 
 
@@ -104,59 +107,67 @@ def _built(
             f"the explorer shows plants of one input and one output; this one has "
             f"{plant.model.n_inputs} and {plant.model.n_outputs}"
         )
-    first = State.first(plant, record)
+    subjects = Subjects(plant, record, source)
     app = dash.Dash(
         "freqid", title="freqid explorer", update_title="", serve_locally=True,
-        suppress_callback_exceptions=True, index_string=PAGE,
+        suppress_callback_exceptions=True, index_string=page(),
     )  # fmt: skip
-    app.layout = layout(dash, first, record)
-    answers = Answers(first, record, source)
+    app.layout = outside(dash)
+    answers = Answers(subjects)
     _wire(dash, app, answers)
     guard(app.server, hosts)
+    receive(app.server, subjects)
     return app, answers
 
 
 def _wire(dash: ModuleType, app: Dash, answers: Answers) -> None:
-    from dash import ALL, Input, Output, State as Kept
+    from dash import ALL, Input, Output, State as Kept, ctx
 
-    first = answers.first
-    plants = first.plants()
+    subjects = answers.subjects
+
+    @app.callback(Output("page", "children"), Input("url", "search"))
+    def opened(search: str | None) -> Component:
+        subject, state = subjects.linked(search)
+        return layout(dash, state, subject.record, subjects.lost(search))
 
     @app.callback(Output("sliders", "children"), Input("plant", "value"), Kept("url", "search"))
     def sliders(plant: str, search: str | None) -> list[Component]:
-        known = State.of(search, first)
+        subject, known = subjects.linked(search)
         scale = known.factors if known.plant == plant else {}
-        rows = [(p, scale.get(p.name, 1.0)) for p in plants[plant]().free_parameters]
-        return [parameter(dash, p, value) for p, value in rows]
+        chosen = subject.first.plants()[plant]()
+        return [parameter(dash, p, scale.get(p.name, 1.0)) for p in chosen.free_parameters]
 
     @app.callback(
         Output("plant", "value"), Output("factor", "value"), Output("hold", "value"),
         Output("band", "value"), Output("noise", "value"), Output("sine", "data"),
-        Input("preset", "value"), Kept("url", "search"),
+        Input("preset", "value"), Input("cells", "clickData"), Kept("settled", "data"),
+        Kept("url", "search"), prevent_initial_call=True,
     )  # fmt: skip
     def chosen(
-        name: str | None, search: str | None
+        name: str | None, click: object, settled: str | None, search: str | None
     ) -> tuple[str, int, str, list[float], float, float]:
-        # without a preset this is the page being opened: its link says what it shows
-        state = presets()[name] if name else State.of(search, first)
+        _, now = subjects.linked(settled or search)
+        preset = presets().get(name or "")
+        state = clicked(now, click) if ctx.triggered_id == "cells" else preset or now
         band = log_of(state.low, state.high)
         return state.plant, state.factor, state.hold, band, 100 * state.noise, state.sine
 
     @app.callback(
         Output("bode", "figure"), Output("nyquist", "figure"), Output("time", "figure"),
-        Output("bias", "figure"), Output("verdict", "children"), Output("verdict", "className"),
-        Output("code", "children"), Output("link", "children"), Output("link", "href"),
-        Output("table", "href"), Output("python", "href"),
+        Output("bias", "figure"), Output("left", "figure"), Output("verdict", "children"),
+        Output("verdict", "className"), Output("code", "children"), Output("link", "children"),
+        Output("link", "href"), Output("table", "href"), Output("python", "href"),
         Input("plant", "value"), Input("factor", "value"), Input("hold", "value"),
         Input("band", "value"), Input("noise", "value"), Input("sine", "data"),
         Input({"role": "parameter", "name": ALL}, "value"),
-        Kept({"role": "parameter", "name": ALL}, "id"),
+        Kept({"role": "parameter", "name": ALL}, "id"), Kept("url", "search"),
     )  # fmt: skip
     def draw(
         plant: str, factor: int, hold: str, band: list[float], noise: float, sine: float,
-        values: list[float], ids: list[dict[str, str]],
+        values: list[float], ids: list[dict[str, str]], search: str | None,
     ) -> tuple[Part | str, ...]:  # fmt: skip
-        names = {p.name for p in plants[plant]().free_parameters}
+        first = subjects.linked(search)[0].first
+        names = {p.name for p in first.plants()[plant]().free_parameters}
         scale = {
             i["name"]: float(f"{10**v:.4g}")
             for i, v in zip(ids, values, strict=True)
@@ -169,9 +180,37 @@ def _wire(dash: ModuleType, app: Dash, answers: Answers) -> None:
         ).valid()  # fmt: skip
         return answers.of(state)
 
-    # the address follows, and one step back leaves the page
+    @app.callback(
+        Output("believed", "children"), Output("verdict", "className", allow_duplicate=True),
+        Input("settled", "data"), prevent_initial_call="initial_duplicate",
+    )  # fmt: skip
+    def believe(settled: str | None) -> tuple[list[Component], object]:
+        if not settled:
+            return [dash.html.P("…")], dash.no_update
+        subject, state = subjects.linked(settled)
+        said, trusted = answers.verdict(state)
+        reasons = dash.html.Ul([dash.html.Li(reason) for reason in said[1:]])
+        # of a simulated experiment the truth is known, and has been told
+        look = "good" if trusted else "doubt"
+        known = dash.no_update if subject.record is None else f"verdict {look}"
+        return [dash.html.P(dash.html.Strong(said[0])), reasons], known
+
+    @app.callback(Output("cells", "figure"), Input("settled", "data"))
+    def map_of_bias(settled: str | None) -> Part:
+        return answers.cells(subjects.linked(settled)[1]) if settled else {}
+
+    # the address follows, one step back leaves the page, and what takes longer is asked for once
+    # the controls have come to rest
     app.clientside_callback(
-        "href => { if (href && href.length > 1) history.replaceState(null, '', href); return ''; }",
+        """href => {
+          if (!href || href.length < 2) return '';
+          history.replaceState(null, '', href);
+          clearTimeout(window.atRest);
+          const search = new URL(href, location.href).search;
+          window.atRest = setTimeout(
+            () => dash_clientside.set_props('settled', {data: search}), 350);
+          return '';
+        }""",
         Output("address", "children"),
         Input("link", "href"),
         prevent_initial_call=True,

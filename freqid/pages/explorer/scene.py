@@ -109,8 +109,7 @@ def scene(state: State, record: Record | None = None) -> Scene:
     """Simulate (or take ``record``), decimate and fit."""
     model = state.model()
     if record is None:
-        same = replace(state, factor=1, hold="zoh", noise=0.0).query()
-        fast = _experiment(same, state.own)
+        fast = _experiment(state.plainly().query(), state.own)
         if state.noise:
             fast = fast.with_noise(state.noise * float(fast.y.std()))
     else:

@@ -25,7 +25,7 @@ HOLDS = {
 
 
 # what a link says, each by its name
-_IN_LINK = ("plant", "factor", "hold", "low", "high", "noise", "sine")
+_IN_LINK = ("plant", "factor", "hold", "low", "high", "noise", "sine", "data")
 # part of the input's power that its band holds
 _DRIVEN = 0.96
 
@@ -54,10 +54,12 @@ class State:
     own: Own | None = field(default=None, compare=False, repr=False)
     # sample time of one's own record in s
     step: float | None = field(default=None, compare=False, repr=False)
+    # a file that was dropped on the page, by its key
+    data: str = ""
 
     def query(self) -> str:
         """The state as the query of a link."""
-        flat = {k: getattr(self, k) for k in _IN_LINK}
+        flat = {k: getattr(self, k) for k in _IN_LINK if k != "data" or self.data}
         return "?" + urlencode(flat | {f"x.{k}": v for k, v in self.factors.items() if v != 1})
 
     @classmethod
@@ -133,6 +135,10 @@ class State:
         tone = float(np.clip(self.sine, top / 1800, top)) if self.sine else 0.0
         return replace(self, low=low, high=high, noise=min(self.noise, 1.0), sine=tone)
 
+    def plainly(self) -> State:
+        """The same experiment, whatever is kept of it and assumed of it."""
+        return replace(self, factor=1, hold="zoh", noise=0.0)
+
     def model(self) -> GreyBox:
         """The true plant: its parameters times the factors of the sliders."""
         plant = self.plants()[self.plant]()
@@ -204,6 +210,11 @@ def presets() -> dict[str, State]:
         "Figure 9: ZOH and FOH": replace(second, hold="foh"),
         "Figure 10: ZOH follows the fast plant": second,
     }
+
+
+def key_of(query: str | None) -> str:
+    """The key of the dropped file that the query of a link names; empty for none."""
+    return dict(parse_qsl((query or "").lstrip("?"))).get("data", "")
 
 
 def around(plant: GreyBox) -> tuple[float, float]:

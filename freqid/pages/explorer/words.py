@@ -9,6 +9,8 @@ import numpy as np
 from freqid.fitting import Z95
 from freqid.pages.explorer.scene import Scene, label_of, rounding_said
 
+# reasons of a verdict that are shown
+_REASONS = 4
 # part by which a number may be off and is right
 _RIGHT = 0.02
 
@@ -62,6 +64,20 @@ def _of_black_box(shown: Scene) -> tuple[str, bool]:
     worst, f = float(off.max()), float(true.frequency[inside][off.argmax()])
     text += f"; its response is off by up to {100 * worst:.3g} %, at {f:.3g} Hz"
     return text, bool(est.signs) or worst > _RIGHT
+
+
+def believed(shown: Scene) -> tuple[list[str], bool]:
+    """Whether the estimate may be believed, and why, what a black box says beside it; whether it
+    is trusted.
+    """
+    est = shown.estimate
+    if est is None:
+        return ["No fit, no verdict."], False
+    with rounding_said():
+        graded, witness = est.verdict, est.witness
+    said = [graded.head, *graded.reasons[:_REASONS]]
+    said.append(f"black box beside it: {witness.verdict}: {witness.sentence}")
+    return [f"{s[0].upper()}{s[1:]}" for s in said], graded.trusted
 
 
 def table(shown: Scene) -> str:
