@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from freqid.checks import InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.kinds import damaged, existing, missing
 from freqid.data.readers.mat import loaded
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # Hz of each unit of frequency
 _HERTZ = {
@@ -68,6 +73,13 @@ def of_universal(path: Path) -> FrequencyResponse:
 
     outputs = list(dict.fromkeys(end(s, "rsp") for s in found))
     inputs = list(dict.fromkeys(end(s, "ref") for s in found))
+    units: dict[str, str] = {}
+    for s in found:
+        # what is measured, over what it was driven by
+        for name, label in ((end(s, "rsp"), "ordinate"), (end(s, "ref"), "orddenom")):
+            unit = str(s.get(f"{label}_axis_units_lab") or "").strip()
+            if unit and unit.upper() != "NONE":
+                units[name] = unit
     f = np.asarray(found[0]["x"], dtype=float)
     G = np.full((len(outputs), len(inputs), len(f)), np.nan + 0j)
     for s in found:
@@ -76,16 +88,28 @@ def of_universal(path: Path) -> FrequencyResponse:
         G[outputs.index(end(s, "rsp")), inputs.index(end(s, "ref"))] = s["data"]
     if np.isnan(G).any():
         raise InputError(f"holds {len(found)} responses, not all of {outputs} from {inputs}")
-    return FrequencyResponse(f, G, input_names=inputs, output_names=outputs)
+    apart = not set(inputs) & set(outputs)
+    return FrequencyResponse(
+        f, G, input_names=inputs, output_names=outputs, units=units if apart else None
+    )
 
 
-def of_matlab(path: Path) -> FrequencyResponse:
+def of_matlab(
+    path: Path, of_frame: Callable[[pd.DataFrame], FrequencyResponse]
+) -> FrequencyResponse:
+    """Frequencies and a complex array, or what ``of_frame`` takes, magnitude and phase, say."""
     try:
         content = loaded(existing(path))
     except NotImplementedError:
         raise InputError("is a MAT file of version 7.3; save it as version 7") from None
     arrays = {k: np.asarray(v) for k, v in content.items() if not k.startswith("__")}
     found = [k for k, v in arrays.items() if np.iscomplexobj(v) and v.ndim >= 1]
+    if not found:
+        import pandas as pd
+
+        long = {k: v for k, v in arrays.items() if v.ndim == 1 and v.dtype.kind in "fiu"}
+        if len(long) > 2 and len({len(v) for v in long.values()}) == 1:
+            return of_frame(pd.DataFrame(long))
     axes = [k for k in arrays if re.fullmatch(FREQUENCY, k.casefold())]
     if len(found) != 1 or not axes:
         raise InputError(

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from pathlib import PurePath
+
+import numpy as np
 
 from freqid.checks import InputError, listed
 from freqid.data.frequency_response import FrequencyResponse
@@ -18,6 +21,14 @@ def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
         raise InputError("a stream is not in memory: take stream.load() here")
     if hasattr(data, "frdata"):
         data = FrequencyResponse.from_control(data)
+    if isinstance(data, str | PurePath):
+        raise InputError(f"data={str(data)!r} is text; freqid.read({str(data)!r}) makes a record")
+    if hasattr(data, "columns"):
+        raise InputError(
+            f"data is a {type(data).__name__}; Record.from_frame(data) makes a record of a table"
+        )
+    if isinstance(data, np.ndarray):
+        raise InputError(f"data is an array {data.shape}; Record(u, y, dt) holds an experiment")
     if not isinstance(data, DataSet | Iterable):
         raise InputError(f"data={data!r} holds no experiment; give a record or a response")
     sets = (data,) if isinstance(data, DataSet) else tuple(listed("data", data))

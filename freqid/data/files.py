@@ -16,6 +16,7 @@ from freqid.data.readers.kinds import LOGS, WRITERS
 from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
+from freqid.data.response_files import looks_like_response
 from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
@@ -51,8 +52,8 @@ def read(
 ) -> Record:
     r"""A record from a file, which is looked at before anything is asked.
 
-    Text tables (.csv, .txt, .dat, .tsv, .asc, also .gz, .bz2, .xz) with any separator, decimal
-    sign, comments, units and time; .xlsx (extra ``excel``), .parquet (extra ``parquet``), .mat
+    Text tables (.csv, .txt, .dat, .log, .lvm or any other suffix, also .gz, .bz2, .xz, .zip) with
+    any separator, decimal sign, comments, units and time; .xlsx (extra ``excel``), .parquet (extra ``parquet``), .mat
     (version 7.3 with extra ``hdf5``), .npz, .h5 (extra ``hdf5``) and .uff (data set 58, extra
     ``uff``). Robot logs, whose channels have clocks of their own (see ``channels`` and
     ``Record.from_logs``): .ulg (PX4, extra ``ulog``), .bag, .mcap and folders of ROS 2 bags
@@ -101,6 +102,8 @@ def read(
         for name in units or {}:
             if name not in (*frame.columns, "time", "reference"):
                 raise InputError(unknown("units", name, [str(c) for c in frame.columns]))
+        if inputs is None and outputs is None and looks_like_response(frame):
+            raise InputError("holds a frequency response, no samples: read_response reads it")
         told = {**frame.attrs.get("units", {}), **(units or {})}
         frame, said = with_time(frame, time, told, dt)
         if stop is not None and "time" in frame.columns:

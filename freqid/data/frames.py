@@ -10,6 +10,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError, positive, real, unknown
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
+from freqid.data.readers.table import named
 from freqid.data.regular_time import on_a_grid
 from freqid.data.remembered import (
     as_printed,
@@ -24,6 +25,7 @@ from freqid.data.remembered import (
     kept_reference,
     kept_step,
 )
+from freqid.data.time_column import time_named, with_time
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -53,6 +55,7 @@ def record_of(
     dt = own_step if dt is None else dt
     if own_inputs is not None and inputs is None and outputs is None:
         inputs, outputs = own_inputs, [c for c in frame.columns if c not in own_inputs]
+    frame, said = _with_its_time(frame, units, dt)
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
@@ -61,7 +64,7 @@ def record_of(
     told = kept_channels(frame, signals, reference)
     u_names, y_names = _channels(signals, inputs, outputs, reference, told)
     between = kept_hold(frame, u_names) if hold is None else hold
-    notes = list(kept_notes(frame))
+    notes = [*kept_notes(frame), *said]
     if resample:
         held = set(u_names) if between is None or between == "zoh" else set()
         frame, more = _resampled(frame, signals, held)
@@ -88,6 +91,26 @@ def record_of(
         conditions=kept_conditions(frame),
         clocks_apart=kept_apart(frame),
     )
+
+
+def _with_its_time(
+    frame: pd.DataFrame, units: Mapping[str, str] | None, dt: float | None
+) -> tuple[pd.DataFrame, list[str]]:
+    """The frame with a time called so, found as in a file where there is none yet."""
+    if _times(frame) is not None:
+        return frame, []
+    plain = {str(c): named(str(c)) for c in frame.columns}
+    own = time_named(list(plain))
+    if own is not None and own in plain:
+        told = {plain[own][0]: plain[own][1]} if plain[own][1] else {}
+        frame = frame.rename(columns={own: plain[own][0]})
+        return with_time(frame, plain[own][0], {**told, **(units or {})}, dt)
+    index = frame.index
+    even = index.dtype.kind == "f" and len(index) > 2 and index.is_monotonic_increasing
+    if dt is None and index.name is None and even:
+        # a time that nobody named
+        return frame.rename_axis("time"), ["the index was taken for the time, in s"]
+    return frame, []
 
 
 def samples_frame(record: Record) -> pd.DataFrame:
@@ -134,7 +157,8 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
     if times is None:
         if dt is None:
             raise InputError(
-                "dt=None, but the data have no column or index called 'time'; give dt in s"
+                "dt=None, but the data have no column or index called 'time'; give dt in s (their "
+                f"columns are {', '.join(str(c) for c in frame.columns)})"
             )
         return positive("dt", dt, "s")
     gaps = np.diff(times)

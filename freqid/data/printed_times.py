@@ -9,7 +9,8 @@ from freqid.checks import FloatArray
 # digits that a rounded time may be off a line through all of them
 _HALF = 0.75
 # samples that tell a period, and the part of it that it must be known to
-_FEW, _KNOWN = 8, 1e-3
+# to be taken, and that to which a rate of two digits is
+_FEW, _KNOWN, _PLAIN = 8, 1e-3, 1e-2
 
 
 def printed_period(times: FloatArray) -> tuple[float, float] | None:
@@ -28,9 +29,13 @@ def printed_period(times: FloatArray) -> tuple[float, float] | None:
     if digit is None or period <= 0 or off < 0.01 * period:
         return None
     known_to = digit / (count - 1)
-    if off > _HALF * digit or known_to > _KNOWN * period:
+    if off > _HALF * digit or known_to > _PLAIN * period:
         return None
-    return plain_period(float(period), known_to), digit
+    found = plain_period(float(period), known_to)
+    if known_to > _KNOWN * period and abs(found * float(f"{1 / found:.2g}") - 1) > 1e-9:
+        # few samples tell a round rate, and no other
+        return None
+    return found, digit
 
 
 def plain_period(period: float, known_to: float) -> float:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, numbers, path_of
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, listed, numbers, path_of
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.readers.table import named
 from freqid.data.remembered import kept_of_response
 from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
@@ -21,6 +23,7 @@ from freqid.data.tables import frame_of
 if TYPE_CHECKING:
     import pandas as pd
 
+_REAL, _IMAGINARY = r"(re|real|in-phase)", r"(im|imag|imaginary|quadrature)"
 _PHASE = r"(phase|ph|phi|angle|arg|deg|degrees|∠)"
 _SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db)"
 
@@ -33,6 +36,7 @@ def read_response(
     decimal: str | None = None,
     input: int | str | None = None,
     output: int | str | None = None,
+    columns: Sequence[str] | None = None,
 ) -> FrequencyResponse:
     r"""A frequency response from a file, as an analyser or another program wrote it.
 
@@ -43,6 +47,7 @@ def read_response(
 
     Args:
         sep, decimal: of a table, where they cannot be found out.
+        columns: names for a table that has none, units behind them: ``magnitude [dB]``.
         input, output: which of several, by name or number from 0; all where not given.
 
     Raises FileNotFoundError for a missing file and ValueError, with what was found, where a file
@@ -62,9 +67,11 @@ def read_response(
         elif kind in (".uff", ".unv"):
             found = of_universal(path)
         elif kind == ".mat":
-            found = of_matlab(path)
+            found = of_matlab(path, of_frame)
         else:
             frame = frame_of(path, sep, decimal)
+            if columns is not None:
+                frame = _renamed(frame, listed("columns", columns))
             found = of_frame(frame, frame.attrs.get("units", {}))
     except InputError as error:
         text = str(error)
@@ -82,11 +89,42 @@ def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> Freque
     at = _one(names, FREQUENCY, told) or names[0]
     f = _numbers(frame, at) * in_hertz(at, told.get(at, ""))
     rest = [n for n in names if n != at]
+    held = _one(rest, "coherence", told)
+    rest = [n for n in rest if n != held]
     G = _complex(frame, rest, told)
     order = np.argsort(f, kind="stable")
     if len(order) < 1 or (np.diff(f[order]) <= 0).any():
         raise InputError(f"column {at!r} holds a frequency twice; keep one of them")
-    return FrequencyResponse(f[order], G[order])
+    coherence = None if held is None else _coherence(held, frame, told)[order]
+    return FrequencyResponse(f[order], G[order], coherence=coherence)
+
+
+def looks_like_response(frame: pd.DataFrame) -> bool:
+    """Whether a table begins with frequencies, and a response stands beside them."""
+    names = [str(c) for c in frame.columns]
+    if {"frequency", "output", "input", "real", "imag"} <= set(names):
+        return True
+    first = names[0].strip().casefold() if names else ""
+    plain = re.sub(r"_(hz|khz|mhz|ghz)$", "", first)
+    if not re.fullmatch(FREQUENCY, plain):
+        return False
+    pair = _one(names[1:], _REAL, {}) and _one(names[1:], _IMAGINARY, {})
+    return bool(pair or _one(names[1:], _PHASE, {}))
+
+
+def _renamed(frame: pd.DataFrame, columns: Sequence[object]) -> pd.DataFrame:
+    """The columns under other names, units in brackets behind them."""
+    if len(columns) != frame.shape[1]:
+        raise InputError(f"columns names {len(columns)} and the table has {frame.shape[1]}")
+    told = [named(str(c)) for c in columns]
+    frame = frame.set_axis([name for name, _ in told], axis=1)
+    frame.attrs["units"] = {name: unit for name, unit in told if unit}
+    return frame
+
+
+def _coherence(name: str, frame: pd.DataFrame, units: dict[str, str]) -> FloatArray:
+    part = _numbers(frame, name)
+    return part / 100 if "%" in units.get(name, "") + name else part
 
 
 def of_db(
@@ -154,10 +192,11 @@ def _joined(real: FloatArray, imaginary: FloatArray) -> ComplexArray:
 
 
 def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> ComplexArray:
-    real = _one(names, r"(re|real|in-phase)", units)
-    imaginary = _one(names, r"(im|imag|imaginary|quadrature)", units)
+    real, imaginary = _one(names, _REAL, units), _one(names, _IMAGINARY, units)
     if real and imaginary:
         return _joined(_numbers(frame, real), _numbers(frame, imaginary))
+    if len(names) == 1 and frame[names[0]].dtype.kind not in "fiub":
+        return _written(frame, names[0])
     phase = _one(names, _PHASE, units)
     turns = [n for n in names if re.search(rf"(^|[^a-z]){_PHASE}([^a-z]|$)", n.casefold())]
     if len(turns) > 1:
@@ -201,6 +240,15 @@ def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> Co
     return magnitude * np.exp(1j * turn)
 
 
+def _written(frame: pd.DataFrame, name: str) -> ComplexArray:
+    """Complex numbers as texts: ``1.5-0.2j``, ``1.5 - 0.2i``, ``(1.5-0.2j)``."""
+    texts = frame[name].astype(str).str.replace(r"[\s()*]", "", regex=True).str.replace("i", "j")
+    try:
+        return np.array([complex(text) for text in texts])
+    except ValueError:
+        raise InputError(f"column {name!r} holds values that are not numbers") from None
+
+
 def _picked(
     frf: FrequencyResponse, input: int | str | None, output: int | str | None
 ) -> FrequencyResponse:
@@ -219,8 +267,10 @@ def _picked(
             raise InputError(f"{name}={given!r} is not one of {', '.join(names)}")
         chosen.append(slice(at, at + 1))
     o, i = chosen
+    left = (*frf.output_names[o], *frf.input_names[i])
     return dataclasses.replace(
-        frf, response=frf.response[o, i], output_names=frf.output_names[o],
+        frf, units={n: u for n, u in frf.units.items() if n in left},
+        response=frf.response[o, i], output_names=frf.output_names[o],
         input_names=frf.input_names[i],
         variance=None if frf.variance is None else frf.variance[o, i],
         coherence=None if frf.coherence is None else frf.coherence[o, i],

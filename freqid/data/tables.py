@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from freqid.checks import InputError, unknown
-from freqid.data.readers.kinds import LOGS, READERS, existing
+from freqid.checks import InputError, listed
+from freqid.data.readers.kinds import READERS, Reader, existing
 from freqid.data.readers.table import named
 
 if TYPE_CHECKING:
     import pandas as pd
 
+# bytes that tell text from other files
+_SNIFFED = 4096
 # kinds of files that may hold several tables
 _GROUPED = (".h5", ".mat", ".xlsx")
 
@@ -29,10 +31,8 @@ def frame_of(
     Raises FileNotFoundError for a missing file, ValueError for one that is empty, damaged or of an
     unknown kind.
     """
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(f"{path}: {unknown('suffix', path.suffix, [*READERS, *LOGS])}")
     existing(path)
+    reader = READERS.get(path.suffix.lower()) or _as_text(path)
     if path.stat().st_size == 0:
         raise InputError(f"{path} is empty; expected columns of samples under a line of names")
     asked = {k: v for k, v in (("sep", sep), ("decimal", decimal)) if v is not None}
@@ -47,6 +47,7 @@ def frame_of(
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     if columns is not None:
+        columns = [str(c) for c in listed("columns", columns)]
         if len(columns) != frame.shape[1]:
             raise InputError(
                 f"{path}: columns names {len(columns)} and the table has {frame.shape[1]}"
@@ -57,3 +58,22 @@ def frame_of(
         frame.attrs["units"] = {n: u for n, u in map(named, map(str, frame.columns)) if u}
         frame.columns = [named(str(c))[0] for c in frame.columns]
     return frame
+
+
+def _as_text(path: Path) -> Reader:
+    """The reader of text tables for a file of no known suffix that is one; ValueError for others.
+
+    JSON looks like a table and is none.
+    """
+    with path.open("rb") as file:
+        begin = file.read(_SNIFFED)
+    if begin and b"\x00" not in begin and begin.lstrip()[:1] not in (b"{", b"[", b"<"):
+        odd = sum(byte < 9 or 13 < byte < 32 for byte in begin)
+        if odd <= 0.02 * len(begin):
+            return READERS[".csv"]
+    kind = path.suffix or "no suffix"
+    raise InputError(
+        f"{path}: {kind} is of no kind that is read: text tables (.csv, .txt, ...; packed, too), "
+        ".xlsx, .parquet, .mat, .npz, .h5, .uff, and logs (.ulg, .bag, .mcap, .mf4); what else "
+        "pandas can read goes through Record.from_frame"
+    )

@@ -31,13 +31,16 @@ _NAMES = {
     "time", "t", "zeit", "temps", "tid", "timestamp", "timestamps", "time stamp", "date time",
     "datetime", "date", "elapsed", "elapsed time", "seconds", "sec", "t_s", "time_s", "time_ms",
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
+    "x_value", "ms", "us", "µs", "ns",
 }  # fmt: skip
 # a count since 1970 of this size is of seconds, milliseconds, …
 EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
 # steps that differ by no more than this part make an unnamed column a time
 _EVEN = 1e-3
 # a name that ends in a unit, and steps in s that nobody samples a machine with
-_SUFFIX, _SLOW = r"_(s|ms|us|ns)$", 1.0
+_SUFFIX, _SLOW = r"(?:^|_)(s|ms|us|µs|ns)$", 0.2
+# units of a count by its steps in them, and what they are called
+_LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms", "milliseconds"))
 # a date and a time of day in columns of their own, and seconds of a day
 _DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
@@ -65,8 +68,9 @@ def with_time(
     told = units.get(name) or re.search(_SUFFIX, name.casefold())
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
     if said == "s" and not told and step >= _SLOW:
+        _, unit, called = next(row for row in _LIKELY if step > row[0])
         notes.append(
-            f"its steps are {step:g} s: give units={{{name!r}: 'ms'}} where they are milliseconds"
+            f"its steps are {step:g} s: give units={{{name!r}: {unit!r}}} where they are {called}"
         )
     return rest, notes
 

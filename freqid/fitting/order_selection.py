@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import InputError, an, choice, flag, listed, whole
-from freqid.data import FrequencyResponse, Record, channel_counts
+from freqid.data import FrequencyResponse, Record, as_data_sets, channel_counts
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
@@ -59,6 +59,7 @@ def select_order(
     """
     import pandas as pd
 
+    data = as_data_sets(data)[0] if hasattr(data, "frdata") else data
     an("data", data, Record, FrequencyResponse)
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))

@@ -60,6 +60,8 @@ def plot_coherence(
     has none.
     """
     choice("unit", unit, list(UNITS))
+    if hasattr(frf, "frdata"):
+        frf = FrequencyResponse.from_control(frf)
     an("frf", frf, FrequencyResponse)
     if frf.coherence is None:
         raise InputError("frf has no coherence; an average over segments or repeats has one")

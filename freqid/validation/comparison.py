@@ -71,7 +71,8 @@ class Comparison:
             f"{n} {f:.2f} %"
             for n, f in zip(self.record.output_names, self.fit_percent, strict=True)
         )
-        return f"<Comparison: {each}, input held by {self.hold!r}>"
+        held = "" if self.hold is None else f", input held by {self.hold!r}"
+        return f"<Comparison: {each}{held}>"
 
     def _repr_html_(self) -> str:
         p = len(self.record.output_names)
@@ -90,9 +91,10 @@ class Comparison:
             f"<td>{most:.3g}</td></tr>"
             for name, fit, rms, most in rows
         )
+        held = "" if self.hold is None else f", input held by {self.hold!r}"
         heads = "".join(f"<th>{h}</th>" for h in ("output", "fit", "rms error", "largest error"))
         return (
-            f"<p>Comparison, input held by {escape(repr(self.hold))}</p>"
+            f"<p>Comparison{escape(held)}</p>"
             f"<table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table>"
         )
 

@@ -215,7 +215,7 @@ def test_bad_files_are_named(tmp_path):
         ("binary.csv", bytes(range(128, 256)) * 4, "is not CSV"),
         ("ragged.csv", b"time,u,y\n0,1,2\n0.1,1,2,3,4\n", "is not CSV or is damaged"),
         ("truncated.csv", b"time,u,y\n0,1,2\n0.1,1,2\n0.2,1", "NaN"),
-        ("signal.xyz", b"1", "suffix='.xyz'"),
+        ("signal.xyz", b"\x00\x01", r"\.xyz is of no kind that is read"),
     ):
         with pytest.raises(ValueError, match=words):
             fq.read(path(name, content))

@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# scalars that tell a sample time in s, or a rate in Hz
+_STEPS, _RATES = ("dt", "Ts", "ts", "Dt", "h"), ("Fs", "fs", "FS", "sampling_rate", "sample_rate")
+CLOCKS = (*_STEPS, *_RATES)
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
 
@@ -67,8 +70,8 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
             full[name][:: N // len(x)] = x
         else:
             raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
-    step = next((scalars[n] for n in ("dt", "Ts", "ts", "Dt", "h") if n in scalars), None)
-    rate = next((scalars[n] for n in ("Fs", "fs", "FS", "sampling_rate") if n in scalars), None)
+    step = next((scalars[n] for n in _STEPS if n in scalars), None)
+    rate = next((scalars[n] for n in _RATES if n in scalars), None)
     if step is None and rate is not None and rate > 0:
         step = 1 / rate
     if "time" not in full and step is not None:

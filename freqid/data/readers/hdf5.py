@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from freqid.checks import Array, InputError
-from freqid.data.readers.columns import columns_of
+from freqid.data.readers.columns import CLOCKS, columns_of
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
 from freqid.data.readers.limits import check_size
 
@@ -37,6 +39,8 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
             check_size(path, taken)
             parent, _, leaf = name.rpartition("/")
             found.setdefault(parent, {})[leaf] = item[()]
+            clocks = {n: v for n, v in item.parent.attrs.items() if n in CLOCKS and np.size(v) == 1}
+            found[parent] |= {n: np.asarray(v).reshape(()) for n, v in clocks.items()}
 
     try:
         # visititems follows no external and no soft links

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from freqid.checks import FloatArray, InputError, unknown
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    Reader = Callable[..., pd.DataFrame]
     Writer = Callable[[pd.DataFrame, Path], None]
     LogReader = Callable[[Path], dict[str, "Channel"]]
 
 Function = TypeVar("Function")
+Reader: TypeAlias = "Callable[..., pd.DataFrame]"
 
 
 @dataclass(frozen=True, eq=False)

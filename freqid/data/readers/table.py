@@ -17,6 +17,12 @@ _NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
+# the same with marks between thousands, of which each decimal sign leaves the other
+_THOUSANDS = {
+    ".": re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(,\d{3}){2,})"),
+    ",": re.compile(r"[+-]?\d{1,3}((\.\d{3})+,\d+|(\.\d{3}){2,})"),
+}
+_OTHER = {".": ",", ",": "."}
 _UNIT = (
     r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2"
     r"|m/s²|g|Hz|Pa|bar|K|°C|%|counts?)"
@@ -35,6 +41,7 @@ class Layout:
     names: list[str]
     units: dict[str, str]
     headed: bool
+    thousands: str | None = None
 
 
 def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) -> Layout:
@@ -107,7 +114,7 @@ def named(text: str) -> tuple[str, str]:
     if found and found[1] and not re.fullmatch(r"\d+", found[2]):
         # DIN 1338 and ISO 80000 write "v/(m/s)"
         return found[1].rstrip(" /"), found[2].strip() if found[2].strip() != "-" else ""
-    quotient = re.fullmatch(rf"(.+?)\s*/\s*{_UNIT}", plain)
+    quotient = re.fullmatch(rf"(.+?)\s*[/,]\s*{_UNIT}", plain)
     if quotient and not re.fullmatch(_UNIT, plain):
         return quotient[1], quotient[2]
     return plain, ""
@@ -140,8 +147,16 @@ def _uncommented(line: str) -> str:
     return text
 
 
-def _is_value(cell: str, decimal: str) -> bool:
-    return bool(_NUMBER[decimal].fullmatch(cell)) or cell.lower() in _BLANK
+def _is_number(cell: str, sign: str, mark: str) -> bool:
+    return bool(_NUMBER[sign].fullmatch(cell)) or _in_thousands(cell, sign, mark)
+
+
+def _in_thousands(cell: str, sign: str, mark: str) -> bool:
+    return mark != _OTHER[sign] and bool(_THOUSANDS[sign].fullmatch(cell))
+
+
+def _is_value(cell: str, sign: str, mark: str) -> bool:
+    return _is_number(cell, sign, mark) or cell.lower() in _BLANK
 
 
 def _tried(lines: Sequence[str], mark: str, sign: str) -> tuple[float, int, Layout] | None:
@@ -151,40 +166,44 @@ def _tried(lines: Sequence[str], mark: str, sign: str) -> tuple[float, int, Layo
     if not last:
         return None
     width = max({len(r) for r in last}, key=[len(r) for r in last].count)
+    if width > 1 and not any(r[-1] for r in last if len(r) == width):
+        # a mark at the end of every line parts nothing
+        width -= 1
     if width < 1 or (width < 2 and mark != ","):
         return None
-    good = [_is_row(r, width, sign) for r in rows]
+    good = [_is_row(r, width, sign, mark) for r in rows]
     if not any(good):
         return None
     followed = [g and after for g, after in zip(good, [*good[1:], True], strict=True)]
     first = followed.index(True) if True in followed else good.index(True)
-    if not any(any(r) for r in rows[:first]) and _is_heading(rows[first:], sign):
+    if not any(any(r) for r in rows[:first]) and _is_heading(rows[first:], sign, mark):
         first += 1
     body = [g for r, g in zip(rows[first:], good[first:], strict=True) if any(r)]
     share = sum(body) / len(body)
     if share < 0.5:
         return None
     cells = [c for r in rows[first : first + 60] for c in r if c]
-    numbers = sum(bool(_NUMBER[sign].fullmatch(c)) for c in cells) / max(len(cells), 1)
+    numbers = sum(_is_number(c, sign, mark) for c in cells) / max(len(cells), 1)
+    marked = any(_in_thousands(c, sign, mark) for c in cells)
     names, units, headed = heading([r for r in rows[:first] if any(r)], width)
-    layout = Layout(mark, sign, first, names, units, headed)
+    layout = Layout(mark, sign, first, names, units, headed, _OTHER[sign] if marked else None)
     return round(share * numbers, 2), width, layout
 
 
-def _is_heading(rows: Sequence[Sequence[str]], sign: str) -> bool:
+def _is_heading(rows: Sequence[Sequence[str]], sign: str, mark: str) -> bool:
     """Whether the first row is a heading though some names are numbers: ``time,1,2``."""
     below = [r for r in rows[1:60] if len(r) == len(rows[0])]
     return len(below) > 1 and any(
-        not _is_value(cell, sign) and all(_NUMBER[sign].fullmatch(r[i]) for r in below)
+        not _is_value(cell, sign, mark) and all(_is_number(r[i], sign, mark) for r in below)
         for i, cell in enumerate(rows[0])
     )
 
 
-def _is_row(cells: Sequence[str], width: int, sign: str) -> bool:
+def _is_row(cells: Sequence[str], width: int, sign: str, mark: str) -> bool:
     """Whether a row is one of samples: as many cells as the others, half of them numbers."""
     trailing = len(cells) == width + 1 and not cells[-1]
     if len(cells) != width and not trailing:
         return False
-    numbers = sum(bool(_NUMBER[sign].fullmatch(c)) for c in cells[:width])
-    other = [c for c in cells[:width] if not _is_value(c, sign) and not _STAMP.fullmatch(c)]
+    numbers = sum(_is_number(c, sign, mark) for c in cells[:width])
+    other = [c for c in cells[:width] if not _is_value(c, sign, mark) and not _STAMP.fullmatch(c)]
     return numbers > 0 and 2 * len(other) <= width

@@ -6,25 +6,43 @@ import bz2
 import gzip
 import io
 import lzma
+import zipfile
 import zlib
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+import numpy as np
+
 from freqid.checks import InputError
 from freqid.data.readers.kinds import damaged, reads, writes
 from freqid.data.readers.limits import check_size, limit_of
+from freqid.data.readers.preambles import body_of
 from freqid.data.readers.table import LOOK, Layout, layout_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+
+def unzipped(path: Path, mode: str) -> IO[bytes]:
+    """The one file of an archive; ValueError where there are others."""
+    archive = zipfile.ZipFile(path)
+    names = [info.filename for info in archive.infolist() if not info.is_dir()]
+    if len(names) != 1:
+        raise InputError(f"holds {', '.join(names[:8]) or 'nothing'}; expected one table")
+    return archive.open(names[0])
+
+
 # part of a text that may be no plain characters
 _ODD = 0.2
 _TWICE = 4
-_OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
+# what zipfile raises for archives that are damaged, locked or of a kind of its own
+_NO_ARCHIVE = zipfile.BadZipFile, NotImplementedError, RuntimeError, KeyError
+_OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open, ".zip": unzipped}
 
 
-@reads(".csv", ".txt", ".dat", ".tsv", ".asc", ".gz", ".bz2", ".xz")
+@reads(
+    ".csv", ".txt", ".dat", ".tsv", ".asc", ".log", ".prn", ".tab", ".lvm", *_OPENERS
+)  # fmt: skip
 def read_text(path: Path, sep: str | None = None, decimal: str | None = None) -> pd.DataFrame:
     """The columns of a text table; ValueError for one that is damaged or holds no samples."""
     import pandas as pd
@@ -33,6 +51,7 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     if "\r" in text:
         # line ends of other machines, and of old ones
         text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text, clock, said = body_of(text)
     # lines as pandas counts them: splitlines() ends some at form feeds, too
     lines = [line for line in text[: 400 * LOOK].split("\n")[:LOOK] if line.strip()]
     if not lines:
@@ -49,12 +68,16 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
         frame = pd.read_csv(
             io.BytesIO(body),
             sep=r"\s+" if layout.separator == " " else layout.separator,
-            decimal=layout.decimal, header=None, comment="#", skipinitialspace=True,
-            index_col=False, **exact,
+            decimal=layout.decimal, thousands=layout.thousands, header=None, comment="#",
+            skipinitialspace=True, index_col=False, **exact,
         )  # fmt: skip
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise damaged("CSV", error) from None
-    return _with_names(frame, layout)
+    frame = _with_names(frame, layout)
+    if clock is not None:
+        frame["time"] = clock[0] + clock[1] * frame["time"].to_numpy(dtype=float)
+    frame.attrs["notes"] = [*said, *frame.attrs.get("notes", [])]
+    return frame
 
 
 def _begin(text: str, skipped: int) -> int:
@@ -82,7 +105,7 @@ def _text(path: Path) -> str:
                 raw = stream.read(limit + 1)
                 if len(raw) > limit:
                     check_size(path, _TWICE * len(raw), "its text")
-    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+    except (OSError, EOFError, lzma.LZMAError, zlib.error, *_NO_ARCHIVE) as error:
         raise damaged("a compressed table", error) from None
     if b"\x00" in raw[:1000] and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("is no text: it holds zero bytes; check the file's kind")
@@ -121,13 +144,28 @@ def _with_names(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
         )
     frame.columns = layout.names
     frame.attrs["units"] = layout.units
-    if not layout.headed:
-        frame.attrs["notes"] = [f"no line of names: columns are {', '.join(layout.names)}"]
+    notes = [] if layout.headed else [f"no line of names: columns are {', '.join(layout.names)}"]
+    if layout.thousands:
+        notes.append(f"{layout.thousands!r} between thousands was taken off")
+    first = frame[layout.names[0]]
+    if layout.headed and layout.names[0] == "column1" and width > 2 and _counts(first):
+        # what pandas and others print before the columns: the number of the row
+        notes.append("the numbers of the rows were left out")
+        frame = frame.drop(columns=["column1"])
+    frame.attrs["notes"] = notes
     mark = {"\t": "tab", " ": "spaces"}.get(layout.separator, repr(layout.separator))
     frame.attrs["found"] = f"columns {', '.join(layout.names)}, parted by {mark}"
     if layout.decimal == ",":
         frame.attrs["found"] += ", with decimal commas"
     return frame
+
+
+def _counts(column: pd.Series[Any]) -> bool:
+    """Whether a column holds the numbers of the rows, from 0 or 1."""
+    values = column.to_numpy()
+    if values.dtype.kind not in "iu" or values[0] not in (0, 1):
+        return False
+    return bool((np.diff(values) == 1).all())
 
 
 @writes(".csv")

@@ -1,0 +1,50 @@
+"""What makers print above their samples that no column says: headers, and a time by its step."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+# LabVIEW ends its headers so; the last of them stands before the line of names
+_LABVIEW = re.compile(r"^\*\*\*End_of_Header\*\*\*[^\n]*\n", re.MULTILINE)
+_LOOK = 2**16
+
+
+class Body(NamedTuple):
+    """A text without what its maker printed above it; ``clock`` is the start and the step in s of a
+    first column that counts, ``notes`` what was taken off.
+    """
+
+    text: str
+    clock: tuple[float, float] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def body_of(text: str) -> Body:
+    """The table of a text, whatever stands above it."""
+    ends = [m.end() for m in _LABVIEW.finditer(text[:_LOOK])]
+    if ends:
+        return Body(text[ends[-1] :], notes=("the headers of LabVIEW were left out",))
+    return _counted(text) or Body(text)
+
+
+def _counted(text: str) -> Body | None:
+    """Rigol's oscilloscopes: ``X,CH1,Start,Increment``, below it these two numbers, then counts."""
+    lines = text[:_LOOK].split("\n", 2)
+    if len(lines) < 3:
+        return None
+    names, below = ([c.strip() for c in line.split(",")] for line in lines[:2])
+    lower = [n.casefold() for n in names]
+    if lower[0] != "x" or not {"start", "increment"} <= set(lower) or len(below) < len(names):
+        return None
+    at = min(lower.index("start"), lower.index("increment"))
+    try:
+        start, step = (float(below[lower.index(n)]) for n in ("start", "increment"))
+    except ValueError:
+        return None
+    if step <= 0:
+        return None
+    units = [f"{n} [{u}]" if u else n for n, u in zip(names[1:at], below[1:at], strict=True)]
+    rest = text[len(lines[0]) + len(lines[1]) + 2 :]
+    head = ",".join(["time", *units])
+    return Body(f"{head}\n{rest}", (start, step), (f"the time counts in steps of {step:g} s",))
