@@ -13,8 +13,8 @@ import cyclopts
 
 import freqid as fq
 from freqid.checks import InputError
-from freqid.cli.estimates import fit, fit_many, new_model
-from freqid.cli.options import Band, Columns, Dt
+from freqid.cli.estimates import USUAL_READING, fit, fit_many, new_model
+from freqid.cli.options import Band, Force, Reading, in_words
 from freqid.cli.planned import bias
 from freqid.cli.plants import in_python, model_of
 from freqid.cli.terminal import (
@@ -28,16 +28,17 @@ from freqid.cli.terminal import (
     write_table,
 )
 
+# kinds of files whose channels are found as they are read
+TEXTS = (".csv", ".txt", ".dat", ".tsv", ".asc")
 
-def reproduce(out: Path = Path("out"), *, force: bool = False) -> None:
+
+def reproduce(out: Path = Path("out"), *, force: Force = False) -> None:
     """Every figure, table and equation of the paper, into a folder and on the screen.
 
     Parameters
     ----------
     out
         folder for them.
-    force
-        overwrite files that are there already.
     """
     from freqid.paper import draw, save
 
@@ -68,15 +69,13 @@ def reproduce(out: Path = Path("out"), *, force: bool = False) -> None:
     print(f"Figures 1 to 10 (.png, .pdf), table2.csv and equations.csv are in {out}/")
 
 
-def demo(out: Path = Path("data"), *, force: bool = False) -> None:
+def demo(out: Path = Path("data"), *, force: Force = False) -> None:
     """Write the paper's chirp experiment as CSV at both rates.
 
     Parameters
     ----------
     out
         folder for them.
-    force
-        overwrite files that are there already.
     """
     names = ["chirp_fast.csv", "chirp_slow.csv"]
     folder(out, names, force)
@@ -88,36 +87,33 @@ def demo(out: Path = Path("data"), *, force: bool = False) -> None:
 def frf(
     data: Path,
     *,
-    input: Columns = None,
-    output: Columns = None,
-    dt: Dt = None,
+    reading: Reading = USUAL_READING,
     band: Band = None,
     method: Literal["etfe", "h1", "lpm", "lrm"] = "etfe",
     segment: int | None = None,
-    reference: str | None = None,
     out: Path | None = None,
     plot: Path | None = None,
-    force: bool = False,
+    force: Force = False,
 ) -> None:
     """Frequency response of a record, to the screen, a CSV file or a picture.
 
     Parameters
     ----------
     data
-        file with a column of time and one for each channel (.csv, .parquet, .mat, .npz, .h5, .uff).
+        any file that freqid reads (freqid show FILE says how).
     method
         etfe, the ratio of DFTs; h1, averaged over segments; lpm and lrm, local polynomials and
         local rational functions. All but etfe tell their variance.
     segment
         samples of each segment of h1.
-    reference
-        column of the commanded signal, for data in closed loop (h1, lpm, lrm).
-    force
-        overwrite files that are there already; never the one that is read.
+    out
+        CSV file for the response.
+    plot
+        Bode plot, with the coherence where there is one.
     """
     may_write(out, [data], force, TABLES)
     may_write(plot, [data], force, PICTURES)
-    record = fq.read(data, input, output, dt, reference=reference)
+    record, reference = reading.record(data), reading.reference
     if reference is not None and method == "etfe":
         raise InputError("--reference needs --method h1, lpm or lrm")
     if segment is not None and method != "h1":
@@ -143,12 +139,9 @@ def frf(
 def show_file(
     file: Path,
     *,
-    input: Columns = None,
-    output: Columns = None,
-    dt: Dt = None,
-    time: str | None = None,
+    reading: Reading = USUAL_READING,
     plot: Path | None = None,
-    force: bool = False,
+    force: Force = False,
 ) -> None:
     """What would be read of a file: channels, rate, what was taken for the time; and a picture.
 
@@ -156,17 +149,19 @@ def show_file(
     ----------
     file
         any file that freqid reads.
-    time
-        the column of the time, where its name does not tell.
     plot
-        picture of the record.
-    force
-        overwrite the picture.
+        picture of the record, or of the response.
     """
     may_write(plot, [file], force, PICTURES)
-    print(fq.channels(file).to_string(index=False, float_format=lambda x: f"{x:.6g}"))
-    record = fq.read(file, input, output, dt=dt, time=time)
-    print(f"{record!r}".strip("<>"))
+    record = reading.data(file)
+    if isinstance(record, fq.FrequencyResponse):
+        print(repr(record).strip("<>"))
+        if plot is not None:
+            write_picture(plot, fq.bode(record, labels=[file.name], unit="Hz"))
+        return
+    if reading == USUAL_READING or file.suffix.lower() not in TEXTS:
+        _print_channels(file)
+    print(repr(record).strip("<>"))
     for note in record.notes:
         print(f"note: {note}")
     found = fq.check_record(record)
@@ -184,17 +179,24 @@ def channels(log: Path) -> None:
     log
         any file that freqid reads; of logs that need an extra the message names it.
     """
-    found = fq.channels(log)
-    print(found.to_string(index=False, float_format=lambda x: f"{x:.6g}"))
+    _print_channels(log)
+
+
+def _print_channels(file: Path) -> None:
+    found = fq.channels(file)
+    # below that a clock is exact
+    exact = found["jitter"].abs() * found["rate"].abs() < 1e-9
+    found["jitter"] = found["jitter"].mask(exact, 0.0)
+    units = {"rate": "rate / Hz", "jitter": "jitter / s", "length": "length / s"}
+    shown = found.rename(columns=units)
+    print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}", na_rep=""))
 
 
 def explore(
     data: Path | None = None,
     *,
     model: str | None = None,
-    input: Columns = None,
-    output: Columns = None,
-    dt: Dt = None,
+    reading: Reading = USUAL_READING,
     host: str = "127.0.0.1",
     port: int = 8050,
     allow_remote: bool = False,
@@ -204,26 +206,33 @@ def explore(
     Parameters
     ----------
     data
-        a record to explore instead of the simulated experiment.
+        a record to explore instead of the simulated experiment; others can be dropped on the page.
     model
         a plant of your own, your_file.py:plant, beside those of the paper.
     host
         other than loopback only with --allow-remote.
     port
         the next free one is taken where it is busy.
+    allow_remote
+        let other machines use the page.
     """
     from freqid.pages import Own, explore as serve
 
-    record = None if data is None else fq.read(data, input, output, dt)
-    named = {"inputs": input, "outputs": output, "dt": dt}
-    given = "".join(f", {k}={v!r}" for k, v in named.items() if v is not None)
+    record = None if data is None else reading.record(data)
     plant = None
     if model is not None:
-        found = model_of(model, 3, None, None)
+        found = model_of(model)
         if not isinstance(found, fq.GreyBox):
             raise InputError(f"--model {model} is no grey box; the explorer moves parameters")
         plant = Own(found, in_python(model))
-    serve(record, host, port, allow_remote, plant, f"fq.read({str(data)!r}{given})")
+    serve(
+        record,
+        host,
+        port,
+        allow_remote,
+        plant,
+        f"fq.read({str(data)!r}{in_words(reading.given())})",
+    )
 
 
 app = cyclopts.App(
@@ -231,8 +240,10 @@ app = cyclopts.App(
     help="Physical parameters from chirp experiments, whatever the input did between the samples.",
     version=fq.__version__,
     result_action="return_value",
-    # a list has no opposite: no --empty-band
-    default_parameter=cyclopts.Parameter(negative_iterable=()),
+    # a switch that is off has no opposite: no --no-force
+    default_parameter=cyclopts.Parameter(negative=()),
+    # what was done until then is said here, and the exit code is that of any shell
+    suppress_keyboard_interrupt=False,
 )
 for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_model, bias, explore):
     app.command(command, name="show" if command is show_file else None)
@@ -256,7 +267,7 @@ def main(arguments: list[str] | None = None) -> None:
     except (ValueError, MemoryError) as error:
         _fail(str(error))
     except KeyboardInterrupt:
-        _fail("interrupted")
+        _fail("interrupted", _INTERRUPTED)
     sys.exit(status if isinstance(status, int) else 0)
 
 
@@ -271,14 +282,18 @@ def _end_tidily_when_told_to() -> None:
         signal.signal(signal.SIGTERM, end)
 
 
-def _fail(message: str) -> None:
+# as shells tell it
+_INTERRUPTED = 128 + signal.SIGINT
+
+
+def _fail(message: str, status: int = 2) -> None:
     with contextlib.suppress(OSError):
         # what was not said cannot be said later, either
         sys.stdout.flush()
     print(f"freqid: {' '.join(message.split())}", file=sys.stderr)
     if sys.stdout is sys.__stdout__ and sys.stdout is not None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    sys.exit(2)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

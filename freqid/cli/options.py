@@ -1,13 +1,23 @@
-"""Options that several commands have, and a hold as text."""
+"""Options that several commands share: how a file is read, which model is meant, and what is known.
+
+Each group is a dataclass whose fields are options of the commands that take it.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+import re
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
 
 from cyclopts import Parameter as Option
 
+import freqid as fq
 from freqid.checks import InputError
+from freqid.cli.plants import model_of, pairs, texts, with_options
+from freqid.data import ResponseFile
 from freqid.lti import holds
+from freqid.models import GreyBox
 
 Band = Annotated[tuple[float, float] | None, Option(help="lowest and highest frequency in Hz")]
 Hold = Annotated[
@@ -17,10 +27,138 @@ Hold = Annotated[
         "zoh:PERIOD, foh:PERIOD in s, or estimate; by default what the record remembers"
     ),
 ]
-Dt = Annotated[float | None, Option(help="sample time in s, for data without a time column")]
-Texts = Annotated[list[str] | None, Option(consume_multiple=True)]
+Force = Annotated[
+    bool, Option(help="overwrite files that are there already; never those that are read")
+]
 Limits = list[tuple[str, float, float]] | None
-Columns = Annotated[list[str] | None, Option(consume_multiple=True)]
+
+
+def _several(text: str) -> Option:
+    return Option(consume_multiple=True, help=text)
+
+
+@Option(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How files are read: what ``freqid.read`` is told."""
+
+    input: Annotated[list[str] | None, _several("columns that drove the plant")] = None
+    output: Annotated[list[str] | None, _several("columns that were measured")] = None
+    reference: Annotated[
+        str | None,
+        Option(help="column of what was commanded in a closed loop, through which the fit goes"),
+    ] = None
+    dt: Annotated[float | None, Option(help="sample time in s, of data without a time")] = None
+    time: Annotated[str | None, Option(help="column of the time, where its name does not tell")] = (
+        None
+    )
+    sep: Annotated[str | None, Option(help="what parts the cells of a text table")] = None
+    decimal: Annotated[str | None, Option(help="its decimal sign")] = None
+    columns: Annotated[list[str] | None, _several("names for a table that has none")] = None
+    group: Annotated[
+        str | None, Option(help="which of several tables: an HDF5 group, a sheet, a structure")
+    ] = None
+    units: Annotated[
+        list[str] | None, _several("NAME=UNIT of columns, such as time=ms torque='N m'")
+    ] = None
+    resample: Annotated[bool, Option(help="put jittered or missing samples on a regular grid")] = (
+        False
+    )
+
+    def given(self) -> dict[str, Any]:
+        """What was asked for, as arguments of ``freqid.read``."""
+        asked = {f.name: getattr(self, f.name) for f in fields(self)}
+        asked["units"] = texts("--units", self.units) or None
+        renamed = {"input": "inputs", "output": "outputs"}
+        return {renamed.get(k, k): v for k, v in asked.items() if v is not None and v is not False}
+
+    def record(self, path: Path) -> fq.Record:
+        """The record of a file."""
+        return fq.read(path, **self.given())
+
+    def data(self, path: Path) -> fq.Record | fq.FrequencyResponse:
+        """The record of a file, or the frequency response that an analyser wrote."""
+        try:
+            return self.record(path)
+        except ResponseFile:
+            told = {"sep": self.sep, "decimal": self.decimal, "columns": self.columns}
+            ends = {"input": self.input, "output": self.output}
+            one = {k: v[0] for k, v in ends.items() if v is not None}
+            return fq.read_response(path, **told, **one)  # type: ignore[arg-type]
+
+
+@Option(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Which model, and what is known of it."""
+
+    model: Annotated[
+        str,
+        Option(
+            help="two-mass (the paper's), three-mass, first-order, output-error (a black box of "
+            "--order), transfer-function (--zeros, --poles), or your own: my_plant.py:plant "
+            "(freqid new-model)"
+        ),
+    ]
+    order: Annotated[int, Option(help="of output-error")] = 3
+    zeros: Annotated[int | None, Option(help="of transfer-function")] = None
+    poles: Annotated[int | None, Option(help="of transfer-function")] = None
+    feedthrough: Annotated[bool, Option(help="output-error with a direct term")] = False
+    stable: Annotated[bool, Option(help="output-error with its poles in the unit circle")] = False
+    delay: Annotated[
+        str | None, Option(help="transfer-function with a delay in s, or 'estimate'")
+    ] = None
+    fix: Annotated[list[str] | None, _several("parameters that keep their values")] = None
+    bounds: Annotated[Limits, Option(help="NAME LOW HIGH of the search")] = None
+    prior: Annotated[Limits, Option(help="NAME MEAN STD that were known before")] = None
+    start: Annotated[list[str] | None, _several("NAME=VALUE to begin from, as often as wanted")] = (
+        None
+    )
+
+    def plant(self) -> object:
+        """The model, fixed, bounded and believed in as was asked."""
+        box = self.order, self.zeros, self.poles, self.feedthrough, self.stable, self.delay
+        found = model_of(self.model, *box)
+        return with_options(found, self.fix or (), self.bounds or (), self.prior or ())
+
+    def grey_box(self) -> GreyBox:
+        """The model; ValueError for one without parameters."""
+        found = self.plant()
+        if not isinstance(found, GreyBox):
+            raise InputError(f"--model {self.model} is no grey box; give one with parameters")
+        return found.with_values(**self.values())
+
+    def values(self) -> dict[str, float]:
+        """What ``--start`` says."""
+        return pairs("--start", self.start)
+
+
+@Option(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """How the fit is made: what ``freqid.fit`` is told."""
+
+    hold: Hold = None
+    band: Band = None
+    weights: Annotated[
+        str | None, Option(help="noise: weigh each line by the noise that the fit leaves there")
+    ] = None
+    offset: Annotated[bool, Option(help="make a constant of each output an unknown")] = False
+    loss: Annotated[str, Option(help="linear, or huber: samples that are far off count less")] = (
+        "linear"
+    )
+    n_starts: Annotated[
+        int | None, Option(help="how many starts to try; by default as many as it takes")
+    ] = None
+
+    def given(self) -> dict[str, Any]:
+        """What differs from the usual, as arguments of ``freqid.fit``."""
+        asked: dict[str, Any] = {
+            "hold": hold_of(self.hold), "band": self.band, "weights": self.weights,
+            "offset": "estimate" if self.offset else None, "n_starts": self.n_starts,
+            "loss": None if self.loss == "linear" else self.loss,
+        }  # fmt: skip
+        return {k: v for k, v in asked.items() if v is not None}
 
 
 def hold_of(text: str | None) -> holds.Hold | str | None:
@@ -34,3 +172,9 @@ def hold_of(text: str | None) -> holds.Hold | str | None:
         raise InputError(
             f"--hold {text} is not a hold; expected zoh, foh, bl, zoh:PERIOD or foh:PERIOD (s)"
         ) from None
+
+
+def in_words(options: dict[str, Any]) -> str:
+    """Arguments as they stand in a call, behind others: ``, inputs='u', dt=0.01``."""
+    plain = {k: v[0] if isinstance(v, list) and len(v) == 1 else v for k, v in options.items()}
+    return re.sub(r"^(?=.)", ", ", ", ".join(f"{k}={v!r}" for k, v in plain.items()))

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter as Option
 
 import freqid as fq
 from freqid.checks import choice, whole
+from freqid.cli.options import Asked, Force
 from freqid.cli.terminal import PICTURES, TABLES, may_write, show, write_picture, write_table
 from freqid.excitation import below_nyquist
 from freqid.lti import holds
-from freqid.models import PLANTS
 
 
 def bias(
     *,
-    model: Literal["two-mass", "three-mass", "first-order"],
+    asked: Asked,
     chirp: tuple[float, float],
     factor: Annotated[list[float], Option(consume_multiple=True)],
     hold: Annotated[list[str] | None, Option(consume_multiple=True)] = None,
@@ -26,14 +26,12 @@ def bias(
     parameter: str | None = None,
     out: Path | None = None,
     plot: Path = Path("bias.png"),
-    force: bool = False,
+    force: Force = False,
 ) -> int:
     """What a chirp, decimated, makes of a model's parameters: computed, without data.
 
     Parameters
     ----------
-    model
-        two-mass (the paper's), three-mass or first-order, at its own values.
     chirp
         lowest and highest frequency in Hz.
     factor
@@ -48,8 +46,6 @@ def bias(
         CSV file for the table.
     plot
         heat map over upper frequency and factor, one panel a hold.
-    force
-        overwrite files that are there already.
     """
     may_write(out, [], force, TABLES)
     may_write(plot, [], force, PICTURES)
@@ -58,16 +54,16 @@ def bias(
         choice("--hold", name, (*holds.Hold.named, "remembered"))
     assumed = [None if name == "remembered" else name for name in names]
     factors = [whole("--factor", f) for f in factor]
-    plant = PLANTS[model]()
+    plant = asked.grey_box()
     low, high = chirp
     below_nyquist(high, base_dt)
-    asked = f"{low:g}-{high:g}"
-    table = fq.bias_map(plant, {asked: fq.ChirpSpectrum(low, high)}, factors, assumed, base_dt)
+    swept = f"{low:g}-{high:g}"
+    table = fq.bias_map(plant, {swept: fq.ChirpSpectrum(low, high)}, factors, assumed, base_dt)
     if out is not None:
         write_table(out, table)
     shown = table.drop(columns=["spectrum", "message"])
     shown["relative_bias"] = [f"{100 * b:+.3g} %" for b in shown["relative_bias"]]
-    show(f"{model}, chirp {asked} Hz held for {1e3 * base_dt:g} ms", shown)
+    show(f"{asked.model}, chirp {swept} Hz held for {1e3 * base_dt:g} ms", shown)
     finite = table[np.isfinite(table["relative_bias"])]
     if parameter is None and len(finite):
         parameter = finite.loc[finite["relative_bias"].abs().idxmax(), "parameter"]
@@ -77,7 +73,7 @@ def bias(
     uppers = sorted({float(f"{u:.3g}") for u in np.linspace(low, 2 * high - low, 15)[2:]} | {high})
     around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}
     picture = fq.bias_map(plant, around, factors, assumed, base_dt)
-    axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[asked])
+    axes = fq.plot_bias_map(picture, parameter or plant.free_parameters[0].name, mark=[swept])
     write_picture(plot, axes)
     print(f"the bias of {parameter} against upper frequency and factor is drawn in {plot}")
     return 0 if table["converged"].all() else 1

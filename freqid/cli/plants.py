@@ -47,23 +47,41 @@ plant = fq.GreyBox(
 
 
 def model_of(
-    text: str, order: int, zeros: int | None, poles: int | None, feedthrough: bool = False
+    text: str,
+    order: int = 3,
+    zeros: int | None = None,
+    poles: int | None = None,
+    feedthrough: bool = False,
+    stable: bool = False,
+    delay: str | None = None,
 ) -> object:
     """The model that ``--model`` names; ValueError, with what there is, for another."""
+    if delay is not None and text != "transfer-function":
+        raise InputError(f"--delay is transfer-function's; give {text} an input_delay of its own")
     if text == "output-error":
-        return fq.OutputError(order, feedthrough)
-    if feedthrough:
-        raise InputError(f"--feedthrough is output-error's; give {text} its own direct term D")
+        return fq.OutputError(order, feedthrough, stable)
+    if feedthrough or stable:
+        name = "--feedthrough" if feedthrough else "--stable"
+        raise InputError(f"{name} is output-error's; {text} says such things by itself")
     if text in PLANTS:
         return PLANTS[text]()
     if text == "transfer-function":
         n = order if poles is None else poles
-        return fq.TransferFunction(n - 1 if zeros is None else zeros, n)
+        return fq.TransferFunction(n - 1 if zeros is None else zeros, n, _late(delay))
     file, _, name = text.rpartition(":")
     if not file or not name:
         known = [*PLANTS, *BLACK_BOXES]
         raise InputError(f"{unknown('--model', text, known)}; or your_file.py:plant")
     return from_file(Path(file), name)
+
+
+def _late(delay: str | None) -> float | str:
+    if delay is None or delay == "estimate":
+        return delay or 0.0
+    try:
+        return float(delay)
+    except ValueError:
+        raise InputError(f"--delay {delay} is no time in s; expected one, or estimate") from None
 
 
 def in_python(text: str) -> tuple[str, str]:

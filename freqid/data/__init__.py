@@ -22,6 +22,7 @@ from freqid.data.local_response import LineNoise, LocalResponse
 from freqid.data.logged import channels
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.quality import check_record
+from freqid.data.readers.kinds import ResponseFile
 from freqid.data.readers.table import named_with
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, overload
 
 from freqid.checks import InputError, an, path_of, unknown
 from freqid.data.logged import kind_of, logged_record
-from freqid.data.readers.kinds import LOGS, WRITERS
+from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
 from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
@@ -53,7 +54,8 @@ def read(
     r"""A record from a file, which is looked at before anything is asked.
 
     Text tables (.csv, .txt, .dat, .log, .lvm or any other suffix, also .gz, .bz2, .xz, .zip) with
-    any separator, decimal sign, comments, units and time; .xlsx (extra ``excel``), .parquet (extra ``parquet``), .mat
+    any separator, decimal sign, comments, units and time; .xlsx (extra ``excel``), .parquet (extra
+    ``parquet``), .mat
     (version 7.3 with extra ``hdf5``), .npz, .h5 (extra ``hdf5``) and .uff (data set 58, extra
     ``uff``). Robot logs, whose channels have clocks of their own (see ``channels`` and
     ``Record.from_logs``): .ulg (PX4, extra ``ulog``), .bag, .mcap and folders of ROS 2 bags
@@ -84,6 +86,8 @@ def read(
     (0.01, ("column 't' was taken for the time, in ms",))
     """
     path = path_of("path", path)
+    if re.fullmatch(r"\.s\d+p", path.suffix.lower()):
+        raise ResponseFile(path)
     if kind_of(path) in LOGS:
         _no_table(path, {
             "dt": dt, "reference": reference, "time": time, "sep": sep, "decimal": decimal,
@@ -103,7 +107,7 @@ def read(
             if name not in (*frame.columns, "time", "reference"):
                 raise InputError(unknown("units", name, [str(c) for c in frame.columns]))
         if inputs is None and outputs is None and looks_like_response(frame):
-            raise InputError("holds a frequency response, no samples: read_response reads it")
+            raise ResponseFile(path)
         told = {**frame.attrs.get("units", {}), **(units or {})}
         frame, said = with_time(frame, time, told, dt)
         if stop is not None and "time" in frame.columns:
@@ -115,6 +119,8 @@ def read(
         )  # fmt: skip
         notes = dict.fromkeys((*frame.attrs.get("notes", ()), *said, *record.notes))
         return _cut(dataclasses.replace(record, notes=tuple(notes)), start, stop, detrend)
+    except ResponseFile:
+        raise
     except InputError as error:
         text = str(error).replace(_REPAIR, "stop= cuts the file before, resample=True fills gaps")
         raise InputError(f"{path}: {text} (found {found})") from None

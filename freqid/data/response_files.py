@@ -108,6 +108,8 @@ def looks_like_response(frame: pd.DataFrame) -> bool:
     plain = re.sub(r"_(hz|khz|mhz|ghz)$", "", first)
     if not re.fullmatch(FREQUENCY, plain):
         return False
+    if any(frame[c].dtype.kind == "c" for c in frame.columns):
+        return True
     pair = _one(names[1:], _REAL, {}) and _one(names[1:], _IMAGINARY, {})
     return bool(pair or _one(names[1:], _PHASE, {}))
 

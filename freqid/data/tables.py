@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freqid.checks import InputError, listed
-from freqid.data.readers.kinds import READERS, Reader, existing
+from freqid.data.readers.kinds import READERS, Reader, ResponseFile, existing
 from freqid.data.readers.table import named
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ def frame_of(
         asked["group"] = group
     try:
         frame = reader(path, **asked)
+    except ResponseFile:
+        raise ResponseFile(path) from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     if columns is not None:

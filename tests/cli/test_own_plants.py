@@ -1,6 +1,11 @@
 """A first day on the command line: one's own file, one's own plant, a report."""
 
 import json
+import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -169,3 +174,67 @@ def test_what_warnings_advise_can_be_done(tmp_path, monkeypatch, capsys):
     assert "--feedthrough is output-error's" in capsys.readouterr().err
     assert run(*given, "--units", "ms") != 0
     assert "--units ms is not NAME=VALUE" in capsys.readouterr().err
+
+
+def test_an_analysers_file_is_fitted(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plant = fq.first_order()
+    f = np.geomspace(1, 100, 80)
+    G = plant.frequency_response(2 * np.pi * f).response[0, 0]
+    rows = np.column_stack([f, 20 * np.log10(abs(G)), np.degrees(np.angle(G))])
+    lines = "\n".join(";".join(f"{x:.12g}" for x in row) for row in rows)
+    (tmp_path / "frf.csv").write_text(f"Frequency [Hz];Magnitude [dB];Phase [deg]\n{lines}\n")
+    assert run("fit", "frf.csv", "--model", "first-order", "--start", "a=30", "b=50",
+               "--out", "e.json", "--plot", "e.png") == 0  # fmt: skip
+    assert fq.load("e.json")["a"] == pytest.approx(100, rel=1e-6)
+    assert (tmp_path / "e.png").stat().st_size > 1000
+    assert run("show", "frf.csv", "--plot", "f.png") == 0
+    assert "80 lines" in capsys.readouterr().out
+    assert run("fit", "frf.csv", "--model", "first-order", "--decimate", "2") == 2
+    assert "--decimate is for records" in capsys.readouterr().err
+
+
+def test_files_are_read_as_they_are_told_to_be_by_every_command(day, capsys):
+    text = (day / "train.csv").read_text().partition("\n")[2]
+    (day / "bare.csv").write_text(text)
+    told = ["--sep", ";", "--decimal", ",", "--columns", "ms", "torque", "angle",
+            "--input", "torque", "--output", "angle", "--units", "ms=ms"]  # fmt: skip
+    assert run("show", "bare.csv", *told) == 0
+    said = capsys.readouterr().out
+    assert "Record torque -> angle: 1500 samples at 0.01 s" in said
+    assert run("frf", "bare.csv", *told, "--band", "0.5", "20", "--out", "frf.csv") == 0
+    assert run("fit", "bare.csv", "--model", "my_plant.py:plant", *told) == 0
+    assert run("fit", "bare.csv", "--model", "transfer-function", "--zeros", "0", "--poles", "2",
+               "--delay", "0", *told) == 0  # fmt: skip
+    assert run("fit", "bare.csv", "--model", "output-error", "--order", "2", "--stable", *told) == 0
+    said = capsys.readouterr().out
+    assert "verdict" in said
+    assert run("fit", "bare.csv", "--model", "my_plant.py:plant", "--stable", *told) == 2
+    assert run("fit", "bare.csv", "--model", "two-mass", "--delay", "estimate", *told) == 2
+    assert run("bias", "--model", "my_plant.py:plant", "--chirp", "1", "20", "--factor", "5",
+               "--base-dt", "2e-3", "--out", "bias.csv") == 0  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["fit", "frf", "show", "fit-many", "bias", "explore"])
+def test_help_tells_every_option_and_no_opposites(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "250")
+    run(command, "--help")
+    said = capsys.readouterr().out
+    assert "--no-force" not in said
+    rows = [line.strip("│ *") for line in said.splitlines() if line.startswith("│")]
+    told = [row for row in rows if row.startswith("--") or " --" in row[:20]]
+    assert len(told) > 5
+    silent = [row for row in told if not re.search(r"\S\s{2,}[^\s[]", row)]
+    assert not silent
+
+
+def test_an_interrupted_command_says_so(day):
+    code = [sys.executable, "-m", "freqid.cli", "fit", "train.csv", "--model", "three-mass",
+            "--n-starts", "5000"]  # fmt: skip
+    process = subprocess.Popen(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(4)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode in (1, 130)
+    assert "interrupted" in out + err
+    assert "Traceback" not in err

@@ -212,5 +212,5 @@ def test_a_uff_of_responses_is_sent_to_its_reader(tmp_path, record):
     data = columns(record)
     channels = {n: (data["time"], data[n]) for n in ("motor", "angle")}
     write_uff_channels(tmp_path / "a.uff", channels, func_type=4)
-    with pytest.raises(ValueError, match="which read_response reads"):
+    with pytest.raises(ValueError, match="read_response reads it"):
         fq.read(tmp_path / "a.uff")

@@ -86,6 +86,13 @@ def of_one_group(
     return {n: a for arrays in found.values() for n, a in arrays.items()}
 
 
+class ResponseFile(InputError):
+    """What holds a frequency response where samples were expected."""
+
+    def __init__(self, path: object = "it") -> None:
+        super().__init__(f"{path} holds a frequency response, no samples: read_response reads it")
+
+
 def missing(kind: str, package: str, extra: str) -> InputError:
     """The error of a file that needs a package that is not installed."""
     return InputError(f"is {kind}, which needs {package}: pip install 'freqid[{extra}]'")

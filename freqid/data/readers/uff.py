@@ -9,7 +9,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError
 from freqid.data.readers.columns import columns_of
-from freqid.data.readers.kinds import damaged, missing, reads
+from freqid.data.readers.kinds import ResponseFile, damaged, missing, reads
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,6 +56,7 @@ def read_uff(path: Path) -> pd.DataFrame:
             )
     if not arrays:
         others = any(s.get("type") == 58 and s.get("func_type") == 4 for s in sets)
-        cure = "; it holds frequency responses, which read_response reads" if others else ""
-        raise InputError(f"holds no time responses (data sets 58 of function type 1){cure}")
+        if others:
+            raise ResponseFile
+        raise InputError("holds no time responses (data sets 58 of function type 1)")
     return columns_of({f"{n} [{units[n]}]" if n in units else n: x for n, x in arrays.items()})
