@@ -129,7 +129,7 @@ def frf(
     if out is not None:
         write_table(out, frame)
     if plot is not None:
-        write_picture(plot, fq.bode(response, labels=[data.name], unit="Hz"))
+        write_picture(plot, fq.plot_response(response, labels=[data.name]))
     if out is None and plot is None:
         print(frame.to_string(index=False))
     else:

@@ -94,7 +94,8 @@ def fit(
         beside = other if isinstance(other, fq.Record) else None
         estimate.report(report, title=f"{model} from {data.name}", validation=beside)
     if plot is not None:
-        write_picture(plot, fq.compare(estimate, record, band=band).plot())
+        beside = fq.compare(estimate, record, band=band)
+        write_picture(plot, beside.plot(zoom=isinstance(record, fq.Record)))
     show(f"{model}, {estimate.hold!r}", in_digits(estimate.parameters).reset_index())
     print(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "

@@ -26,6 +26,7 @@ from freqid.data.band import Band, chosen
 from freqid.data.conditions import as_conditions
 from freqid.data.entries import frozen, shaped
 from freqid.data.remembered import response_columns
+from freqid.data.sources import that_follows
 from freqid.data.units import as_units, quotient
 from freqid.lti import Hold
 
@@ -156,6 +157,7 @@ class FrequencyResponse:
         ends = self.output_names[output], self.input_names[input]
         return quotient(*(self.units.get(name, "") for name in ends))
 
+    @that_follows
     def select(self, limits: tuple[float, float]) -> FrequencyResponse:
         """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""
         keep = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
@@ -165,6 +167,7 @@ class FrequencyResponse:
         }
         return dataclasses.replace(self, **cut)
 
+    @that_follows
     def with_conditions(self, **conditions: float) -> FrequencyResponse:
         """The response with what was set for it, by name: a posture, a load, a known parameter.
 

@@ -9,6 +9,7 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
 from freqid.data.band import Band, chosen
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.sources import that_follows
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,11 +77,13 @@ class LocalResponse(FrequencyResponse):
         super().__init__(*given, **fields)  # type: ignore[arg-type]
         self.__dict__["line_noise"] = line_noise
 
+    @that_follows
     def with_conditions(self, **conditions: float) -> LocalResponse:
         """The same with what was set for it, by name."""
         fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
         return LocalResponse(**fields)
 
+    @that_follows
     def select(self, limits: tuple[float, float]) -> LocalResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
         kept = super().select(limits)

@@ -10,6 +10,7 @@ import numpy as np
 from freqid.checks import ComplexArray, InputError, numbers, whole
 from freqid.data.entries import frozen
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.sources import that_follows
 
 
 class PeriodicResponse(FrequencyResponse):
@@ -70,11 +71,13 @@ class PeriodicResponse(FrequencyResponse):
             freedom=whole("freedom", freedom),
         )  # fmt: skip
 
+    @that_follows
     def with_conditions(self, **conditions: float) -> PeriodicResponse:
         """The same with what was set for it, by name."""
         fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
         return PeriodicResponse(**fields)
 
+    @that_follows
     def select(self, limits: tuple[float, float]) -> PeriodicResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
         kept = self.plain().select(limits)

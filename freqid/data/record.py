@@ -27,6 +27,7 @@ from freqid.data.printed import as_html, as_text
 from freqid.data.sampling import check_rates, less_trend, noise_sizes, sample_at
 from freqid.data.selection import as_holds, channel, selected, with_input
 from freqid.data.signals import Signals
+from freqid.data.sources import that_follows
 from freqid.data.units import as_units
 from freqid.lti import Hold, ZeroOrderHold
 
@@ -122,6 +123,7 @@ class Record(Signals):
         lacking = {"notes": (), "aliased": 0.0, "conditions": {}, "clocks_apart": None}
         self.__dict__.update(lacking | sealed(state))
 
+    @that_follows
     def decimate(self, factor: int, keep_input: bool = False, antialias: bool = False) -> Record:
         """Every ``factor``-th sample, with the hold remembered as it was.
 
@@ -154,6 +156,7 @@ class Record(Signals):
             reference=None if reference is None else reference[::factor],
         )
 
+    @that_follows
     def slice(self, start: float | None = None, stop: float | None = None) -> Record:
         """The samples from ``start`` up to but not including ``stop``, both in s.
 
@@ -178,6 +181,7 @@ class Record(Signals):
             reference=None if self.reference is None else self.reference[first:last],
         )
 
+    @that_follows
     def detrend(self, order: int = 0) -> Record:
         """Input and output less their least-squares polynomial in time; order 0 is the mean.
 
@@ -189,6 +193,7 @@ class Record(Signals):
         order = whole("order", order, least=0)
         return replace(self, u=less_trend(self.u, order), y=less_trend(self.y, order))
 
+    @that_follows
     def with_noise(
         self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: float | None = None
     ) -> Record:
@@ -202,20 +207,20 @@ class Record(Signals):
         noise = np.random.default_rng(whole("seed", seed, least=0)).standard_normal(self.y.shape)
         return replace(self, y=self.y + size.reshape(self.y.shape[1:]) * noise)
 
+    @that_follows
     def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> Record:
         """The same samples with another hold remembered; names mean it at the input's period.
 
-        A dictionary gives each of several inputs its own, ``{"torque": "zoh", "coulomb": "bl"}``.
+        A dictionary gives each input its own, ``{"torque": "zoh", "coulomb": "bl"}``.
         """
         return replace(self, hold=as_holds(hold, self.input_dt, self.hold, self.input_names))
 
     def to_frame(self) -> pd.DataFrame:
         """Samples as a DataFrame indexed by time in s.
 
-        An output slower than the input has NaN between its samples. A hold other than the
-        zero-order hold at the input's own period is kept in one column more, ``zoh_period``,
-        ``foh_period`` or ``band_limited``, followed by the input's name where each has its own,
-        and each condition in a column ``condition q``: a file written from here remembers both.
+        An output slower than the input has NaN between its samples. A hold that is not the usual
+        one is kept in a column more, ``zoh_period``, ``foh_period`` or ``band_limited``, one for
+        each input where they differ, and each condition in a column ``condition q``.
 
         >>> Record([0.0, 1.0], [0.0, 0.5], dt=0.1).to_frame().columns.tolist()
         ['u', 'y']
@@ -236,12 +241,11 @@ class Record(Signals):
     ) -> Record:
         """A record from a DataFrame (pandas, polars, …), an xarray.Dataset, or u, y, sampling_time.
 
-        The time is a column ``time`` or an index of numbers (s), times or timedeltas called
-        ``time``; it must be uniform. ``dt`` (s) is for frames without one. Where neither inputs
-        nor outputs are named, two columns beside the time are input and output in that order.
-        ``resample`` puts an irregular time, or missing samples, on a regular grid by straight
-        lines and says so in ``notes``. Raises ValueError for unknown columns, and without
-        ``resample`` for missing samples or an irregular time.
+        The time is found as in a file (``read``), or is an index of times or of numbers (s); it
+        must be uniform. ``dt`` (s) is for frames without one. Of two unnamed columns the first is
+        the input. ``resample`` puts an irregular time, or missing samples, on a regular grid and
+        says so in ``notes``. Raises ValueError for unknown columns, and without ``resample`` for
+        missing samples or an irregular time.
 
         >>> import pandas as pd
         >>> frame = pd.DataFrame({"time": [0, 0.1, 0.2], "u": [0.0, 1, 1], "y": [0.0, 0, 1]})
@@ -254,6 +258,7 @@ class Record(Signals):
         """Samples (N,) of a channel by name; KeyError with the nearest name for another."""
         return channel(self, name)
 
+    @that_follows
     def select(
         self,
         inputs: Sequence[str] | str | None = None,
@@ -271,9 +276,8 @@ class Record(Signals):
     ) -> Record:
         """The record with a known input more, (N,), sampled like the others.
 
-        ``hold`` is what it did between its samples: ``"bl"`` for one made of measured signals, such
-        as the sign of a velocity that stands for Coulomb friction; None is that of the record.
-        Raises ValueError for a name that is taken or another number of samples.
+        ``hold`` is what it did between its samples, ``"bl"`` for one made of measured signals; None
+        is that of the record. ValueError for a name that is taken, another number of samples.
 
         >>> record = Record([0.0, 1.0], [0.0, 0.5], dt=0.1)
         >>> record.with_input("coulomb", -np.sign(record["y"]), hold="bl").input_names
@@ -281,6 +285,7 @@ class Record(Signals):
         """
         return with_input(self, name, samples, hold, unit)
 
+    @that_follows
     def with_conditions(self, **conditions: float) -> Record:
         """The record with what was set for it, by name: a posture, a load, a known parameter.
 

@@ -40,7 +40,7 @@ class Estimate(Questioned, Shown):
     Attributes:
         model: the model at the estimate: GreyBox, DiscreteModel or ContinuousModel.
         names, values: names of the P values that were estimated, and these, in their units.
-        nominal: the values that the search began from, (P,); NaN where there were none.
+        nominal: the values that the model itself has, (P,); NaN where it has none.
         units: unit of each value.
         uncertainty: how the estimate scatters, or the covariance itself, (P, P).
         cost: the data's part of the least weighted sum of squared errors, in output units squared,

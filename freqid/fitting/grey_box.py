@@ -202,7 +202,9 @@ def _estimate(
         model=model,
         names=structure.names,
         values=values,
-        nominal=np.append(structure.values[:count], [np.nan] * (len(values) - count)),
+        nominal=np.array(
+            [p.value for p in structure.parameters] + [np.nan] * (len(values) - count)
+        ),
         units=structure.units,
         uncertainty=spread,
         problem=minimum,

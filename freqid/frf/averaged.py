@@ -18,6 +18,7 @@ from freqid.data import (
     as_records,
     chosen,
     references_of,
+    that_estimates,
 )
 from freqid.frf.measured import measured
 from freqid.frf.segments import (
@@ -32,6 +33,7 @@ from freqid.frf.segments import (
 )
 
 
+@that_estimates
 def h1(
     records: Record | Sequence[Record] | Stream,
     segment: int | None = None,
@@ -74,6 +76,7 @@ def h1(
     return _response(s, s.yu @ np.linalg.inv(s.uu))
 
 
+@that_estimates
 def h2(
     records: Record | Sequence[Record] | Stream,
     segment: int | None = None,
@@ -98,6 +101,7 @@ def h2(
     return _scaled(_response(s, G), s, G, np.ones(G.shape))
 
 
+@that_estimates
 def hv(
     records: Record | Sequence[Record] | Stream,
     segment: int | None = None,

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import FrequencyResponse, Record, as_records
+from freqid.data import FrequencyResponse, Record, as_records, that_estimates
 from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra
 
 
+@that_estimates
 def etfe(
     record: Record | Sequence[Record], band: tuple[float, float] | None = None
 ) -> FrequencyResponse:

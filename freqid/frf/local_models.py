@@ -24,6 +24,7 @@ from freqid.data import (
     as_records,
     chosen,
     references_of,
+    that_estimates,
 )
 from freqid.frf.local_windows import Form, Lines, Local, inflation, local_models
 from freqid.frf.measured import measured
@@ -38,6 +39,7 @@ _HOPELESS = 100.0
 _DEPENDENT = 1e-12
 
 
+@that_estimates
 def local_polynomial(
     records: Record | Sequence[Record],
     order: int = 2,
@@ -73,6 +75,7 @@ def local_polynomial(
     return _estimate(records, order, 0, band, width, reference)
 
 
+@that_estimates
 def local_rational(
     records: Record | Sequence[Record],
     order: int = 3,
@@ -172,7 +175,7 @@ def _widened(
         warnings.warn(
             "the input's spectrum is so smooth, as a chirp's is, that the local polynomials cannot "
             "tell it from the transient everywhere; use local_rational",
-            stacklevel=4,
+            stacklevel=5,
         )
     return lines, form
 

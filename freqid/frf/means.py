@@ -16,6 +16,7 @@ from freqid.data import (
     as_records,
     chosen,
     references_of,
+    that_estimates,
 )
 from freqid.frf.measured import units_of
 from freqid.frf.noise_of_means import FREEDOM, means
@@ -34,6 +35,7 @@ _WORSE, _NOT_AT_ALL = 0.75, 0.05
 _CERTAIN = 4.0
 
 
+@that_estimates
 def periodic(
     records: Record | Sequence[Record],
     period: float | None = None,

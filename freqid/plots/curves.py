@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 UNITS = {"rad/s": 2 * np.pi, "Hz": 1.0}
 # so small a part of what stands beside it is nothing
 _ROUNDING = 1e-12
+# part of the input's largest power below which a line tells nothing
+_DRIVEN = 1e-6
 # points around each mode's circle
 _ARCS = 160
 # squared radius of a 95 % ellipse of two normal variables
@@ -91,10 +93,41 @@ def shown(
         raise InputError(f"labels has {len(labels)} entries for {len(things)} responses")
     between = hold or common_hold(things)
     at = frequencies(things) if omega is None else np.asarray(omega, dtype=float)
-    names: Sequence[str | None] = labels or [None] * len(things)
+    names = _names(things) if labels is None else labels
     looks = [line(i) if styles is None else styles[i] for i in range(len(things))]
     each = zip(things, names, looks, strict=True)
     return [Shown(response_of(thing, at, between), name, look) for thing, name, look in each]
+
+
+def _names(things: Sequence[Drawable]) -> Sequence[str | None]:
+    """What several things are called where nobody says it: one of each kind by its kind."""
+    kinds = [_kind(t) for t in things]
+    if len(things) < 2:
+        return [None] * len(things)
+    counted = [kinds[: i + 1].count(k) for i, k in enumerate(kinds)]
+    return [f"{k} {n}" if kinds.count(k) > 1 else k for k, n in zip(kinds, counted, strict=True)]
+
+
+def _kind(thing: Drawable) -> str:
+    if isinstance(thing, Estimate):
+        return "estimate"
+    if isinstance(thing, FrequencyResponse):
+        seen = thing.input_spectrum is not None or thing.variance is not None
+        return "measured" if seen or thing.coherence is not None else "response"
+    return str(getattr(thing, "name", None) or "model") if isinstance(thing, Model) else "system"
+
+
+def told_range(frf: FrequencyResponse) -> tuple[float, float]:
+    """The frequencies (Hz) between which the input had power, all of them where that is unknown.
+
+    Where nothing drove the plant a measured response is a quotient of noise.
+    """
+    f = frf.frequency
+    if frf.input_spectrum is None:
+        return float(f[0]), float(f[-1])
+    power = frf.input_spectrum.max(axis=0)
+    at = f[power >= _DRIVEN * power.max(initial=0)]
+    return float(at[0]), float(at[-1])
 
 
 def common_hold(things: Sequence[Drawable]) -> Hold | None:
@@ -202,7 +235,8 @@ def heard(curve: BodeCurve, frf: FrequencyResponse, pair: tuple[int, int]) -> Bo
     """The curve of a channel pair where it is more than rounding beside those of the same output,
     or of the same input; nothing elsewhere.
     """
-    size = np.abs(frf.response)
+    low, high = told_range(frf)
+    size = np.abs(frf.response[..., (frf.frequency >= low) & (frf.frequency <= high)])
     beside = max(size[pair[0]].max(initial=0), size[:, pair[1]].max(initial=0))
     told = curve.magnitude > _ROUNDING * beside
     if told.all():
@@ -215,10 +249,11 @@ def _next_to(
     beside: FrequencyResponse | None, frf: FrequencyResponse, pair: tuple[int, ...], scattered: bool
 ) -> FloatArray:
     f, phase = frf.frequency, frf.phase[pair]
-    away, both = phase, np.ones(len(f), dtype=bool)
+    low, high = told_range(frf)
+    away, both = phase, (f >= low) & (f <= high)
     if beside is not None:
         low, high = beside.frequency[[0, -1]]
-        both = (f >= low) & (f <= high)
+        both &= (f >= low) & (f <= high)
         if (np.array(pair) >= beside.response.shape[:2]).any() or not both.any():
             return phase
         away = phase - np.interp(f, beside.frequency, beside.phase[pair])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, ParamSpec, TypeAlias, TypeVar, cast
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, choice
+from freqid.plots.spectra import POINTS, envelope
 from freqid.plots.style import on_dark
 
 if TYPE_CHECKING:
@@ -171,6 +172,9 @@ def _line(line: Line2D) -> Part:
         # a line across the whole panel
         transform = line.get_transform() - line.axes.transData  # type: ignore[union-attr]
         x, y = transform.transform(np.column_stack([x, y])).T
+    if len(x) > 2 * POINTS and not marked and (np.diff(x) > 0).all() and np.isfinite(y).all():
+        # a browser redraws some thousands of points while one drags
+        x, y = envelope(x, y, 2 * POINTS)
     return {
         "type": "scatter", "x": x, "y": y, "mode": mode,
         "name": "" if label.startswith("_") else label,

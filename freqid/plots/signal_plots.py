@@ -10,10 +10,13 @@ from freqid.checks import InputError, an, choice
 from freqid.data import FrequencyResponse, Record
 from freqid.plots.curves import UNITS
 from freqid.plots.interactive import Backend, offers_plotly
-from freqid.plots.style import Panels, drawing, line, stacked
+from freqid.plots.style import Panels, Style, drawing, line, stacked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+# samples of which the width of a page shows each
+_LONG = 3000
 
 
 @offers_plotly
@@ -36,13 +39,17 @@ def plot_record(
             (ax[0], "input", record.input_names, record.input_time, record.inputs, steps),
             (ax[1], "output", record.output_names, record.time, record.outputs, "default"),
         ):
+            # of long records single samples cannot be seen, and thick lines hide one another
+            look: Style = {"linewidth": 0.6} if len(time) > _LONG else {}
             for index, (name, values) in enumerate(zip(names, signals.T, strict=True)):
-                axis.plot(time, values, label=name, drawstyle=drawn, **line(index))
+                axis.plot(time, values, label=name, drawstyle=drawn, **(line(index) | look))
             unit = (record.units or {}).get(names[0], "")
             name = names[0] if len(names) == 1 else what
             axis.set_ylabel(f"{name} / {unit}" if unit else name)
             if len(names) > 1:
-                axis.legend()
+                # on the upper edge, where no curve is
+                axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=len(names),
+                            borderaxespad=0.1)  # fmt: skip
         ax[1].set_xlabel("time / s")
     return ax
 

@@ -11,6 +11,7 @@ from freqid.checks import FloatArray, InputError, flag, table_with
 from freqid.data import FrequencyResponse
 from freqid.plots.bode_nyquist import bode
 from freqid.plots.interactive import Backend, offers_plotly
+from freqid.plots.spectra import peaks, worst_stretch
 from freqid.plots.style import Panels, drawing, ink, line, stacked
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
     from freqid.validation import Comparison
 
-# samples of the stretch that is looked at closely
-_FEW, _MANY = 40, 80
+# lines of a spectrum that paper shows
+_LINES = 10_000
 
 
 @offers_plotly
@@ -60,11 +61,11 @@ def plot_comparison(
             text = f"simulated, {comparison.fit_percent[o]:.1f} %"
             above.plot(time, simulated[:, o], label=text, **line(2))
             above.set_ylabel(label)
-            above.legend(loc="upper right", ncols=2)
+            _legend_above(above)
             below.plot(time, residuals[:, o], color=ink(1), linewidth=0.8)
             below.set_ylabel("difference")
             if zoom:
-                worst = _worst(residuals[:, o], record.dt)
+                worst = worst_stretch(residuals[:, o], record.dt)
                 near, spectra = ax[rows * o + 2], ax[rows * o + 3]
                 for values, style in ((measured, line(0)), (simulated[:, o], line(2))):
                     near.plot(time[worst], values[worst], marker=".", markersize=3, **style)
@@ -76,28 +77,27 @@ def plot_comparison(
     return ax
 
 
-def _worst(residual: FloatArray, dt: float) -> slice:
-    """The stretch of some dozens of samples, or of a second, that holds most of what is left."""
-    N = len(residual)
-    length = int(np.clip(1 / dt, min(_FEW, N), max(min(_MANY, N), 1)))
-    power = np.concatenate([[0.0], np.cumsum(residual**2)])
-    first = int(np.argmax(power[length:] - power[:-length]))
-    return slice(first, first + length)
-
-
 def _draw_spectra(
     ax: Axes, measured: FloatArray, residual: FloatArray, dt: float, unit: str
 ) -> None:
     """Amplitudes of what was measured and of what is left, over frequency."""
-    f = np.fft.rfftfreq(len(measured), dt)[1:]
+    f, amplitude = peaks(measured - measured.mean(), dt, (0.0, 0.5 / dt), _LINES)
+    # what was compared: a band leaves nothing but rounding beside it
+    there = f[amplitude > 1e-7 * amplitude.max(initial=0)]
+    band = (float(there[0]), float(there[-1])) if len(there) else (0.0, 0.5 / dt)
     for values, style, label in (
         (measured, line(0), "measured"), (residual, line(1), "difference"),
     ):  # fmt: skip
-        amplitude = 2 * np.abs(np.fft.rfft(values - values.mean()))[1:] / len(values)
-        ax.plot(f, amplitude, label=label, **(style | {"linewidth": 0.8}))
+        at, amplitude = peaks(values - values.mean(), dt, band, _LINES)
+        ax.plot(at, amplitude, label=label, **(style | {"linewidth": 0.8}))
     ax.set(xscale="log", yscale="log", xlabel="frequency / Hz",
            ylabel=f"amplitude / {unit}" if unit else "amplitude")  # fmt: skip
-    ax.legend(loc="upper right", ncols=2)
+    _legend_above(ax)
+
+
+def _legend_above(ax: Axes) -> None:
+    """A legend on the upper edge, where no curve is."""
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.1)
 
 
 @offers_plotly

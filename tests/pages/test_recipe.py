@@ -1,5 +1,6 @@
 """A report's recipe runs as it stands, and gives the same numbers."""
 
+import dataclasses
 import html
 import re
 import subprocess
@@ -104,4 +105,40 @@ def test_data_that_were_changed_were_not_read(file):
 
     record = fq.read(file)
     assert source(record) == f"fq.read({str(file)!r})"
-    assert source(record.slice(0, 1)) is None
+    assert source(dataclasses.replace(record, y=2 * record.y)) is None
+    assert source(record.with_noise(np.array([0.1]))) is None
+
+
+@pytest.mark.parametrize("made", [
+    lambda record: record.decimate(5),
+    lambda record: record.detrend().slice(0.5, 3.5).decimate(4, keep_input=True),
+    lambda record: record.with_hold("foh"),
+    lambda record: record.with_noise(0.01, seed=3).with_conditions(Ja=11.0),
+    lambda record: fq.etfe(record, band=(10, 80)),
+    lambda record: fq.h1(record.decimate(2), 500, band=(10, 80)).select((12, 70)),
+    lambda record: fq.etfe([record, record.with_noise(0.1)], (10, 80)),
+    lambda record: [record.decimate(5), record.detrend()],
+])  # fmt: skip
+def test_what_was_done_to_the_data_is_done_again(made, file, tmp_path):
+    est = fq.fit(fq.two_mass(k=1.45e5).fix("fm"), made(fq.read(file, inputs="u")))
+    code = lines(est, tmp_path)
+    assert "..." not in code
+    assert "model = fq.two_mass(k=145000.0" in code
+    np.testing.assert_allclose(again(code, tmp_path), est.values, rtol=1e-9)
+
+
+def test_of_the_command_line_with_decimation(file, tmp_path):
+    run = subprocess.run(
+        [sys.executable, "-m", "freqid.cli", "fit", str(file), "--model", "two-mass", "--band",
+         "10", "80", "--decimate", "4", "--hold", "zoh", "--report", "axis.html",
+         "--out", "e.json"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (tmp_path / "axis.html").exists(), run.stderr
+    page = (tmp_path / "axis.html").read_text(encoding="utf-8")
+    code = html.unescape(re.search(r'<pre id="call">(.*?)</pre>', page, re.S)[1])
+    assert f"data = fq.read({str(file)!r}).decimate(4, keep_input=False)" in code
+    np.testing.assert_allclose(again(code, tmp_path), fq.load(tmp_path / "e.json").values)
+    # what the screen says of it the page says too
+    for said in re.findall(r"(?:witness|note|warning)[^:]*: (.*)", run.stdout):
+        assert said[:60] in html.unescape(page), said

@@ -321,3 +321,12 @@ def test_a_notebook_shows_a_comparison_as_a_table():
         rms = np.sqrt(np.mean(abs(errors) ** 2, axis=1))
         np.testing.assert_allclose([float(c) for c in cells[2::4]], rms, rtol=6e-3)
         np.testing.assert_allclose([float(c) for c in cells[3::4]], abs(errors).max(1), rtol=6e-3)
+
+
+def test_a_residual_test_draws_itself(plant, slow):
+    noisy = slow.with_noise(0.1, seed=1)
+    table = fq.residual_test(fq.fit(plant, noisy, band=(10, 80)), noisy, band=(10, 80))
+    axes = table.plot()
+    assert len(axes) == len(table.attrs["correlations"])
+    assert "lag / samples" in axes[-1].get_xlabel()
+    assert type(table[table["passed"]]).__name__ == "DataFrame"

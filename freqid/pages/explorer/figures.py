@@ -19,6 +19,7 @@ from freqid.plots import (
     bode_curve,
     bode_traces,
     line,
+    peaks,
     trace,
     unit_of,
 )
@@ -26,8 +27,6 @@ from freqid.validation import compare
 
 # curves that look alike wherever they are
 _STYLES = {"estimate": 2, "measured": 5}
-# lines of a spectrum that are drawn
-_LINES = 500
 # part of a parameter below which its axis is linear, as far as it then reaches in tens, and ticks
 _LINEAR, _TICKS = 0.01, (0.01, 0.1, 1.0, 10.0, 100.0)
 
@@ -169,7 +168,7 @@ def left_figure(shown: Scene) -> Part:
     measured = beside.measured[:, 0]
     left = beside.residuals.reshape(len(measured), -1)[:, 0]
     data = [
-        trace(*_peaks(y, shown.slow.dt, (low, high)), name, line(look))
+        trace(*peaks(y, shown.slow.dt, (low, high)), name, line(look))
         for y, name, look in ((measured, "measured", 0), (left, "left", 2))
     ]
     layout = base(title) | {
@@ -178,18 +177,6 @@ def left_figure(shown: Scene) -> Part:
                   "dtick": 1},
     }  # fmt: skip
     return {"data": data, "layout": layout}
-
-
-def _peaks(y: FloatArray, dt: float, band: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Amplitudes at the lines of a band; of many lines the largest of each short stretch."""
-    f = np.fft.rfftfreq(len(y), dt)
-    amplitude = 2 * np.abs(np.fft.rfft(y)) / len(y)
-    inside = (f >= band[0]) & (f <= band[1]) & (f > 0)
-    f, amplitude = f[inside], amplitude[inside]
-    if len(f) <= _LINES:
-        return f, amplitude
-    stretches = np.unique(np.searchsorted(f, np.geomspace(f[0], f[-1], _LINES)))
-    return f[stretches], np.maximum.reduceat(amplitude, stretches)
 
 
 def _spread(x: FloatArray | float) -> FloatArray:

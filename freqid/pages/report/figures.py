@@ -21,7 +21,11 @@ from freqid.plots import (
     bode_axes,
     bode_curve,
     bode_traces,
+    envelope,
+    hold_in_words,
+    peaks,
     trace,
+    worst_stretch,
 )
 from freqid.validation import compare
 
@@ -127,37 +131,71 @@ def _residuals(
     t, drawn = record.time[: len(simulated)], []
     for o, name in enumerate(record.output_names):
         y, s = c.measured[:, o], simulated[:, o]
-        note = f"{c.fit_percent[o]:.2f} % (NRMSE), simulated with {c.hold!r}"
-        note += f", {est.band[0]:g} to {est.band[1]:g} Hz" if est.band else ""
+        unit = record.units.get(name, "")
+        said = f"{name} / {unit}" if unit else str(name)
+        note = f"{c.fit_percent[o]:.2f} % (NRMSE), simulated with {_held(c.hold)}"
+        raw = []
+        if est.band is not None:
+            note += f", {est.band[0]:g} to {est.band[1]:g} Hz"
+            # what a band leaves swings at the ends of a record, where the record itself does not
+            whole = record.outputs[: len(simulated), o]
+            raw = [trace(*envelope(t, whole), "as recorded", _DATA) | {"opacity": 0.5}]
         thinned = len(t) > _POINTS
         note += (
             "; of long records the extremes are drawn, so that no peak is lost." if thinned else "."
         )
         data = [
-            trace(*_envelope(t, y), "measured", _BLACK),
-            trace(*_envelope(t, s), "simulated", _ORANGE),
-            trace(*_envelope(t, y - s), "difference", _BLUE, axis=2),
+            *raw,
+            trace(*envelope(t, s), "simulated", _ORANGE),
+            trace(*envelope(t, y), "measured", _BLACK),
+            trace(*envelope(t, y - s), "difference", _BLUE, axis=2),
         ]
         axes: Part = {
             "xaxis": {"anchor": "y2", "title": {"text": "time / s"}},
-            "yaxis": {"domain": [0.36, 1], "title": {"text": escape(str(name))}},
+            "yaxis": {"domain": [0.36, 1], "title": {"text": escape(said)}},
             "yaxis2": {"domain": [0, 0.28], "title": {"text": "difference"}},
         }
         drawn.append(_figure(f"{title}{name}", note, data, 460, 1.1, axes))
+        drawn.append(_closely(f"{title}{name}, closely", said, t, y, s, record.dt, est.band))
     return drawn
 
 
-def _envelope(t: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The least and the largest sample of each of many short pieces, in the order of their times.
+def _closely(
+    title: str,
+    said: str,
+    t: FloatArray,
+    y: FloatArray,
+    s: FloatArray,
+    dt: float,
+    band: tuple[float, float] | None,
+) -> Figure:
+    """The stretch in which the difference is largest, above spectra of output and difference."""
+    at = worst_stretch(y - s, dt)
+    ends = band or (0.0, 0.5 / dt)
+    data = [
+        trace(t[at], y[at], "measured", _BLACK, mode="lines"),
+        trace(t[at], s[at], "simulated", _ORANGE),
+        trace(*peaks(y, dt, ends), "measured, spectrum", _BLACK, axis=2) | {"xaxis": "x2"},
+        trace(*peaks(y - s, dt, ends), "difference, spectrum", _BLUE, axis=2) | {"xaxis": "x2"},
+    ]
+    axes: Part = {
+        "xaxis": {"anchor": "y", "title": {"text": "time / s"}},
+        "yaxis": {"domain": [0.6, 1], "title": {"text": escape(said)}},
+        "xaxis2": {"anchor": "y2", "type": "log", "title": {"text": "frequency / Hz"}},
+        "yaxis2": {"domain": [0, 0.42], "type": "log", "title": {"text": "amplitude"},
+                   "exponentformat": "power", "dtick": 1},
+    }  # fmt: skip
+    note = "Above, where the difference is largest; below, amplitudes over frequency."
+    for part in data[2:]:
+        part["showlegend"] = True
+    return _figure(title, note, data, 460, 1.1, axes)
 
-    Every n-th sample of a fast signal would be a slow one that was never there.
-    """
-    if len(y) <= _POINTS:
-        return t, y
-    pieces = np.array_split(np.arange(len(y)), _POINTS // 2)
-    ends = [sorted({p[np.argmin(y[p])], p[np.argmax(y[p])]}) for p in pieces]
-    at = np.concatenate(ends)
-    return t[at], y[at]
+
+def _held(hold: object) -> str:
+    """A hold in words."""
+    if not isinstance(hold, PeriodicHold):
+        return "an input known between its samples" if hold is None else f"the hold {hold!r}"
+    return f"{hold_in_words(hold)} of {1e3 * hold.period:.4g} ms"
 
 
 def records(est: Estimate) -> list[Record]:

@@ -39,6 +39,7 @@ def write_report(
         title=title or f"Estimate of {getattr(est.model, 'name', type(est.model).__name__)}",
         verdict=found,
         warnings=list(est.warnings),
+        witness=None if est.testimony is None else est.witness,
         notes=list(est.notes),
         parameters=parameters(est, away),
         bias_note="The bias is what the assumed hold adds: the estimate less that under the hold "

@@ -12,7 +12,7 @@ import numpy as np
 
 from freqid.data import DataSet, source
 from freqid.fitting import Estimate, data_digest
-from freqid.models import GreyBox, Parameter, model_to_dict
+from freqid.models import PLANTS, GreyBox, Parameter, model_to_dict
 from freqid.pages.report.sentences import versions
 
 # beyond so many parameters and records the lines are no longer read
@@ -61,6 +61,10 @@ def _grey_box(est: Estimate) -> tuple[list[str], str | None]:
     module holds.
     """
     model = est.model
+    began = dict(zip(est.names, est.nominal, strict=True))
+    own = {n: v for n, v in began.items() if n in model.values and math.isfinite(v)}
+    if (short := _ready_made(model.with_values(**own))) is not None:
+        return [], short
     written = model_to_dict(model)
     paths = {key: written[key] for key in ("matrices", "jacobian")}
     if paths["matrices"] is None or (model.jacobian is not None and paths["jacobian"] is None):
@@ -75,7 +79,6 @@ def _grey_box(est: Estimate) -> tuple[list[str], str | None]:
         names[key] = f"partial({', '.join([name, *map(repr, given)])})" if given else name
     if any(name.startswith("partial(") for name in names.values()):
         imports.insert(0, "from functools import partial")
-    began = dict(zip(est.names, est.nominal, strict=True))
     rows = [_parameter(p, began.get(p.name, p.value)) for p in model.parameters]
     if any(re.search(r"\binf\b", row.partition(", ")[2]) for row in rows):
         imports.insert(0, "from math import inf")
@@ -90,6 +93,31 @@ def _grey_box(est: Estimate) -> tuple[list[str], str | None]:
     lines = ["fq.GreyBox(", f"    {names['matrices']},", "    ["]
     lines += [f"        {row}," for row in rows] + ["    ],", *more, ")"]
     return imports, "\n".join(lines)
+
+
+def _ready_made(model: GreyBox) -> str | None:
+    """A plant of freqid's own as it is called, with what was changed of it; None for others."""
+    for make in PLANTS.values():
+        base = make()
+        own = {p.name: p for p in model.parameters}
+        if model.matrices is not base.matrices or list(own) != [p.name for p in base.parameters]:
+            continue
+        values = {p.name: own[p.name].value for p in base.parameters}
+        fixed = {p.name: own[p.name].fixed for p in base.parameters}
+        moved = {p.name: values[p.name] for p in base.parameters if values[p.name] != p.value}
+        again = base.with_values(**moved)
+        held = [p.name for p in base.parameters if fixed[p.name] and not p.fixed]
+        freed = [p.name for p in base.parameters if p.fixed and not fixed[p.name]]
+        again = again.fix(*held) if held else again
+        again = again.free(*freed) if freed else again
+        if again != model:
+            continue
+        function, given = (getattr(make, "func", make), getattr(make, "args", ()))
+        said = [*map(repr, given), *(f"{k}={v!r}" for k, v in moved.items())]
+        text = f"fq.{function.__name__}({', '.join(said)})"
+        text += f".fix({', '.join(map(repr, held))})" if held else ""
+        return text + (f".free({', '.join(map(repr, freed))})" if freed else "")
+    return None
 
 
 def _plain(value: object) -> object:

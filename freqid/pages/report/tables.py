@@ -31,7 +31,7 @@ class Table(NamedTuple):
 
 def parameters(est: Estimate, bias: Mapping[str, float]) -> Table:
     """The parameters with their error bars, and bias bars where there are any."""
-    columns = ["parameter", "value", "±", "95 % from", "to", "began at", "unit"]
+    columns = ["parameter", "value", "±", "95 % from", "to", "nominal", "unit"]
     if bias:
         columns.insert(3, "bias")
     rows = []
@@ -83,18 +83,26 @@ def tests(est: Estimate) -> list[dict[str, object]]:
 
 def modes(est: Estimate) -> Table:
     """Frequency and damping of each mode, or the time constant of a real pole."""
-    columns = ["mode", "frequency in Hz", "±", "damping ratio", "±", "time constant in s", "±"]
-    named = ["frequency", "frequency_std", "damping", "damping_std", "time_constant",
-             "time_constant_std"]  # fmt: skip
+    columns = ["mode", "frequency in Hz", "±", "damping ratio", "±", "time constant in s", "±",
+               "pole in rad/s"]  # fmt: skip
     found = est.modes()
-    rows = [
-        [
-            f"{i + 1}{_outside(mode)}",
-            *(_number(float(mode[n]), 2 if n.endswith("std") else 6) for n in named),
-        ]
-        for i, (_, mode) in enumerate(found.head(_ROWS).iterrows())
-    ]
+    rows = []
+    for i, (_, mode) in enumerate(found.head(_ROWS).iterrows()):
+        row = [f"{i + 1}{_outside(mode)}"]
+        for n in ("frequency", "damping", "time_constant"):
+            value, std = float(mode[n]), float(mode[f"{n}_std"])
+            row += [_rounded(value, std) if std > 0 else _number(value, 6), _error(std)]
+        rows.append([*row, _pole(float(mode["frequency"]), float(mode["damping"]))])
     return Table(columns, rows, max(len(found) - _ROWS, 0))
+
+
+def _pole(frequency: float, damping: float) -> str:
+    """The pole of a mode, a pair of them with both signs, in continuous time."""
+    if np.isnan(damping):
+        return "0"
+    size = 2 * np.pi * frequency
+    real, imaginary = -damping * size, size * np.sqrt(max(1 - damping**2, 0.0))
+    return f"{real:.4g}" + (f" ± {imaginary:.5g}j" if imaginary > 1e-9 * size else "")
 
 
 def _outside(mode: pd.Series) -> str:
@@ -111,7 +119,7 @@ def spread(est: Estimate) -> Table:
     found = found[found["shift"].notna()]
     rows = [
         [row["between"], row["parameter"], _number(row["percent"], 3), _number(row["shift"], 3),
-         _number(row["p_value"], 2), _number(row["std"], 2), _number(row["widened"], 2)]
+         _number(row["p_value"], 2), _error(row["std"]), _error(row["widened"])]
         for row in found.head(_ROWS).reset_index().to_dict("records")
     ]  # fmt: skip
     return Table(columns, rows, max(len(found) - _ROWS, 0))
