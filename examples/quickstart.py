@@ -40,7 +40,7 @@ axes = fq.bode(
     labels=["true", *estimates],
     unit="Hz",
 )
-axes[0].legend(loc="upper right")
+axes[0].legend(loc="lower left")
 axes[0].figure.suptitle("Two-mass axis identified from a chirp decimated by 10")
 axes[0].figure.savefig(out / "quickstart.png", dpi=150)
 plt.close("all")

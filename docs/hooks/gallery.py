@@ -27,7 +27,9 @@ def on_pre_build(config):
         title = path.read_text().splitlines()[0].strip('"')
         pages += [f"## {path.stem}", "", title, ""]
         for picture in sorted(folder.rglob("*.png"))[:4]:
-            pages += [f"![{picture.stem}]({picture.relative_to(ROOT / 'docs')})", ""]
+            at = picture.relative_to(ROOT / "docs")
+            # a wide one is read at its own size
+            pages += [f"[![{picture.stem}]({at})]({at})", ""]
         pages += ['??? note "what it prints"', "", "    ```"]
         pages += [f"    {line}" for line in done.stdout.splitlines()[:60]]
         pages += ["    ```", "", '??? note "the script"', "", "    ```python"]

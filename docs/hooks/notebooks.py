@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+import pathspec
+
 PAGE = "notebooks/measured_robot.py"
 BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -14,5 +16,6 @@ def on_config(config):
             entry.update(
                 {"Notebooks": [p for p in pages if PAGE not in p.values()]} if pages else {}
             )
-        config.exclude_docs += PAGE + "\n"
+        excluded = pathspec.gitignore.GitIgnoreSpec.from_lines([PAGE])
+        config.exclude_docs = (config.exclude_docs or excluded) + excluded
     return config

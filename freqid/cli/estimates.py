@@ -91,8 +91,8 @@ def fit(
     if out is not None:
         estimate.save(out, overwrite=force)
     if report is not None:
-        beside = other if isinstance(other, fq.Record) else None
-        estimate.report(report, title=f"{model} from {data.name}", validation=beside)
+        on = other if isinstance(other, fq.Record) else None
+        estimate.report(report, title=f"{model} from {data.name}", validation=on)
     if plot is not None:
         beside = fq.compare(estimate, record, band=band)
         write_picture(plot, beside.plot(zoom=isinstance(record, fq.Record)))

@@ -78,7 +78,7 @@ class Record(Signals):
     conditions: Mapping[str, float]
     clocks_apart: float | None
 
-    # written by hand: fields hold what was checked, which is less than what may be given
+    # by hand: fields hold what was checked, which is less than what may be given
     def __init__(
         self,
         u: ArrayLike,
@@ -195,7 +195,7 @@ class Record(Signals):
 
     @that_follows
     def with_noise(
-        self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: float | None = None
+        self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: ArrayLike | None = None
     ) -> Record:
         """The record with white Gaussian noise on every output.
 
@@ -243,9 +243,8 @@ class Record(Signals):
 
         The time is found as in a file (``read``), or is an index of times or of numbers (s); it
         must be uniform. ``dt`` (s) is for frames without one. Of two unnamed columns the first is
-        the input. ``resample`` puts an irregular time, or missing samples, on a regular grid and
-        says so in ``notes``. Raises ValueError for unknown columns, and without ``resample`` for
-        missing samples or an irregular time.
+        the input. ``resample`` puts an irregular time, or missing samples, on a regular grid.
+        Raises ValueError for unknown columns, and else for missing samples or irregular times.
 
         >>> import pandas as pd
         >>> frame = pd.DataFrame({"time": [0, 0.1, 0.2], "u": [0.0, 1, 1], "y": [0.0, 0, 1]})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, finite, numbers
+from freqid.checks import FloatArray, InputError, numbers
 
 
 def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
@@ -31,7 +31,7 @@ def sample_at(position: float) -> int:
     return int(np.ceil(position - 1e-6))
 
 
-def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: float | None) -> FloatArray:
+def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: ArrayLike | None) -> FloatArray:
     """Standard deviations of noise on outputs (N, outputs), (outputs,), as ``with_noise`` says."""
     p = y.shape[1]
     if (std is None) == (snr is None):
@@ -39,7 +39,10 @@ def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: float | None) -> Floa
     if snr is not None:
         if not y.std(axis=0).all():
             raise InputError(f"snr={snr!r}: an output is constant; give std, the noise's own size")
-        return y.std(axis=0) * 10 ** (-finite("snr", snr) / 20)
+        ratio = np.atleast_1d(numbers("snr", snr))
+        if ratio.shape not in ((1,), (p,)) or not np.isfinite(ratio).all():
+            raise InputError(f"snr={snr!r}: expected finite dB, one or one for each of {p} outputs")
+        return y.std(axis=0) * 10 ** (-ratio / 20)
     sizes = np.atleast_1d(numbers("std", std if std is not None else ()))
     if sizes.shape not in ((1,), (p,)) or not np.isfinite(sizes).all() or (sizes < 0).any():
         raise InputError(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, InputError
+from freqid.data.arithmetic import less, times
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -42,7 +43,29 @@ class Signals:
         return [self, *other] if isinstance(other, list) else NotImplemented
 
     def __radd__(self, other: object) -> list[object]:
+        if isinstance(other, int) and other == 0:
+            # where sum() begins
+            return [self]
         return [*other, self] if isinstance(other, list) else NotImplemented
+
+    def __mul__(self, factor: object) -> Self:
+        """The experiment so many times as large: what a linear plant does of more input."""
+        return times(self, factor)
+
+    def __rmul__(self, factor: object) -> Self:
+        return times(self, factor)
+
+    def __truediv__(self, divisor: object) -> Self:
+        if not isinstance(divisor, int | float) or not divisor:
+            raise InputError(f"a record divided by {divisor!r:.40}; expected a number, not zero")
+        return times(self, 1 / divisor)
+
+    def __sub__(self, other: object) -> Self:
+        """What one experiment has more than another of the same rate, length and channels."""
+        return less(self, other)
+
+    def __neg__(self) -> Self:
+        return times(self, -1.0)
 
     @property
     def factor(self) -> int:

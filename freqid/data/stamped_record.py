@@ -62,7 +62,7 @@ class StampedRecord(Record):
         return self._with(conditions={**self.conditions, **conditions})
 
     def with_noise(
-        self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: float | None = None
+        self, std: float | ArrayLike | None = None, seed: int = 0, *, snr: ArrayLike | None = None
     ) -> StampedRecord:
         """The record with white Gaussian noise on every logged output."""
         noisy = Record(self.y_logged, self.y_logged, dt=1.0, hold="zoh")

@@ -29,17 +29,22 @@ def rounded(value: float, std: float) -> str:
         return f"{exact:.0f}"
     # trailing zeros are digits, too
     text = f"{value:#.{digits}g}"
-    return text if "e" in text else text.rstrip(".")
+    return text.replace(".e", "e") if "e" in text else text.rstrip(".")
 
 
 def of_error(std: float) -> str:
     """A standard error in its two digits.
 
-    >>> of_error(0.012345), of_error(361.2)
-    ('0.012', '360')
+    >>> of_error(0.012345), of_error(361.2), of_error(0.2), of_error(6e-6)
+    ('0.012', '360', '0.20', '6.0e-06')
     """
+    if not std or not np.isfinite(std):
+        return f"{std:g}"
     exact = float(f"{std:.2g}")
-    return f"{exact:.0f}" if 100 <= abs(exact) < 10**_PLAIN else f"{std:.2g}"
+    if 100 <= abs(exact) < 10**_PLAIN:
+        return f"{exact:.0f}"
+    # a zero that is known is a digit, too
+    return f"{std:#.2g}".rstrip(".")
 
 
 def in_digits(table: pd.DataFrame, columns: Sequence[str] = ("lower", "upper")) -> pd.DataFrame:
@@ -56,4 +61,20 @@ def in_digits(table: pd.DataFrame, columns: Sequence[str] = ("lower", "upper")) 
         else:
             plain = table[name].map(lambda v: f"{v:.6g}" if isinstance(v, float) else str(v))
             shown[str(name)] = plain.tolist()
+    return pd.DataFrame(shown, index=table.index).replace("nan", "")
+
+
+def in_pairs(table: pd.DataFrame) -> pd.DataFrame:
+    """A table whose columns have errors of their own, ``damping`` and ``damping_std``, as text."""
+    import pandas as pd
+
+    shown: dict[str, list[str]] = {}
+    for name in map(str, table.columns):
+        if f"{name}_std" in table.columns:
+            cells = zip(table[name], table[f"{name}_std"], strict=True)
+            shown[name] = [rounded(v, s) for v, s in cells]
+        elif name.endswith("_std"):
+            shown[f"± {name.removesuffix('_std')}"] = [of_error(s) for s in table[name]]
+        else:
+            shown[name] = [str(v) for v in table[name]]
     return pd.DataFrame(shown, index=table.index).replace("nan", "")

@@ -150,6 +150,8 @@ class Estimate(Questioned, Shown):
         """
         import pandas as pd
 
+        from freqid.fitting.table import Table
+
         std = np.sqrt(np.diag(self.covariance_matrix))
         lower, upper = self._limits(std)
         free = pd.DataFrame(
@@ -163,7 +165,7 @@ class Estimate(Questioned, Shown):
             },
             index=pd.Index(list(self.names), name="parameter"),
         )
-        return with_tied(free, self, Z95)
+        return Table(with_tied(free, self, Z95))
 
     def _limits(self, std: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends of 95 % intervals, inside the bounds."""
@@ -239,7 +241,9 @@ class Estimate(Questioned, Shown):
             return known
         low, high = self.band or (0.0, 0.5 / self.dt if self.dt else np.inf)
         found = modes(*self._unknowns)
-        return found.assign(in_band=found["frequency"].between(low, high))
+        from freqid.fitting.table import Table
+
+        return Table(found.assign(in_band=found["frequency"].between(low, high)))
 
     def pole_scatter(self) -> tuple[ComplexArray, FloatArray]:
         """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
@@ -263,6 +267,11 @@ class Estimate(Questioned, Shown):
         if method == "profile":
             if not isinstance(self.model, GreyBox) or self.scatter.given is not None:
                 raise InputError("profile intervals need a grey-box estimate from data")
+            if self.problem is None:
+                raise InputError(
+                    "profile intervals need the data, which a file of an estimate does not hold; "
+                    "fit them again"
+                )
             std = np.sqrt(np.diag(self.covariance_matrix))
             return profile_intervals(self.minimum, self.scatter.change, std, level, progress)
         half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))

@@ -25,11 +25,11 @@ from freqid.plots.curves import (
     frequency_label,
     heard,
     shown,
-    told_range,
     unit_of,
 )
 from freqid.plots.interactive import Backend, offers_plotly
 from freqid.plots.style import Grid, Panels, Style, channel_grid, drawing, line, stacked
+from freqid.plots.windows import fitted_band, look_at, window_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,9 +99,9 @@ def bode(
         # a logarithm has no zero
         amplitude.set(xscale="log", yscale="log" if drawn and not decibel else "linear")
         phase.set(xscale="log")
-        _look_at(amplitude, phase, window, fitted, unit)
+        look_at(amplitude, phase, window, fitted, unit)
 
-    window, fitted = _window(responses, curves) if omega is None else None, _fitted_band(responses)
+    window, fitted = window_of(responses, curves) if omega is None else None, fitted_band(responses)
     outputs, inputs = _channels(curves)
     new = ax is None and outputs * inputs > 1
     if new or (isinstance(ax, np.ndarray) and ax.shape == (2 * outputs, inputs)):
@@ -128,64 +128,6 @@ def bode(
         elif through is not None:
             amplitude.set_title(through, fontsize="medium")
     return ax
-
-
-def _fitted_band(things: Sequence[Drawable]) -> tuple[float, float] | None:
-    """The band (Hz) that holds those of all estimates, None where one has none."""
-    bands = [t.band for t in things if isinstance(t, Estimate)]
-    if not bands or None in bands:
-        return None
-    given = [b for b in bands if b is not None]
-    return min(b[0] for b in given), max(b[1] for b in given)
-
-
-def _window(things: Sequence[Drawable], curves: Sequence[Shown]) -> tuple[float, float] | None:
-    """The frequencies (Hz) that are worth a look: what was fitted and as much again on both sides,
-    or what was driven; None for all.
-    """
-    band = _fitted_band(things)
-    if band is not None:
-        return band[0] / 2, 2 * band[1]
-    measured = [c.response for c in curves if c.response.input_spectrum is not None]
-    if not measured or any(isinstance(t, Estimate) for t in things):
-        return None
-    ends = [told_range(frf) for frf in measured]
-    return min(e[0] for e in ends) / 1.2, 1.2 * max(e[1] for e in ends)
-
-
-def _look_at(
-    amplitude: Axes,
-    phase: Axes,
-    window: tuple[float, float] | None,
-    fitted: tuple[float, float] | None,
-    unit: str,
-) -> None:
-    """Only the window, as high as the curves are there; what was not fitted behind a veil."""
-    if window is None:
-        return
-    for axis in (amplitude, phase):
-        drawn = [np.asarray(one.get_data(), dtype=float) for one in axis.lines]
-        x, y = np.hstack(drawn) if drawn else np.zeros((2, 0))
-        low, high = (w * UNITS[unit] for w in window)
-        inside = (x >= low) & (x <= high) & np.isfinite(y)
-        if not inside.any():
-            return
-        x, y = x[inside], y[inside]
-        axis.set_xlim(max(low, x.min() / 1.05), min(high, 1.05 * x.max()))
-        if axis.get_yscale() == "log":
-            y = y[y > 0]
-            if len(y):
-                axis.set_ylim(y.min() / 1.4, 1.4 * y.max())
-        else:
-            room = 0.06 * max(np.ptp(y), 1.0)
-            axis.set_ylim(y.min() - room, y.max() + room)
-        if fitted is not None:
-            left, right = axis.get_xlim()
-            for begin, end in ((left, fitted[0] * UNITS[unit]), (fitted[1] * UNITS[unit], right)):
-                if end > begin:
-                    paper = axis.get_facecolor()
-                    axis.axvspan(begin, end, color=paper, alpha=0.65, linewidth=0, zorder=2.4)
-            axis.set_xlim(left, right)
 
 
 def _channels(curves: Sequence[Shown]) -> tuple[int, int]:

@@ -63,6 +63,6 @@ def bode_axes(split: float, ticks: Part, amplitude: str = "amplitude") -> Part:
     return {
         "xaxis": {"type": "log", "anchor": "y2", "title": {"text": "frequency / Hz"}, **ticks},
         "yaxis": {"type": "log", "domain": [split, 1], "title": {"text": escape(amplitude)},
-                  "exponentformat": "power"},
+                  "exponentformat": "power", "dtick": 1},
         "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}, "dtick": 90},
     }  # fmt: skip

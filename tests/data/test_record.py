@@ -274,3 +274,30 @@ BAD_RECORDS = {
 def test_bad_input_is_named(words):
     with pytest.raises(ValueError, match=words):
         BAD_RECORDS[words]()
+
+
+def test_records_are_scaled_and_subtracted_as_linear_plants_allow(plant):
+    u = fq.white_noise(600, seed=4)
+    first = fq.simulate(plant, u, 1e-3)
+    second = fq.simulate(plant, np.roll(u, 7), 1e-3)
+    for made in (2 * first, first * 2, first / 0.5, -(-2 * first)):
+        np.testing.assert_allclose(made.y, fq.simulate(plant, 2 * u, 1e-3).y, atol=1e-9)
+        assert made.hold == first.hold
+    left = first - second
+    again = fq.simulate(plant, u - np.roll(u, 7), 1e-3)
+    np.testing.assert_allclose(left.y, again.y, atol=1e-9)
+    np.testing.assert_allclose(left.u, again.u)
+    assert sum([first, second]) == [first, second]
+    for wrong in (lambda: first - second.decimate(2), lambda: first - second.slice(0, 0.3),
+                  lambda: first - 3.0, lambda: first * "2", lambda: first * np.nan,
+                  lambda: first / 0, lambda: first - second.with_conditions(q=1.0)):  # fmt: skip
+        with pytest.raises(ValueError, match="record"):
+            wrong()
+
+
+def test_noise_by_ratio_for_each_output():
+    record = fq.Record(np.arange(4000.0), np.random.default_rng(0).standard_normal((4000, 2)), 1.0)
+    noise = (record.with_noise(snr=[40, 0], seed=1).y - record.y).std(axis=0)
+    np.testing.assert_allclose(noise, [0.01, 1.0], rtol=0.05)
+    with pytest.raises(ValueError, match="snr"):
+        record.with_noise(snr=[1.0, 2.0, 3.0])

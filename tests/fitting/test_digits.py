@@ -39,7 +39,7 @@ def test_as_a_paper_prints_it(value, std, text):
 
 
 def test_errors_have_two_digits():
-    assert [of_error(s) for s in (0.01234, 361.2, 1.0, 4.2e7)] == ["0.012", "360", "1", "4.2e+07"]
+    assert [of_error(s) for s in (0.01234, 361.2, 1.0, 4.2e7)] == ["0.012", "360", "1.0", "4.2e+07"]
 
 
 def test_every_view_of_an_estimate_shows_the_same_digits():
@@ -57,3 +57,18 @@ def test_modes_say_whether_the_band_holds_them():
     assert modes["in_band"].tolist() == modes["frequency"].between(10, 80).tolist()
     assert modes["in_band"].any()
     assert not modes["in_band"].all()
+
+
+def test_tables_show_the_digits_that_errors_leave_and_keep_all():
+    import pickle
+
+    table = EST.parameters
+    assert "..." not in repr(table)
+    for name, row in table.iterrows():
+        assert rounded(row["value"], row["std"]) in repr(table)
+        assert float(row["value"]) == EST[name]
+    assert of_error(table["std"].iloc[0]) in table._repr_html_()
+    modes = EST.modes()
+    assert rounded(modes["frequency"].iloc[1], modes["frequency_std"].iloc[1]) in repr(modes)
+    assert pickle.loads(pickle.dumps(table)).equals(table)
+    assert type(table.loc[["k"]]).__name__ == "DataFrame"
