@@ -95,3 +95,28 @@ def test_what_is_raised_is_on_the_page_of_messages(wrong):
         wrong()
     text = str(raised.value).replace("`", "'")
     assert any(re.fullmatch(re.escape(t).replace("…", ".*"), text, re.S) for t in listed), text
+
+
+def test_the_tutorials_three_commands(tmp_path, monkeypatch, capsys):
+    """A first day: from a semicolon file of one's own to a report about one's own plant."""
+    from freqid.cli.commands import main
+
+    page = (DOCS / "index.md").read_text()
+    commands = re.findall(r"^freqid .*(?:my_plant|mine\.csv).*$", page, re.M)
+    assert len(commands) == 3
+    monkeypatch.chdir(tmp_path)
+    lag = fq.GreyBox(
+        lambda J, k, d: ([[0, 1], [-k / J, -d / J]], [[0], [1 / J]], [[1, 0]], None),
+        [fq.Parameter("J", 0.12), fq.Parameter("k", 90.0), fq.Parameter("d", 0.3)],
+    )
+    record = fq.simulate(lag, fq.white_noise(2000, seed=1), 5e-3).with_noise(snr=30)
+    rows = np.column_stack([1e3 * record.time, record.u, record.y])
+    body = "\n".join(";".join(f"{v:.9f}" for v in row) for row in rows).replace(".", ",")
+    (tmp_path / "mine.csv").write_text(f"Zeit [ms];Moment [N m];Winkel [rad]\n{body}\n")
+    for command in commands:
+        with pytest.raises(SystemExit) as end:
+            main(command.split()[1:])
+        assert end.value.code == 0, capsys.readouterr().err
+    assert "verdict: trust" in capsys.readouterr().out
+    assert (tmp_path / "est.html").stat().st_size > 1e5
+    assert (tmp_path / "mine.png").exists()

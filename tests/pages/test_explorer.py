@@ -226,7 +226,7 @@ def test_a_file_dropped_on_the_page_is_read_as_read_does(browser, address, slow,
     text += "# a long comment\n" * 70_000
     assert len(text) > 2**20
     browser.execute_script(DROP, "no table at all", "evil.html")
-    until(browser, f"{SAID}.includes('suffix')", "the reason")
+    until(browser, f"{SAID}.includes('no samples')", "the reason")
     browser.execute_script(DROP, text, "../my run.csv")
     until(browser, f"{SAID}.includes('name them')", "the question")
     names = browser.find_elements(By.CSS_SELECTOR, "#channels select")

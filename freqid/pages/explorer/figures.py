@@ -136,11 +136,14 @@ def bias_figure(shown: Scene) -> Part:
     at, low, high = (_spread(v) for v in (away, away - half, away + half))
     bars = {"type": "data", "symmetric": False, "array": (high - at).tolist(),
             "arrayminus": (at - low).tolist(), "color": "#7f7f7f"}  # fmt: skip
-    # good is what a hundredth, or the error bar, explains
+    # good is what a hundredth, or the error bar, explains; one's own plant is known by no one
     good = np.abs(away) <= np.maximum(2 * _LINEAR, half)
+    looks = [COLOURS[3] if g else COLOURS[2] for g in good]
+    if shown.measured:
+        looks = [COLOURS[1] if h < 1 else "#9aa0a6" for h in half / np.maximum(np.abs(ratio), 1e-9)]
     data = [{"type": "bar", "x": list(est.names), "y": at.tolist(),
              "text": [f"{est[n]:.4g}" for n in est.names], "textposition": "outside",
-             "marker": {"color": [COLOURS[3] if g else COLOURS[2] for g in good]},
+             "marker": {"color": looks},
              "error_y": bars, "cliponaxis": False, "showlegend": False}]  # fmt: skip
     reach = float(np.abs([low, high]).max())
     # those that would lie on one another at zero are left out

@@ -6,13 +6,15 @@ from urllib.parse import quote
 
 import numpy as np
 
-from freqid.fitting import Z95
+from freqid.fitting import of_error
 from freqid.pages.explorer.scene import Scene, label_of, rounding_said
 
 # reasons of a verdict that are shown
 _REASONS = 4
 # part by which a number may be off and is right
 _RIGHT = 0.02
+# standard errors beyond which one of several numbers lies once in a hundred pages
+_SURE = 3.1
 
 
 def sentence(shown: Scene) -> tuple[str, bool]:
@@ -34,18 +36,24 @@ def sentence(shown: Scene) -> tuple[str, bool]:
     away = {n: est[n] / truth[n] - 1 for n in est.names if truth[n]}
     # a sign that is impossible says more than any percentage
     worst = min(away, key=lambda n: (est[n] * truth[n] > 0, -abs(away[n])))
+    found = f"{est[worst]:.4g}{_give_or_take(std[worst], est[worst])}"
     text = (
-        f"{worst} = {est[worst]:.4g} where {truth[worst]:.4g} is {shown.truth}"
+        f"{worst} = {found} where {truth[worst]:.4g} is {shown.truth}"
         if abs(away[worst]) > 1e-3
         else f"Every parameter is {shown.truth} to a tenth of a per cent"
     )
     # beside one's own record the plant is a guess, and no estimate is wrong for leaving it
     wrong = not shown.measured and any(
-        abs(part) > max(_RIGHT, Z95 * std[n] / abs(truth[n])) for n, part in away.items()
+        abs(part) > max(_RIGHT, _SURE * std[n] / abs(truth[n])) for n, part in away.items()
     )
     fitted = f"{est.fit_percent:.4g} % explained" if shown.measured else ""
     said = ". ".join(part for part in (text, fitted, shown.message) if part)
     return said, bool(est.signs) or wrong
+
+
+def _give_or_take(std: float, value: float) -> str:
+    """The standard error, where it is worth a word."""
+    return f" ± {of_error(std)}" if np.isfinite(std) and std > 1e-4 * abs(value) else ""
 
 
 def _of_black_box(shown: Scene) -> tuple[str, bool]:
