@@ -161,3 +161,29 @@ def test_a_mode_that_samples_cannot_see_is_left_to_a_search():
     above = minima(true, [r], {"start": {"w": 2 * np.pi * 70.3}})[0]
     assert above is None or above.values["w"] < 2 * np.pi * 50
     assert minima(true, [r], {"start": {"w": 2 * np.pi * 31}})[0] is not None
+
+
+def test_from_starts_up_and_down_one_search_shows_where_the_others_are():
+    """Plain steps from 20 % up and down ran out of the numbers, and took the others along."""
+    plant = fq.two_mass()
+    clean = fq.simulate(plant, fq.chirp(10, 80, 1, 0.5e-3), 0.5e-3)
+    records = [clean.with_noise(0.01 * float(clean.y.std()), seed=i) for i in range(24)]
+    factors = (1.2, 1 / 1.2, 1.2, 1 / 1.2, 1.2)
+    parameters = plant.free_parameters
+    start = {p.name: p.value * f for p, f in zip(parameters, factors, strict=True)}
+    found = minima(plant, records, {"start": start})
+    done = [i for i, each in enumerate(found) if each is not None]
+    assert len(done) >= 21
+    for i in done[:6]:
+        alone = fq.fit(plant, records[i], start=start)
+        assert found[i].cost <= alone.cost * (1 + 1e-8)
+        assert found[i].values["k"] == pytest.approx(alone["k"], rel=1e-5)
+
+
+def test_of_long_records_a_part_of_the_lines_raises_no_more_doubts():
+    """What parameters explain of a part of the lines was counted against them."""
+    plant = fq.first_order()
+    clean = fq.simulate(plant, fq.chirp(2, 60, 20, 1e-3), 1e-3)
+    records = [clean.with_noise(0.01 * float(clean.y.std()), seed=i) for i in range(60)]
+    found = minima(plant, records, {"start": {"b": 120.0, "a": 80.0}})
+    assert sum(each is None for each in found) <= 5

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import Array, BoolArray, FloatArray
+from freqid.checks import Array, BoolArray, FloatArray, IntArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.lti import PeriodicHold, eigenbasis_of_many
@@ -37,6 +37,11 @@ class ManyPoints:
     def cost(self) -> FloatArray:
         """Sums of squares, (S,)."""
         return np.asarray(np.einsum("sk,sk->s", self.residual, self.residual))
+
+    def some(self, which: IntArray) -> ManyPoints:
+        """Those of some of the points."""
+        parts = self.residual, self.jacobian, self.transient, self.inverse
+        return ManyPoints(*(each[which] for each in parts))
 
     def normal(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Cost (S,), gradient JᵀR (S, P) and JᵀJ (S, P, P), the transients taken off."""
@@ -68,7 +73,7 @@ class ManyCosts:
         other.U, other.Y = self.U[..., kept] * more, self.Y[..., kept] * more
         return other
 
-    def some(self, which: slice) -> ManyCosts:
+    def some(self, which: slice | IntArray) -> ManyCosts:
         """Those of some of the records."""
         other = copy.copy(self)
         other.U, other.Y, other.energy = self.U[which], self.Y[which], self.energy[which]

@@ -32,7 +32,7 @@ _LOG = logging.getLogger(__name__)
 
 # records of a chunk, which is kept or lost as one, with verdicts and without, and from how many on
 # processes are worth it
-_CHUNK, _QUICK, _FEW = 8, 32, 16
+_CHUNK, _QUICK, _FEW = 8, 128, 16
 
 Source = DataSet | str | Path
 Row = dict[str, Any]

@@ -55,7 +55,7 @@ class Left:
         score = (J * each[:, None]) @ J.swapaxes(-1, -2) * (self.rows / self.freedom * self.share)
         return np.asarray(np.sqrt(np.einsum("spp->sp", self.inverse @ score @ self.inverse)))
 
-    @property
+    @cached_property
     @np.errstate(all="ignore")
     def certain(self) -> BoolArray:
         """Of which records nothing is in doubt, (S,): every parameter is told and physical, and
@@ -107,10 +107,19 @@ class Left:
         if hold.reaches_next or s.model.state_space().D.any():
             shapes.append(np.ones((len(phi), 1, len(z)), complex))
         gain, count = self._explained(np.concatenate(shapes, axis=1))
+        # on a part of the lines the parameters themselves are not at their least
+        gain = np.maximum(gain - self._own_gain(), 0.0)
         more = np.maximum(count - self.x.shape[1], 0)
         below = np.maximum(self.freedom - more, 1)
         f = gain / np.maximum(more, 1) / ((self.at.cost - gain) / below)
         return np.where(more > 0, scipy.stats.f.sf(f, np.maximum(more, 1), below), 1.0)
+
+    def _own_gain(self) -> FloatArray:
+        """What the parameters would still explain of what is left on these lines, (S,)."""
+        J, r = self.jacobian, self.at.residual
+        g = (J @ r[..., None])[..., 0]
+        inverse, _ = inverse_of(J @ J.swapaxes(-1, -2))
+        return np.asarray(np.einsum("sp,spq,sq->s", g, inverse, g))
 
     def _explained(self, ways: ComplexArray) -> tuple[FloatArray, FloatArray]:
         """What responses (S, C, K) from each input to each output explain of what is left (S,), and

@@ -7,33 +7,39 @@ left to a search of their own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, IntArray
 from freqid.data import Record
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.cost.many_costs import ManyCosts, one_shape
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.entry import fit
 from freqid.fitting.grey_box import checked_start
 from freqid.fitting.many.left import Left, inverse_of
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.batched import descend
+from freqid.fitting.search.descent import uninterrupted
 from freqid.fitting.sufficiency import enough_rows
 from freqid.lti import in_one_blas_thread
 from freqid.models import GreyBox
 
 # what a batch knows of the options of ``fit``
 _OPTIONS = {"start", "band", "hold", "seed"}
-# real values in a batch at a time
-_ROWS = 120_000
+# residuals and their derivatives in a batch at a time: more of them leave the processor's cache
+_VALUES = 540_000
 # lines of the first steps; gain and step that end these, the step that ends the others, and how
 # many there are of each at the most
 _LINES, _GAIN, _FIRST_STEP, _LAST_STEP, _LIMIT, _STEPS = 300, 1e-4, 1e-3, 1e-4, 40, 4
+# a step of this part of a standard error is the last, too: after it the cost is flat to ten digits
+_OF_STD = 0.05
 # lines that are enough for error bars and doubts
 _ENOUGH = 4000
+# records that are tried from the start, of which the others learn where they may be
+_PROBED = 8
 # channels up to which poles with free residues are a fair opponent
 _CHANNELS = 4
 
@@ -104,50 +110,103 @@ def _of_one_shape(
         return [None] * len(records)
     enough_rows(experiments[:1], len(structure.names))
     every = ManyCosts(structure, experiments)
+    found: list[Done | None] = [None] * len(records)
+
+    def look(which: IntArray, at: Callable[[ManyCosts], FloatArray]) -> None:
+        if len(which):
+            some = every.some(which)
+            for i, each in zip(which, _minima_of(some, at(some)), strict=True):
+                found[i] = each
+
+    def left() -> IntArray:
+        return np.array([i for i, each in enumerate(found) if each is None], dtype=int)
+
+    first = np.arange(min(_PROBED, len(records)))
+    look(first, _from_start)
+    known = [list(each.values.values()) for each in found if each is not None]
+    near = np.median(known, axis=0) / structure.scale if known else None
+    if near is None and len(records) > 1:
+        # so far off plain steps find nothing: a search of one shows where the others are
+        near = _searched(model, records[0], options, structure)
+    if near is not None:
+        # machines of one kind are alike
+        look(left(), lambda some: np.tile(near, (len(some.Y), 1)))
+    look(np.setdiff1d(left(), first), _from_start)
+    return found
+
+
+def _searched(
+    model: GreyBox, record: Record, options: Mapping[str, object], structure: GreyStructure
+) -> FloatArray | None:
+    """The unknowns at the minimum of one record's own search; None where that finds none."""
+    est = fit(model, record, **options)  # type: ignore[arg-type]
+    uninterrupted(est.message)
+    if not est.converged or list(est.names) != list(structure.names):
+        return None
+    return est.values / structure.scale
+
+
+def _from_start(every: ManyCosts) -> FloatArray:
+    """Where damped steps on some lines lead from the structure's own start, (S, P)."""
     lines = every.first.n_lines
     few = every.thinned(_LINES / lines) if lines / 2 >= _LINES else every
-    begin = np.tile(structure.start, (len(records), 1))
-    near = descend(few, begin, last_step=_FIRST_STEP, limit=_LIMIT, gain=_GAIN).values
-    size = max(_ROWS // every.first.n_rows, 1)
+    begin = np.tile(every.structure.start, (len(every.Y), 1))
+    return descend(few, begin, last_step=_FIRST_STEP, limit=_LIMIT, gain=_GAIN).values
+
+
+def _minima_of(every: ManyCosts, near: FloatArray) -> list[Done | None]:
+    """Those next to points (S, P), so many at a time as memory is quick with."""
+    columns = near.shape[1] + len(every.structure.model.poles) + 1
+    size = max(_VALUES // (every.first.n_rows * columns), 1)
     found: list[Done | None] = []
-    for first in range(0, len(records), size):
+    for first in range(0, len(near), size):
         some = slice(first, first + size)
         found += _minima(every.some(some), near[some])
     return found
 
 
+@np.errstate(all="ignore")
 def _minima(every: ManyCosts, x: FloatArray) -> list[Done | None]:
     """Those next to points (S, P)."""
-    structure, lines = every.structure, every.first.n_lines
+    structure, lines, x = every.structure, every.first.n_lines, x.copy()
     certain = np.zeros(len(x), bool)
+    on = np.arange(len(x))
     for _ in range(_STEPS):
-        _, g, H = every.at(x).normal()
-        inverse, told = inverse_of(H)
-        step = -(inverse @ g[..., None])[..., 0]
         # a record that has ended stays where it is, whatever its neighbours do
-        x = np.where(certain[:, None], x, x + step)
+        cost, g, H = every.normal(x[on], on)
+        inverse, told = inverse_of(H)
+        std = np.sqrt(np.einsum("spp->sp", inverse) * (cost / every.first.n_rows)[:, None])
+        step = -(inverse @ g[..., None])[..., 0]
+        step = np.where(np.isfinite(step).all(axis=1)[:, None], step, 0.0)
+        x[on] += step
         # the step after such a one would be as small as its square, or as a part of it in noise
-        certain |= told & (np.abs(step).max(axis=1) <= _LAST_STEP)
-        if certain.all():
+        small = (np.abs(step) <= np.maximum(_LAST_STEP, _OF_STD * std)).all(axis=1)
+        certain[on] = told & small
+        on = on[~certain[on]]
+        if not len(on):
             break
-    few = every.thinned(_ENOUGH / lines, evenly=True) if lines / 2 >= _ENOUGH else every
     at = every.at(x)
     cost, _, H = at.normal()
     inverse, told = inverse_of(H)
-    certain &= told
-    at = at if few is every else few.at(x)
-    left = Left(few, x, at, inverse, few.first.n_lines / lines)
-    certain &= left.certain
-    done: list[Done | None] = []
-    for i, sure in enumerate(certain):
-        if not sure:
-            done.append(None)
+    # those that have left the numbers are not to take the others along
+    ended = np.flatnonzero(certain & told & np.isfinite(cost))
+    done: list[Done | None] = [None] * len(x)
+    if not len(ended):
+        return done
+    x, cost, energy = x[ended], cost[ended], every.energy[ended]
+    few, at = every.some(ended), at.some(ended)
+    if lines / 2 >= _ENOUGH:
+        few = few.thinned(_ENOUGH / lines, evenly=True)
+        at = few.at(x)
+    left = Left(few, x, at, inverse[ended], few.first.n_lines / lines)
+    for number, i in enumerate(ended):
+        if not left.certain[number]:
             continue
-        theta, std = x[i] * structure.scale, left.std[i] * structure.scale
-        done.append(Done(
+        theta, std = x[number] * structure.scale, left.std[number] * structure.scale
+        done[i] = Done(
             dict(zip(structure.names, theta.tolist(), strict=True)),
             dict(zip(structure.names, std.tolist(), strict=True)),
-            float(cost[i]),
-            float(100 * (1 - np.sqrt(cost[i] / every.energy[i]))),
-        ))  # fmt: skip
+            float(cost[number]),
+            float(100 * (1 - np.sqrt(cost[number] / energy[number]))),
+        )
     return done
