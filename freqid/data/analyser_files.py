@@ -18,23 +18,26 @@ if TYPE_CHECKING:
     import pandas as pd
 
 # Hz of each unit of frequency
-_HERTZ = {
+HERTZ = {
     "hz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "rad/s": 1 / (2 * np.pi),
     "rad/sec": 1 / (2 * np.pi),
 }  # fmt: skip
-FREQUENCY = r"(f|freq|frequency|frequenz|w|omega|ω)"
+FREQUENCY = r"(f|freq|frequency|frequenz|angular frequency|w|omega|ω)"
 
 
 def in_hertz(name: str, unit: str) -> float:
     """Hz of one step of a column of frequencies, by its unit or its name."""
     text = unit.casefold()
-    if not text:
-        tail = re.search(r"_(hz|khz|mhz|ghz)$", name.casefold())
-        turned = re.search(r"^(w|omega|ω)|rad", name.casefold())
+    plain = name.casefold().strip()
+    if re.search(r"(?<![a-z])log", plain):
+        raise InputError(f"column {name!r} may hold logarithms; give frequencies in Hz")
+    if not text or f"{plain}/{text}".endswith("rad/s"):
+        tail = re.search(r"(?:^f|[_\s]|frequency)(hz|khz|mhz|ghz)$", plain)
+        turned = re.search(r"^(w|omega|ω)(?![a-z])|rad|angular", plain)
         text = tail[1] if tail else "rad/s" if turned else "hz"
-    if text not in _HERTZ:
-        raise InputError(f"the unit of {name!r} is {unit!r}; expected one of {', '.join(_HERTZ)}")
-    return _HERTZ[text]
+    if text not in HERTZ:
+        raise InputError(f"the unit of {name!r} is {unit!r}; expected one of {', '.join(HERTZ)}")
+    return HERTZ[text]
 
 
 def of_touchstone(path: Path) -> FrequencyResponse:
@@ -110,7 +113,7 @@ def of_matlab(
         long = {k: v for k, v in arrays.items() if v.ndim == 1 and v.dtype.kind in "fiu"}
         if len(long) > 2 and len({len(v) for v in long.values()}) == 1:
             return of_frame(pd.DataFrame(long))
-    axes = [k for k in arrays if re.fullmatch(FREQUENCY, k.casefold())]
+    axes = [k for k in arrays if re.fullmatch(rf"{FREQUENCY}(_hz)?", k.casefold())]
     if len(found) != 1 or not axes:
         raise InputError(
             f"holds {', '.join(arrays)}; expected frequencies f (Hz) or w (rad/s) and one complex "

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 from freqid.checks import InputError, an, path_of, unknown
+from freqid.data.analyser_columns import looks_like_response
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
 from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
-from freqid.data.response_files import looks_like_response
 from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
@@ -106,10 +106,16 @@ def read(
         for name in units or {}:
             if name not in (*frame.columns, "time", "reference"):
                 raise InputError(unknown("units", name, [str(c) for c in frame.columns]))
-        if inputs is None and outputs is None and looks_like_response(frame):
+        if (
+            inputs is None
+            and outputs is None
+            and looks_like_response(frame, frame.attrs.get("units", {}))
+        ):
             raise ResponseFile(path)
         told = {**frame.attrs.get("units", {}), **(units or {})}
         frame, said = with_time(frame, time, told, dt)
+        # which is in s now
+        told.pop("time", None)
         if stop is not None and "time" in frame.columns:
             # what is cut off may be damaged
             frame = frame[~(frame["time"] > frame["time"].iloc[0] + stop)]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, positive, real, unknown
+from freqid.checks import FloatArray, InputError, listed, positive, real, unknown
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
 from freqid.data.readers.table import named
@@ -25,7 +25,7 @@ from freqid.data.remembered import (
     kept_reference,
     kept_step,
 )
-from freqid.data.time_column import time_named, with_time
+from freqid.data.time_column import EPOCHS, time_named, with_time
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -97,7 +97,15 @@ def _with_its_time(
     frame: pd.DataFrame, units: Mapping[str, str] | None, dt: float | None
 ) -> tuple[pd.DataFrame, list[str]]:
     """The frame with a time called so, found as in a file where there is none yet."""
-    if _times(frame) is not None:
+    if not frame.columns.is_unique:
+        twice = str(frame.columns[frame.columns.duplicated()][0])
+        raise InputError(f"column {twice!r} is there twice; rename one of them")
+    if "time" not in frame.columns:
+        if frame.index.name is not None and _is_time(frame.index.name):
+            frame = frame.reset_index()
+        elif _times(frame) is not None:
+            return frame, []
+    elif (units or {}).get("time") is None and not _counts(frame):
         return frame, []
     plain = {str(c): named(str(c)) for c in frame.columns}
     own = time_named(list(plain))
@@ -111,6 +119,16 @@ def _with_its_time(
         # a time that nobody named
         return frame.rename_axis("time"), ["the index was taken for the time, in s"]
     return frame, []
+
+
+def _is_time(name: object) -> bool:
+    return str(name) != "time" and time_named([str(name)]) is not None
+
+
+def _counts(frame: pd.DataFrame) -> bool:
+    """Whether a column of times may be a count since 1970."""
+    x = frame["time"]
+    return x.dtype.kind in "iuf" and bool((x.abs() > EPOCHS[-1][0]).any())
 
 
 def samples_frame(record: Record) -> pd.DataFrame:
@@ -217,7 +235,13 @@ def _channels(
 ) -> tuple[list[str], list[str]]:
     given: list[list[str] | None] = []
     for argument, value in (("inputs", inputs), ("outputs", outputs), ("reference", reference)):
-        names = None if value is None else [value] if isinstance(value, str) else list(value)
+        names = (
+            None
+            if value is None
+            else [value]
+            if isinstance(value, str)
+            else listed(argument, value)
+        )
         for name in names or []:
             if name not in signals:
                 raise InputError(unknown(argument, name, signals))

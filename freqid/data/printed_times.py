@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from freqid.checks import FloatArray
+from freqid.checks import FloatArray, IntArray
 
 # digits that a rounded time may be off a line through all of them
-_HALF = 0.75
+_HALF = 0.55
+# exceptions that have to be there to show their own order, and the part of the steps up to which
+# they are exceptions
+_SHOWN, _RARE = 4, 0.05
+# digits that a step of an even time may have
+_STEPS = 10_000
 # samples that tell a period, and the part of it that it must be known to
 # to be taken, and that to which a rate of two digits is
 _FEW, _KNOWN, _PLAIN = 8, 1e-3, 1e-2
@@ -24,9 +29,13 @@ def printed_period(times: FloatArray) -> tuple[float, float] | None:
         return None
     number, t = np.arange(count), times - times[0]
     period, start = np.polyfit(number, t, 1)
-    off = float(np.abs(t - start - period * number).max())
+    away = t - start - period * number
+    off = float(np.ptp(away)) / 2
     digit = _digit(t)
     if digit is None or period <= 0 or off < 0.01 * period:
+        return None
+    steps = np.round(np.diff(t) / digit)
+    if not (np.abs(steps) < _STEPS).all() or _lost(steps.astype(int)):
         return None
     known_to = digit / (count - 1)
     if off > _HALF * digit or known_to > _PLAIN * period:
@@ -36,6 +45,18 @@ def printed_period(times: FloatArray) -> tuple[float, float] | None:
         # few samples tell a round rate, and no other
         return None
     return found, digit
+
+
+def _lost(steps: IntArray) -> bool:
+    """Whether a few steps of another size are gaps: rounding has many of them, evenly apart."""
+    usual = int(np.bincount(steps[steps >= 0]).argmax()) if (steps >= 0).any() else 0
+    odd = np.flatnonzero(steps != usual)
+    if not 0 < len(odd) <= _RARE * len(steps):
+        return False
+    if len(odd) < _SHOWN:
+        return True
+    apart = np.diff(odd)
+    return bool(apart.max() - apart.min() > 1)
 
 
 def plain_period(period: float, known_to: float) -> float:

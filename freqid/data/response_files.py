@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, listed, numbers, path_of
+from freqid.checks import Array, InputError, listed, numbers, path_of
+from freqid.data.analyser_columns import (
+    coherence_of,
+    complex_of,
+    joined,
+    numbers_of,
+    one_of,
+)
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
@@ -19,13 +26,10 @@ from freqid.data.readers.table import named
 from freqid.data.remembered import kept_of_response
 from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
+from freqid.lti import InputHolds
 
 if TYPE_CHECKING:
     import pandas as pd
-
-_REAL, _IMAGINARY = r"(re|real|in-phase)", r"(im|imag|imaginary|quadrature)"
-_PHASE = r"(phase|ph|phi|angle|arg|deg|degrees|∠)"
-_SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db)"
 
 
 @that_reads
@@ -86,32 +90,18 @@ def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> Freque
     if {"frequency", "output", "input", "real", "imag"} <= set(names):
         return _long(frame)
     told = dict(units or own_units)
-    at = _one(names, FREQUENCY, told) or names[0]
-    f = _numbers(frame, at) * in_hertz(at, told.get(at, ""))
+    at = one_of([re.sub(r"_hz$", "", n) for n in names], FREQUENCY)
+    at = next((n for n in names if at and n.startswith(at)), names[0])
+    f = numbers_of(frame, at) * in_hertz(at, told.get(at, ""))
     rest = [n for n in names if n != at]
-    held = _one(rest, "coherence", told)
+    held = one_of(rest, "coherence")
     rest = [n for n in rest if n != held]
-    G = _complex(frame, rest, told)
+    G = complex_of(frame, rest, told)
     order = np.argsort(f, kind="stable")
     if len(order) < 1 or (np.diff(f[order]) <= 0).any():
         raise InputError(f"column {at!r} holds a frequency twice; keep one of them")
-    coherence = None if held is None else _coherence(held, frame, told)[order]
+    coherence = None if held is None else coherence_of(held, frame, told)[order]
     return FrequencyResponse(f[order], G[order], coherence=coherence)
-
-
-def looks_like_response(frame: pd.DataFrame) -> bool:
-    """Whether a table begins with frequencies, and a response stands beside them."""
-    names = [str(c) for c in frame.columns]
-    if {"frequency", "output", "input", "real", "imag"} <= set(names):
-        return True
-    first = names[0].strip().casefold() if names else ""
-    plain = re.sub(r"_(hz|khz|mhz|ghz)$", "", first)
-    if not re.fullmatch(FREQUENCY, plain):
-        return False
-    if any(frame[c].dtype.kind == "c" for c in frame.columns):
-        return True
-    pair = _one(names[1:], _REAL, {}) and _one(names[1:], _IMAGINARY, {})
-    return bool(pair or _one(names[1:], _PHASE, {}))
 
 
 def _renamed(frame: pd.DataFrame, columns: Sequence[object]) -> pd.DataFrame:
@@ -122,11 +112,6 @@ def _renamed(frame: pd.DataFrame, columns: Sequence[object]) -> pd.DataFrame:
     frame = frame.set_axis([name for name, _ in told], axis=1)
     frame.attrs["units"] = {name: unit for name, unit in told if unit}
     return frame
-
-
-def _coherence(name: str, frame: pd.DataFrame, units: dict[str, str]) -> FloatArray:
-    part = _numbers(frame, name)
-    return part / 100 if "%" in units.get(name, "") + name else part
 
 
 def of_db(
@@ -142,14 +127,16 @@ def of_db(
 
 
 def _long(frame: pd.DataFrame) -> FrequencyResponse:
+    # names may be numbers
+    frame = frame.assign(output=frame["output"].astype(str), input=frame["input"].astype(str))
     outputs, inputs = list(dict.fromkeys(frame["output"])), list(dict.fromkeys(frame["input"]))
     first = frame[(frame["output"] == outputs[0]) & (frame["input"] == inputs[0])]
-    f = _numbers(first, "frequency")
+    f = numbers_of(first, "frequency")
     fields: dict[str, Array] = {}
     columns: dict[str, Array] = {
-        n: _numbers(frame, n) for n in ("variance", "coherence") if n in frame.columns
+        n: numbers_of(frame, n) for n in ("variance", "coherence") if n in frame.columns
     }
-    columns["response"] = _joined(_numbers(frame, "real"), _numbers(frame, "imag"))
+    columns["response"] = joined(numbers_of(frame, "real"), numbers_of(frame, "imag"))
     for name, values in columns.items():
         whole = np.empty((len(outputs), len(inputs), len(f)), values.dtype)
         for i, y in enumerate(outputs):
@@ -161,7 +148,7 @@ def _long(frame: pd.DataFrame) -> FrequencyResponse:
         fields[name] = whole
     if "input_spectrum" in frame.columns:
         rows = frame[frame["output"] == outputs[0]]
-        spectra = [_numbers(rows[rows["input"] == u], "input_spectrum") for u in inputs]
+        spectra = [numbers_of(rows[rows["input"] == u], "input_spectrum") for u in inputs]
         if len({len(s) for s in spectra}) > 1:
             raise InputError("column 'input_spectrum' has another number of rows for each input")
         fields["input_spectrum"] = np.array(spectra)
@@ -174,81 +161,6 @@ def _long(frame: pd.DataFrame) -> FrequencyResponse:
     names = {"input_names": inputs, "output_names": outputs, "units": units}
     kept = kept_of_response(frame, [str(n) for n in inputs])
     return FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
-
-
-def _one(names: list[str], pattern: str, units: dict[str, str]) -> str | None:
-    found = [n for n in names if re.search(rf"(^|[^a-z]){pattern}([^a-z]|$)", n.casefold())]
-    return found[0] if found else None
-
-
-def _numbers(frame: pd.DataFrame, name: str) -> FloatArray:
-    try:
-        return frame[name].to_numpy(dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"column {name!r} holds values that are not numbers") from None
-
-
-def _joined(real: FloatArray, imaginary: FloatArray) -> ComplexArray:
-    # not a sum, in which an infinite part would spoil the other
-    return np.stack([real, imaginary], axis=-1).view(complex)[..., 0]
-
-
-def _complex(frame: pd.DataFrame, names: list[str], units: dict[str, str]) -> ComplexArray:
-    real, imaginary = _one(names, _REAL, units), _one(names, _IMAGINARY, units)
-    if real and imaginary:
-        return _joined(_numbers(frame, real), _numbers(frame, imaginary))
-    if len(names) == 1 and frame[names[0]].dtype.kind not in "fiub":
-        return _written(frame, names[0])
-    phase = _one(names, _PHASE, units)
-    turns = [n for n in names if re.search(rf"(^|[^a-z]){_PHASE}([^a-z]|$)", n.casefold())]
-    if len(turns) > 1:
-        raise InputError(
-            f"several responses side by side, with phases {', '.join(turns)}; keep the columns of "
-            "one, or write rows with the columns output and input"
-        )
-    others = [n for n in names if n != phase]
-    size = _one(others, _SIZE, units) or (others[0] if len(others) == 1 else None)
-    if size is None:
-        raise InputError(
-            f"no magnitude or real part among the columns {', '.join(names)}; name them magnitude "
-            "[dB], phase [deg], or real, imag"
-        )
-    magnitude = _numbers(frame, size)
-    if "db" in (units.get(size, "") + " " + size).casefold():
-        magnitude = 10 ** (magnitude / 20)
-    elif (magnitude < 0).any():
-        raise InputError(
-            f"column {size!r} is below zero, as magnitudes in dB are; name it {size} [dB], or real "
-            "and imag"
-        )
-    if phase is None:
-        raise InputError(
-            f"the columns {', '.join(names)} hold no phase: a fit needs it; export it too"
-        )
-    turn = _numbers(frame, phase)
-    text = (units.get(phase, "") + " " + phase).casefold()
-    # "Grad" is German for degrees
-    radians = re.search(r"(?<![a-z])rad", text)
-    told = radians or re.search(r"deg|°|grad", text)
-    if units.get(phase) and not told:
-        raise InputError(f"the unit of {phase!r} is {units[phase]!r}; expected deg or rad")
-    if not told and len(turn) > 2 and np.abs(turn).max() <= 2 * np.pi and turn.any():
-        raise InputError(
-            f"column {phase!r} may be in degrees or in radians; name it {phase} [deg] or "
-            f"{phase} [rad]"
-        )
-    if not radians:
-        turn = np.deg2rad(turn)
-    return magnitude * np.exp(1j * turn)
-
-
-def _written(frame: pd.DataFrame, name: str) -> ComplexArray:
-    """Complex numbers as texts: ``1.5-0.2j``, ``1.5 - 0.2i``, ``(1.5-0.2j)``."""
-    texts = frame[name].astype(str).str.replace(r"[\s()*]", "", regex=True).str.replace("i", "j")
-    try:
-        return np.array([complex(text) for text in texts])
-    except ValueError:
-        raise InputError(f"column {name!r} holds values that are not numbers") from None
 
 
 def _picked(
@@ -265,7 +177,8 @@ def _picked(
             chosen.append(slice(None))
             continue
         at = names.index(given) if isinstance(given, str) and given in names else given
-        if not isinstance(at, int) or not 0 <= at < len(names):
+        at = int(at) if isinstance(at, np.integer) else at
+        if not isinstance(at, int) or isinstance(at, bool) or not 0 <= at < len(names):
             raise InputError(f"{name}={given!r} is not one of {', '.join(names)}")
         chosen.append(slice(at, at + 1))
     o, i = chosen
@@ -276,4 +189,6 @@ def _picked(
         input_names=frf.input_names[i],
         variance=None if frf.variance is None else frf.variance[o, i],
         coherence=None if frf.coherence is None else frf.coherence[o, i],
+        input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[i],
+        hold=frf.hold.of(range(len(frf.input_names))[i]) if isinstance(frf.hold, InputHolds) else frf.hold,
     )  # fmt: skip

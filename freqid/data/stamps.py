@@ -52,7 +52,7 @@ def _counted(name: str, given: ArrayLike) -> tuple[Array, tuple[float, str]]:
         raise InputError(f"{name} must be three finite times in s, (N,), or more")
     size = float(np.nanmax(np.abs(array.astype(float)), initial=0))
     whole = array.astype("int64") if array.dtype.kind in "iu" else array.astype(float)
-    for least, scale, text in EPOCHS:
-        if np.isfinite(size) and size > least:
+    for least, most, scale, text in EPOCHS:
+        if least < size < most:
             return whole, (scale, f"{text} since 1970")
     return array.astype(float), (1.0, "s")

@@ -54,7 +54,9 @@ def frame_of(
             raise InputError(
                 f"{path}: columns names {len(columns)} and the table has {frame.shape[1]}"
             )
-        frame.columns = list(columns)
+        told = [named(c) for c in columns]
+        frame.columns = [name for name, _ in told]
+        frame.attrs["units"] = {name: unit for name, unit in told if unit}
         frame.attrs.pop("notes", None)
     if "units" not in frame.attrs:
         frame.attrs["units"] = {n: u for n, u in map(named, map(str, frame.columns)) if u}

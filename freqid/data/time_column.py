@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, unknown
+from freqid.checks import Array, FloatArray, InputError, unknown
 from freqid.data.readers.table import named
 
 if TYPE_CHECKING:
@@ -33,8 +33,8 @@ _NAMES = {
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
     "x_value", "ms", "us", "µs", "ns",
 }  # fmt: skip
-# a count since 1970 of this size is of seconds, milliseconds, …
-EPOCHS = ((1e17, 1e-9, "ns"), (1e14, 1e-6, "µs"), (1e11, 1e-3, "ms"))
+# a count since 1970 that means a day between 2001 and 2100 is of nanoseconds, microseconds, …
+EPOCHS = ((1e18, 4.1e18, 1e-9, "ns"), (1e15, 4.1e15, 1e-6, "µs"), (1e12, 4.1e12, 1e-3, "ms"))
 # steps that differ by no more than this part make an unnamed column a time
 _EVEN = 1e-3
 # a name that ends in a unit, and steps in s that nobody samples a machine with
@@ -45,6 +45,8 @@ _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms
 _DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
 _DAY = 86_400.0
+# a number, however its thousands are marked
+_NUMERAL = r"[+-]?\d[\d.,' ]*([eEdD][+-]?\d+)?"
 
 
 def with_time(
@@ -135,6 +137,13 @@ def _converted(column: Column) -> Column | None:
     """Texts as dates or durations; None where they are neither."""
     import pandas as pd
 
+    # what pandas takes for a count of nanoseconds is a number that it could not read
+    numbers = column.astype(str).str.fullmatch(_NUMERAL)
+    if numbers.any():
+        cell = column[numbers].iloc[-1]
+        raise InputError(
+            f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
+        )
     # with dots the day comes first
     first = bool(column.astype(str).str.contains(r"\d\.\d+\.").any())
     ways: list[Callable[[], Any]] = [
@@ -169,7 +178,7 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
                 f"column {name!r} holds {column.iloc[0]!r}, which is neither a number nor a time"
             )
         return in_seconds(name, converted, unit)
-    values = column.to_numpy(dtype=float)
+    values = _less_the_first(column.to_numpy())
     suffix = re.search(_SUFFIX, name.casefold())
     wanted = unit or (suffix[1] if suffix else "")
     if wanted:
@@ -179,11 +188,17 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
             )
         scale = UNITS[wanted.casefold()]
         return _scaled(values, scale), wanted
-    size = float(np.nanmax(np.abs(values), initial=0))
-    for least, scale, text in EPOCHS:
-        if size > least:
+    size = float(np.nanmax(np.abs(column.to_numpy(dtype=float)), initial=0))
+    for least, most, scale, text in EPOCHS:
+        if least < size < most:
             return _scaled(values - values[0], scale), f"{text} since 1970"
     return values, "s"
+
+
+def _less_the_first(values: Array) -> FloatArray:
+    """Values as floats; whole ones beyond the digits of these from the first of them on."""
+    large = values.dtype.kind in "iu" and np.abs(values.astype(float)).max(initial=0) > 2**53
+    return (values - values[0] if large else values).astype(float)
 
 
 def _scaled(values: FloatArray, scale: float) -> FloatArray:

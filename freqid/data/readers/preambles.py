@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from freqid.checks import InputError
+
 # LabVIEW ends its headers so; the last of them stands before the line of names
 _LABVIEW = re.compile(r"^\*\*\*End_of_Header\*\*\*[^\n]*\n", re.MULTILINE)
 _LOOK = 2**16
@@ -24,7 +26,14 @@ def body_of(text: str) -> Body:
     """The table of a text, whatever stands above it."""
     ends = [m.end() for m in _LABVIEW.finditer(text[:_LOOK])]
     if ends:
-        return Body(text[ends[-1] :], notes=("the headers of LabVIEW were left out",))
+        parts = len(re.findall(r"^X_Value\t", text, re.MULTILINE))
+        if parts > 1:
+            raise InputError(f"holds {parts} segments of LabVIEW; keep one of them in each file")
+        body = text[ends[-1] :]
+        head, mark, rest = body.partition("\n")
+        # a column of remarks, which rows without one leave out
+        plain = re.sub(r"\tComment\s*$", "", head)
+        return Body(plain + mark + rest, notes=("the headers of LabVIEW were left out",))
     return _counted(text) or Body(text)
 
 
@@ -47,4 +56,7 @@ def _counted(text: str) -> Body | None:
     units = [f"{n} [{u}]" if u else n for n, u in zip(names[1:at], below[1:at], strict=True)]
     rest = text[len(lines[0]) + len(lines[1]) + 2 :]
     head = ",".join(["time", *units])
+    if below[0].casefold().startswith("s") and not below[0].casefold().startswith("seq"):
+        # seconds, which the step says once more
+        return Body(f"{head}\n{rest}")
     return Body(f"{head}\n{rest}", (start, step), (f"the time counts in steps of {step:g} s",))

@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from freqid.checks import InputError
 
@@ -23,6 +24,12 @@ _THOUSANDS = {
     ",": re.compile(r"[+-]?\d{1,3}((\.\d{3})+,\d+|(\.\d{3}){2,})"),
 }
 _OTHER = {".": ",", ",": "."}
+_WHOLE = {
+    ".": re.compile(r"[+-]?\d{1,3}(,\d{3})+"),
+    ",": re.compile(r"[+-]?\d{1,3}(\.\d{3})+"),
+}
+# so much less a column leaps that is read right
+_SMOOTHER = 1 / 3
 _UNIT = (
     r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2"
     r"|m/s²|g|Hz|Pa|bar|K|°C|%|counts?)"
@@ -49,11 +56,13 @@ def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) 
     shown = [_uncommented(line) for line in lines]
     quoted = any('"' in line for line in shown[-60:])
     best: tuple[float, int, Layout] | None = None
+    # who says which sign is the decimal one says that the other is none
+    sure = decimal is not None
     for mark in [separator] if separator else _SEPARATORS:
         for sign in [decimal] if decimal else (".", ","):
             if mark == sign and not quoted:
                 continue
-            found = _tried(shown, mark, sign)
+            found = _tried(shown, mark, sign, sure)
             if found is not None and (best is None or found[:2] > best[:2]):
                 best = found
     if best is None:
@@ -64,7 +73,41 @@ def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) 
             f"holds no columns of numbers that could be found; it begins {seen[:60]!r}: give sep= "
             "and decimal="
         )
-    return best[2]
+    layout = best[2]
+    if decimal is None:
+        _check_thousands([parted(line, layout.separator) for line in shown[layout.first :]], layout)
+    return layout
+
+
+def _check_thousands(rows: Sequence[Sequence[str]], layout: Layout) -> None:
+    """ValueError for a column of whole numbers in which the decimal sign may part thousands.
+
+    They may where all cells that have the sign have three digits behind it, and the others go on
+    from them: 998, 999, 1,000. As decimals they would leap.
+    """
+    sign = layout.decimal
+    group = re.compile(rf"[+-]?[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+")
+    for i in range(len(layout.names)):
+        cells = [r[i] for r in rows if len(r) > i and r[i]]
+        marked = [c for c in cells if sign in c]
+        if not marked or len(marked) == len(cells) or not all(map(group.fullmatch, marked)):
+            continue
+        try:
+            whole = [float(c.replace(sign, "")) for c in cells]
+            parts = [float(c.replace(sign, ".")) for c in cells]
+        except ValueError:
+            continue
+        if _leaps(whole) < _SMOOTHER * _leaps(parts):
+            raise InputError(
+                f"column {layout.names[i]!r} holds {marked[0]}, which may be a thousand and more; "
+                f"give decimal={sign!r}, or decimal={_OTHER[sign]!r} where it parts thousands"
+            )
+
+
+def _leaps(values: Sequence[float]) -> float:
+    """How far a column leaps from row to row, beside its own size."""
+    size = sorted(map(abs, values))[len(values) // 2]
+    return sum(abs(b - a) for a, b in pairwise(values)) / (size or 1.0)
 
 
 def parted(line: str, separator: str) -> list[str]:
@@ -82,9 +125,10 @@ def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[
 
     ``x [mm]``, ``x (mm)`` and a row of units below that of names are understood.
     """
-    full = [list(r) for r in rows if len(r) in (width, width + 1) and any(r)]
-    full = [r[:width] for r in full if len(r) == width or not r[-1]]
-    if not full and rows and _are_names(rows[-1]) and len(rows[-1]) in range(2, width):
+    full = [list(r) for r in rows if len(r) >= width and any(r)]
+    full = [r[:width] for r in full if not any(r[width:])]
+    near = range(2, width), range(width + 1, width + 3)
+    if not full and rows and _are_names(rows[-1]) and any(len(rows[-1]) in r for r in near):
         raise InputError(
             f"the samples have {width} cells and the line of names {len(rows[-1])}: "
             f"{', '.join(rows[-1])}; mend that line"
@@ -147,63 +191,69 @@ def _uncommented(line: str) -> str:
     return text
 
 
-def _is_number(cell: str, sign: str, mark: str) -> bool:
-    return bool(_NUMBER[sign].fullmatch(cell)) or _in_thousands(cell, sign, mark)
+def _is_number(cell: str, sign: str, mark: str, sure: bool = False) -> bool:
+    return bool(_NUMBER[sign].fullmatch(cell)) or _in_thousands(cell, sign, mark, sure)
 
 
-def _in_thousands(cell: str, sign: str, mark: str) -> bool:
-    return mark != _OTHER[sign] and bool(_THOUSANDS[sign].fullmatch(cell))
+def _in_thousands(cell: str, sign: str, mark: str, sure: bool) -> bool:
+    if mark == _OTHER[sign]:
+        return False
+    return bool(_THOUSANDS[sign].fullmatch(cell) or (sure and _WHOLE[sign].fullmatch(cell)))
 
 
-def _is_value(cell: str, sign: str, mark: str) -> bool:
-    return _is_number(cell, sign, mark) or cell.lower() in _BLANK
+def _is_value(cell: str, sign: str, mark: str, sure: bool = False) -> bool:
+    return _is_number(cell, sign, mark, sure) or cell.lower() in _BLANK
 
 
-def _tried(lines: Sequence[str], mark: str, sign: str) -> tuple[float, int, Layout] | None:
+def _tried(
+    lines: Sequence[str], mark: str, sign: str, sure: bool
+) -> tuple[float, int, Layout] | None:
     """How well a separator and a decimal sign explain the lines: part of numbers, columns."""
     rows = [parted(line, mark) for line in lines]
     last = [r for r in rows[-60:] if any(r)]
     if not last:
         return None
     width = max({len(r) for r in last}, key=[len(r) for r in last].count)
-    if width > 1 and not any(r[-1] for r in last if len(r) == width):
+    while width > 1 and not any(r[width - 1] for r in rows if len(r) >= width):
         # a mark at the end of every line parts nothing
         width -= 1
     if width < 1 or (width < 2 and mark != ","):
         return None
-    good = [_is_row(r, width, sign, mark) for r in rows]
+    good = [_is_row(r, width, sign, mark, sure) for r in rows]
     if not any(good):
         return None
     followed = [g and after for g, after in zip(good, [*good[1:], True], strict=True)]
     first = followed.index(True) if True in followed else good.index(True)
-    if not any(any(r) for r in rows[:first]) and _is_heading(rows[first:], sign, mark):
+    if not any(any(r) for r in rows[:first]) and _is_heading(rows[first:], sign, mark, sure):
         first += 1
     body = [g for r, g in zip(rows[first:], good[first:], strict=True) if any(r)]
     share = sum(body) / len(body)
     if share < 0.5:
         return None
     cells = [c for r in rows[first : first + 60] for c in r if c]
-    numbers = sum(_is_number(c, sign, mark) for c in cells) / max(len(cells), 1)
-    marked = any(_in_thousands(c, sign, mark) for c in cells)
+    numbers = sum(_is_number(c, sign, mark, sure) for c in cells) / max(len(cells), 1)
+    marked = any(_in_thousands(c, sign, mark, sure) for c in cells)
     names, units, headed = heading([r for r in rows[:first] if any(r)], width)
     layout = Layout(mark, sign, first, names, units, headed, _OTHER[sign] if marked else None)
     return round(share * numbers, 2), width, layout
 
 
-def _is_heading(rows: Sequence[Sequence[str]], sign: str, mark: str) -> bool:
+def _is_heading(rows: Sequence[Sequence[str]], sign: str, mark: str, sure: bool) -> bool:
     """Whether the first row is a heading though some names are numbers: ``time,1,2``."""
     below = [r for r in rows[1:60] if len(r) == len(rows[0])]
     return len(below) > 1 and any(
-        not _is_value(cell, sign, mark) and all(_is_number(r[i], sign, mark) for r in below)
+        not _is_value(cell, sign, mark, sure)
+        and all(_is_number(r[i], sign, mark, sure) for r in below)
         for i, cell in enumerate(rows[0])
     )
 
 
-def _is_row(cells: Sequence[str], width: int, sign: str, mark: str) -> bool:
+def _is_row(cells: Sequence[str], width: int, sign: str, mark: str, sure: bool) -> bool:
     """Whether a row is one of samples: as many cells as the others, half of them numbers."""
-    trailing = len(cells) == width + 1 and not cells[-1]
+    trailing = len(cells) > width and not any(cells[width:])
     if len(cells) != width and not trailing:
         return False
-    numbers = sum(_is_number(c, sign, mark) for c in cells[:width])
-    other = [c for c in cells[:width] if not _is_value(c, sign, mark) and not _STAMP.fullmatch(c)]
+    numbers = sum(_is_number(c, sign, mark, sure) for c in cells[:width])
+    values = (_is_value(c, sign, mark, sure) or _STAMP.fullmatch(c) for c in cells[:width])
+    other = [known for known in values if not known]
     return numbers > 0 and 2 * len(other) <= width

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 def unzipped(path: Path, mode: str) -> IO[bytes]:
     """The one file of an archive; ValueError where there are others."""
     archive = zipfile.ZipFile(path)
-    names = [info.filename for info in archive.infolist() if not info.is_dir()]
+    every = [info.filename for info in archive.infolist() if not info.is_dir()]
+    # what a Mac puts beside each file
+    names = [name for name in every if not name.startswith("__MACOSX/")]
     if len(names) != 1:
         raise InputError(f"holds {', '.join(names[:8]) or 'nothing'}; expected one table")
     return archive.open(names[0])
