@@ -206,7 +206,7 @@ def unknown(name: str, value: object, allowed: Iterable[str]) -> str:
     """Sentence for a name that is not among ``allowed``, with the nearest one as a hint."""
     names = [str(a) for a in allowed]
     folded = {n.casefold(): n for n in names}
-    near = difflib.get_close_matches(str(value).casefold(), folded, n=1, cutoff=0.6)
+    near = difflib.get_close_matches(str(value).casefold(), folded, n=1, cutoff=0.5)
     hint = f"; did you mean {folded[near[0]]!r}?" if near else ""
     return f"{name}={value!r} is not one of {', '.join(map(repr, names))}{hint}"
 

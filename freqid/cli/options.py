@@ -100,9 +100,9 @@ class Asked:
             "(freqid new-model)"
         ),
     ]
-    order: Annotated[int, Option(help="of output-error")] = 3
-    zeros: Annotated[int | None, Option(help="of transfer-function")] = None
-    poles: Annotated[int | None, Option(help="of transfer-function")] = None
+    order: Annotated[int | None, Option(help="of output-error; by default 3")] = None
+    zeros: Annotated[int | None, Option(help="of transfer-function; by default one less")] = None
+    poles: Annotated[int | None, Option(help="of transfer-function; by default 3")] = None
     feedthrough: Annotated[bool, Option(help="output-error with a direct term")] = False
     stable: Annotated[bool, Option(help="output-error with its poles in the unit circle")] = False
     delay: Annotated[
@@ -144,6 +144,9 @@ class Search:
         str | None, Option(help="noise: weigh each line by the noise that the fit leaves there")
     ] = None
     offset: Annotated[bool, Option(help="make a constant of each output an unknown")] = False
+    error: Annotated[
+        str, Option(help="of responses: linear, or log where errors grow with their size")
+    ] = "linear"
     loss: Annotated[str, Option(help="linear, or huber: samples that are far off count less")] = (
         "linear"
     )
@@ -157,6 +160,7 @@ class Search:
             "hold": hold_of(self.hold), "band": self.band, "weights": self.weights,
             "offset": "estimate" if self.offset else None, "n_starts": self.n_starts,
             "loss": None if self.loss == "linear" else self.loss,
+            "error": None if self.error == "linear" else self.error,
         }  # fmt: skip
         return {k: v for k, v in asked.items() if v is not None}
 

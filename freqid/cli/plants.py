@@ -48,25 +48,29 @@ plant = fq.GreyBox(
 
 def model_of(
     text: str,
-    order: int = 3,
+    order: int | None = None,
     zeros: int | None = None,
     poles: int | None = None,
     feedthrough: bool = False,
     stable: bool = False,
     delay: str | None = None,
 ) -> object:
-    """The model that ``--model`` names; ValueError, with what there is, for another."""
-    if delay is not None and text != "transfer-function":
-        raise InputError(f"--delay is transfer-function's; give {text} an input_delay of its own")
+    """The model that ``--model`` names; ValueError, with what there is, for another, and for an
+    option that it does not have.
+    """
+    for option, given, owner in (
+        ("--order", order, "output-error"), ("--feedthrough", feedthrough, "output-error"),
+        ("--stable", stable, "output-error"), ("--zeros", zeros, "transfer-function"),
+        ("--poles", poles, "transfer-function"), ("--delay", delay, "transfer-function"),
+    ):  # fmt: skip
+        if given not in (None, False) and text != owner:
+            raise InputError(f"{option} is {owner}'s; {text} says such things by itself")
     if text == "output-error":
-        return fq.OutputError(order, feedthrough, stable)
-    if feedthrough or stable:
-        name = "--feedthrough" if feedthrough else "--stable"
-        raise InputError(f"{name} is output-error's; {text} says such things by itself")
+        return fq.OutputError(3 if order is None else order, feedthrough, stable)
     if text in PLANTS:
         return PLANTS[text]()
     if text == "transfer-function":
-        n = order if poles is None else poles
+        n = 3 if poles is None else poles
         return fq.TransferFunction(n - 1 if zeros is None else zeros, n, _late(delay))
     file, _, name = text.rpartition(":")
     if not file or not name:
@@ -111,7 +115,10 @@ def from_file(path: Path, name: str) -> object:
         raise InputError(f"{path}: {unknown('--model', name, models)}")
     found = getattr(module, name)
     if not isinstance(found, kinds) and callable(found):
-        found = found()
+        try:
+            found = found()
+        except TypeError as error:
+            raise InputError(f"{path}: {name} makes no model by itself ({error})") from None
     if not isinstance(found, kinds):
         raise InputError(
             f"{path}: {name} is a {type(found).__name__}; expected a GreyBox or a black box"

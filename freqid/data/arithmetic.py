@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 S = TypeVar("S", bound="Signals")
 # what has to be the same of two experiments
-_ALIKE = ("dt", "input_dt", "hold", "input_names", "output_names", "conditions")
+_ALIKE = ("hold", "input_names", "output_names", "units", "conditions")
 
 
 def times(record: S, factor: object) -> S:
@@ -31,14 +32,22 @@ def less(record: S, other: object) -> S:
     """The difference of two experiments; ValueError where they are not alike."""
     if type(other) is not type(record):
         raise InputError(f"a record less a {type(other).__name__}; expected another record")
+    for name in ("dt", "input_dt"):
+        own, given = getattr(record, name), getattr(other, name)
+        if not math.isclose(own, given, rel_tol=1e-9):
+            raise InputError(f"records of unlike {name}, {own!r} and {given!r}, have no difference")
     for name in _ALIKE:
         own, given = getattr(record, name, None), getattr(other, name, None)
         if own != given:
             raise InputError(f"records of unlike {name}, {own!r} and {given!r}, have no difference")
     mine, theirs = _signals(record), _signals(other)
+    if mine.keys() != theirs.keys():
+        raise InputError("one of the records has a reference, and the other none")
     if {n: x.shape for n, x in mine.items()} != {n: x.shape for n, x in theirs.items()}:
         raise InputError("records of unlike lengths have no difference; slice one of them")
-    return replace(record, **{n: mine[n] - theirs[n] for n in mine})  # type: ignore[type-var]
+    folded = max(getattr(r, "aliased", 0.0) for r in (record, other))
+    left = {n: mine[n] - theirs[n] for n in mine}
+    return replace(record, aliased=folded, **left)  # type: ignore[type-var]
 
 
 def _signals(record: object) -> dict[str, FloatArray]:

@@ -190,5 +190,6 @@ def _picked(
         variance=None if frf.variance is None else frf.variance[o, i],
         coherence=None if frf.coherence is None else frf.coherence[o, i],
         input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[i],
-        hold=frf.hold.of(range(len(frf.input_names))[i]) if isinstance(frf.hold, InputHolds) else frf.hold,
+        hold=frf.hold.of(range(len(frf.input_names))[i])
+        if isinstance(frf.hold, InputHolds) else frf.hold,
     )  # fmt: skip

@@ -56,9 +56,11 @@ class Signals:
         return times(self, factor)
 
     def __truediv__(self, divisor: object) -> Self:
-        if not isinstance(divisor, int | float) or not divisor:
-            raise InputError(f"a record divided by {divisor!r:.40}; expected a number, not zero")
-        return times(self, 1 / divisor)
+        if isinstance(divisor, bool) or not isinstance(divisor, int | float | np.number):
+            raise InputError(f"a record divided by {divisor!r:.40}; expected a number")
+        if not divisor:
+            raise InputError("a record divided by zero; expected another number")
+        return times(self, 1 / float(divisor))
 
     def __sub__(self, other: object) -> Self:
         """What one experiment has more than another of the same rate, length and channels."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
-from freqid.lti import Hold
+from freqid.lti import Hold, InputHolds
 
 P = ParamSpec("P")
 Made = TypeVar("Made")
@@ -35,8 +35,9 @@ def that_reads(function: Callable[P, Made]) -> Callable[P, Made]:
     @wraps(function)
     def called(*args: P.args, **options: P.kwargs) -> Made:
         found = function(*args, **options)
-        given = [_text(a) for a in args] + [f"{k}={_text(v)}" for k, v in options.items()]
-        _CALLS[found] = f"fq.{function.__name__}({', '.join(given)})"
+        given = _written(args, options)
+        if given is not None:
+            _CALLS[found] = f"fq.{function.__name__}({given})"
         return found
 
     return called
@@ -78,18 +79,35 @@ def that_estimates(function: Callable[P, Made]) -> Callable[P, Made]:
 
 def _written(args: Sequence[object], options: Mapping[str, object]) -> str | None:
     """Arguments as they stand in a call; None where one of them cannot be written."""
-    if not all(_plain(v) for v in (*args, *options.values())):
+    texts = [in_python(v) for v in (*args, *options.values())]
+    if None in texts or not all(name.isidentifier() for name in options):
         return None
-    return ", ".join([*map(_text, args), *(f"{k}={_text(v)}" for k, v in options.items())])
+    named = zip(["" for _ in args] + [f"{name}=" for name in options], texts, strict=True)
+    return ", ".join(f"{name}{text}" for name, text in named)
 
 
-def _plain(value: object) -> bool:
+def in_python(value: object) -> str | None:
+    """A value as Python writes it after ``import freqid as fq``; None for what is too much."""
+    if hasattr(value, "tolist"):
+        # of numpy or pandas
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        items = {repr(k): in_python(v) for k, v in value.items()}
+        short = len(items) <= _FEW and None not in items.values()
+        return "{" + ", ".join(f"{k}: {v}" for k, v in items.items()) + "}" if short else None
     if isinstance(value, list | tuple):
-        return len(value) <= _FEW and all(map(_plain, value))
-    return value is None or isinstance(value, str | bool | int | float | Hold | Path)
-
-
-def _text(value: object) -> str:
+        each = [in_python(v) for v in value]
+        if len(each) > _FEW or None in each:
+            return None
+        inside = ", ".join(map(str, each))
+        if isinstance(value, list):
+            return f"[{inside}]"
+        return f"({inside},)" if len(each) == 1 else f"({inside})"
+    if isinstance(value, InputHolds):
+        return None
+    if isinstance(value, Hold):
+        return f"fq.{value!r}"
     if isinstance(value, Path):
-        value = str(value)
-    return f"fq.{value!r}" if isinstance(value, Hold) else repr(value)
+        return repr(str(value))
+    known = value is None or isinstance(value, str | bool | int | float)
+    return (repr(str(value)) if isinstance(value, str) else repr(value)) if known else None

@@ -22,7 +22,8 @@ def rounded(value: float, std: float) -> str:
     """
     if not (np.isfinite(value) and np.isfinite(std) and std > 0) or value == 0:
         return f"{value:.{_PLAIN}g}"
-    place = int(np.floor(np.log10(std))) - 1
+    # of the error as it is shown: 0.0996 is 0.10
+    place = int(np.floor(np.log10(float(f"{std:.2g}")))) - 1
     digits = int(np.clip(int(np.floor(np.log10(abs(value)))) - place + 1, 1, _MOST))
     exact = float(f"{value:.{digits}g}")
     if place >= 0 and abs(exact) < 10**_PLAIN:

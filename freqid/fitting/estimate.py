@@ -142,15 +142,20 @@ class Estimate(Questioned, Shown):
         """Covariance of the parameters, (P, P)."""
         return self.scatter.covariance
 
-    @cached_property
+    @property
     def parameters(self) -> pd.DataFrame:
         """Value, standard error, 95 % interval, nominal value and unit of each parameter.
 
         The free ones in the order of ``names``, then those tied to them.
         """
-        import pandas as pd
-
         from freqid.fitting.table import Table
+
+        # what is changed of a table is not changed of the estimate
+        return Table(self._parameters.copy())
+
+    @cached_property
+    def _parameters(self) -> pd.DataFrame:
+        import pandas as pd
 
         std = np.sqrt(np.diag(self.covariance_matrix))
         lower, upper = self._limits(std)
@@ -165,7 +170,7 @@ class Estimate(Questioned, Shown):
             },
             index=pd.Index(list(self.names), name="parameter"),
         )
-        return Table(with_tied(free, self, Z95))
+        return with_tied(free, self, Z95)
 
     def _limits(self, std: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends of 95 % intervals, inside the bounds."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
+from freqid.data import in_python
 from freqid.fitting.digits import in_digits, of_error, rounded
 
 if TYPE_CHECKING:
@@ -93,7 +94,9 @@ def call_of(model: object, count: int, given: Mapping[str, object]) -> str:
             continue
         if name == "start":
             value = dict(value)  # type: ignore[call-overload]
-        text = repr(value) if not hasattr(value, "shape") else f"<array {value.shape}>"
+        text = in_python(value) or (
+            f"<array {value.shape}>" if hasattr(value, "shape") else repr(value)
+        )
         shown.append(f"{name}={text}")
     data = "data" if count == 1 else f"[{count} data sets]"
     return f"fq.fit({', '.join(['model', data, *shown])})\n# model = {model!r}"

@@ -36,10 +36,24 @@ from freqid.fitting.noise_models import (
     ResponseNoise,
 )
 from freqid.frf import spectra
-from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold
+from freqid.lti import BandLimited, Hold, InputHolds, PeriodicHold, Plane, ZeroOrderHold
 
 InitialState = Literal["estimate", "zero", "steady"]
 Domain = Literal["frequency", "time"]
+
+
+# sample times from which a hold is that of another record
+_OUTLASTS = 2.0
+
+
+def check_period(hold: Hold, step: float) -> None:
+    """ValueError for a hold that outlasts samples: what is between its steps is samples, too."""
+    for each in hold.holds if isinstance(hold, InputHolds) else (hold,):
+        if isinstance(each, PeriodicHold) and each.period >= _OUTLASTS * step * (1 - 1e-9):
+            raise InputError(
+                f"hold={each!r} outlasts the input's samples, {step:g} s apart; an input that "
+                f"keeps values for several samples is held for one of them, too: {each.name!r}"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,7 +97,7 @@ class GreyBox(Model):
             without(self.matrices, timing),
             ties,
             self.vectorized,
-            self.jacobian,
+            None if self.jacobian is None else without(self.jacobian, timing),  # type: ignore[arg-type]
             nominal,
             conditions,
         )

@@ -86,6 +86,11 @@ class MatrixFunction:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
         self.__dict__.update({"conditions": {}} | arrived(state))
 
+    @property
+    def _apart(self) -> tuple[str, ...]:
+        """Parameters that the matrices do not take: delays."""
+        return self.matrices.names if isinstance(self.matrices, _Without) else ()
+
     def under(self, conditions: Mapping[str, float]) -> MatrixFunction:
         """The same function where other conditions are set."""
         other = copy.copy(self)
@@ -139,7 +144,7 @@ class MatrixFunction:
             moved = self.ties.resolve({**values, name: values[name] + _COMPLEX_STEP * 1j})
             for other, value in moved.items():
                 slope = np.imag(value) / _COMPLEX_STEP
-                if slope == 0:
+                if slope == 0 or other in self._apart:
                     continue
                 if other not in by:
                     raise InputError(f"jacobian returned no derivative by {other!r}")

@@ -24,12 +24,15 @@ class Portable:
 
     def __reduce__(self) -> tuple[object, tuple[object]]:
         try:
-            pickle.dumps(self.function)
+            # by its name, which another process looks for in a script that it does not run
+            known = b"__main__" not in pickle.dumps(self.function)
         except (pickle.PicklingError, AttributeError, TypeError):
-            import cloudpickle
+            known = False
+        if known:
+            return Portable, (self.function,)
+        import cloudpickle
 
-            return _from_code, (cloudpickle.dumps(self.function),)
-        return Portable, (self.function,)
+        return _from_code, (cloudpickle.dumps(self.function),)
 
 
 def _from_code(code: bytes) -> Portable:

@@ -101,7 +101,10 @@ def bode(
         phase.set(xscale="log")
         look_at(amplitude, phase, window, fitted, unit)
 
-    window, fitted = window_of(responses, curves) if omega is None else None, fitted_band(responses)
+    # axes that were given may hold other curves
+    held = ax is not None and any(each.lines for each in np.ravel(np.asarray(ax, dtype=object)))
+    window = window_of(responses, curves) if omega is None and not held else None
+    fitted = fitted_band(responses)
     outputs, inputs = _channels(curves)
     new = ax is None and outputs * inputs > 1
     if new or (isinstance(ax, np.ndarray) and ax.shape == (2 * outputs, inputs)):
@@ -197,10 +200,15 @@ def hold_in_words(hold: Hold) -> str:
 
 
 def _draw(curve: BodeCurve, amplitude: Axes, phase: Axes, unit: str, decibel: bool) -> None:
+    if (curve.frequency <= 0).any():
+        # which a logarithmic axis has no place for
+        curve = curve.some(curve.frequency > 0)
     x = curve.frequency * UNITS[unit]
     level = _in_decibel if decibel else np.asarray
-    amplitude.plot(x, level(curve.magnitude), label=curve.label, **curve.style)
-    phase.plot(x, curve.phase, **curve.style)
+    # no line goes through one point
+    mark = "o" if len(x) == 1 else None
+    amplitude.plot(x, level(curve.magnitude), label=curve.label, marker=mark, **curve.style)
+    phase.plot(x, curve.phase, marker=mark, **curve.style)
     if curve.limits is not None and curve.turn is not None:
         low, high = map(level, curve.limits)
         bands = (amplitude, low, high), (phase, curve.phase - curve.turn, curve.phase + curve.turn)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError
-from freqid.data import FrequencyResponse
+from freqid.checks import BoolArray, FloatArray, InputError
+from freqid.data import FrequencyResponse, source
 from freqid.fitting import Z95, Estimate
 from freqid.lti import Hold, PeriodicHold
 from freqid.models import Model, as_model
@@ -48,6 +48,15 @@ class BodeCurve:
     label: str | None = None
     limits: tuple[FloatArray, FloatArray] | None = None
     turn: FloatArray | None = None
+
+    def some(self, kept: BoolArray) -> BodeCurve:
+        """The curve at some of its frequencies."""
+        limits = None if self.limits is None else (self.limits[0][kept], self.limits[1][kept])
+        return replace(
+            self, frequency=self.frequency[kept], magnitude=self.magnitude[kept],
+            phase=self.phase[kept], limits=limits,
+            turn=None if self.turn is None else self.turn[kept],
+        )  # fmt: skip
 
 
 def frequency_label(unit: str) -> str:
@@ -94,7 +103,10 @@ def shown(
     between = hold or common_hold(things)
     at = frequencies(things) if omega is None else np.asarray(omega, dtype=float)
     names = _names(things) if labels is None else labels
-    looks = [line(i) if styles is None else styles[i] for i in range(len(things))]
+    if styles is not None and len(styles) != len(things):
+        raise InputError(f"styles has {len(styles)} entries for {len(things)} responses")
+    own = [None] * len(things) if styles is None else styles
+    looks: list[Style] = [line(i) if style is None else style for i, style in enumerate(own)]
     each = zip(things, names, looks, strict=True)
     return [Shown(response_of(thing, at, between), name, look) for thing, name, look in each]
 
@@ -112,7 +124,11 @@ def _kind(thing: Drawable) -> str:
     if isinstance(thing, Estimate):
         return "estimate"
     if isinstance(thing, FrequencyResponse):
-        seen = thing.input_spectrum is not None or thing.variance is not None
+        seen = (
+            source(thing) is not None
+            or thing.input_spectrum is not None
+            or thing.variance is not None
+        )
         return "measured" if seen or thing.coherence is not None else "response"
     return str(getattr(thing, "name", None) or "model") if isinstance(thing, Model) else "system"
 
@@ -155,7 +171,8 @@ def frequencies(things: Sequence[Drawable]) -> FloatArray:
     fitted = [t for t in things if isinstance(t, Estimate)]
     if measured:
         base = np.unique(np.concatenate(measured))
-        low, high = base[0], base[-1]
+        # lines at zero alone have no place on a logarithmic axis
+        low, high = (base[0], base[-1]) if len(base) else (0.1, 1000.0)
     else:
         low, high = 0.1, 1000.0
         if len(sizes):

@@ -44,7 +44,7 @@ def plot_comparison(
         if zoom:
             raise InputError("zoom=True shows samples; a response has none")
         shown = dataclasses.replace(record, response=comparison.simulated, variance=None)
-        return bode(record, shown, labels=["measured", "model"], ax=ax)
+        return bode(record, shown, labels=["measured", "model"], ax=ax, unit="Hz")
     count, rows = record.n_outputs, 4 if zoom else 2
     simulated = comparison.simulated.reshape(len(comparison.simulated), -1)
     residuals = comparison.residuals.reshape(simulated.shape)

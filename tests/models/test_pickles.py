@@ -90,3 +90,36 @@ def test_copies_call_the_same_function():
         assert other.values == model.values
     with pytest.raises(TypeError, match="pickle"):
         pickle.dumps(model)
+
+
+SCRIPT = """
+import pickle, sys
+import freqid as fq
+from functools import partial
+
+def lag(gain, b, a):
+    return [[-a]], [[gain * b]], [[1.0]], None
+
+model = fq.GreyBox(partial(lag, 3.0), [fq.Parameter("b", 5.0), fq.Parameter("a", 2.0)])
+sys.stdout.buffer.write(pickle.dumps(model))
+"""
+
+
+def test_functions_of_a_script_go_along(tmp_path):
+    (tmp_path / "mine.py").write_text(SCRIPT)
+    made = subprocess.run(
+        [sys.executable, "mine.py"], cwd=tmp_path, capture_output=True, check=True
+    )
+    model = pickle.loads(made.stdout)
+    assert model.frequency_response([0.0]).response[0, 0, 0] == pytest.approx(7.5)
+
+
+def test_a_jacobian_need_not_know_delays():
+    model = fq.GreyBox(
+        lambda a: ([[-a]], [[a]], [[1.0]], None),
+        [fq.Parameter("a", 20.0), fq.Parameter("Td", 0.01)], input_delay="Td",
+        jacobian=lambda a: {"a": ([[-1.0]], [[1.0]], [[0.0]], None)},
+    )  # fmt: skip
+    record = fq.simulate(model, fq.white_noise(600, seed=1), 0.01).with_noise(0.001)
+    est = fq.fit(model.with_values(Td=0.013, a=25.0), record)
+    assert est["a"] == pytest.approx(20.0, rel=0.02)

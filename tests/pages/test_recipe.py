@@ -106,7 +106,9 @@ def test_data_that_were_changed_were_not_read(file):
     record = fq.read(file)
     assert source(record) == f"fq.read({str(file)!r})"
     assert source(dataclasses.replace(record, y=2 * record.y)) is None
-    assert source(record.with_noise(np.array([0.1]))) is None
+    assert source(record.with_noise(np.array([0.1]))) == f"{source(record)}.with_noise([0.1])"
+    assert source(record.with_noise(0.1 * record.y.std())).count("np.") == 0
+    assert source(record.with_conditions(**{"my q": 1.0})) is None
 
 
 @pytest.mark.parametrize("made", [

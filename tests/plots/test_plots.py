@@ -172,3 +172,32 @@ def test_nyquist_curves_of_several_channels_can_be_told_apart():
     assert colours[:2] == colours[2:]
     assert colours[0] != colours[1]
     assert dashes[0] == dashes[1] != dashes[2]
+
+
+def test_odd_responses_are_drawn_or_refused_in_words(plant, slow):
+    at_zero = fq.FrequencyResponse([0.0], [1j])
+    fq.bode(at_zero)
+    one = fq.bode(fq.FrequencyResponse([5.0], [1j]))
+    assert one[0].lines[0].get_marker() == "o"
+    with pytest.raises(ValueError, match="styles has 0"):
+        fq.bode(plant, styles=[])
+    fq.bode(plant, plant, styles=[None, {"color": "red"}])
+    low = fq.fit(plant, slow, band=(10, 40))
+    high = fq.fit(plant, slow, band=(50, 80))
+    axes = fq.bode(low, unit="Hz")
+    before = axes[0].get_xlim()
+    fq.bode(high, unit="Hz", ax=axes)
+    assert axes[0].get_xlim()[0] <= before[0]
+    plt.close("all")
+
+
+def test_tables_of_an_estimate_are_the_readers_own(plant, slow):
+    est = fq.fit(plant, slow.with_noise(0.1), band=(10, 80))
+    table = est.parameters
+    table["std"] = 0.0
+    assert (est.parameters["std"] > 0).all()
+
+
+def test_a_hold_that_outlasts_samples_is_refused_in_words(plant, slow):
+    with pytest.raises(ValueError, match="outlasts"):
+        fq.fit(plant, slow.with_hold(fq.ZeroOrderHold(2 * slow.dt)), band=(10, 80))

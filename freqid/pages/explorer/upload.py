@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # bytes of a file, and files that are on their way or may be asked again for other channels
 LARGEST_FILE, _OPEN = 2**28, 4
+# bytes of a file's name
+_LONGEST = 100
 _KEY, _NAME = re.compile(r"[0-9a-f]{16}"), re.compile(r"[^\w.+\- ]+")
 
 
@@ -34,7 +36,7 @@ class Uploads:
     def add(self, key: str, name: str, at: int, piece: bytes) -> None:
         """The piece of a file that begins ``at`` that byte; ValueError for one out of order."""
         with self._turn:
-            path = self.path(key, name)
+            path = self._made(key, name)
             size = path.stat().st_size if path.exists() else 0
             if at != size:
                 raise InputError(f"a piece at byte {at} of a file of which {size} are there")
@@ -46,13 +48,25 @@ class Uploads:
             with path.open("ab") as file:
                 file.write(piece)
 
-    def path(self, key: str, name: str) -> Path:
-        """Where a file lies, under its own name; ValueError for a key that is none."""
+    def path(self, key: str) -> Path:
+        """Where a file lies that has come; ValueError for a key that none has."""
+        with self._turn:
+            if not _KEY.fullmatch(key):
+                raise InputError("a key has sixteen hexadecimal digits")
+            if key not in self._paths:
+                raise InputError("no such file has come here; drop it again")
+            self._paths.move_to_end(key)
+            return self._paths[key]
+
+    def _made(self, key: str, name: str) -> Path:
+        """A new place for a file, under its own name, or the one that it has."""
         if not _KEY.fullmatch(key):
             raise InputError("a key has sixteen hexadecimal digits")
         if key not in self._paths:
-            plain = _NAME.sub("_", Path(name.replace("\\", "/")).name).lstrip(".")[-100:]
-            self._paths[key] = self._folder / key / (plain or "file")
+            plain = _NAME.sub("_", Path(name.replace("\\", "/")).name).lstrip(".")
+            # file systems count bytes
+            short = plain.encode()[-_LONGEST:].decode(errors="ignore")
+            self._paths[key] = self._folder / key / (short or "file")
             self._paths[key].parent.mkdir(exist_ok=True)
         self._paths.move_to_end(key)
         while len(self._paths) > _OPEN:
@@ -79,7 +93,7 @@ def receive(server: Flask, subjects: Subjects) -> None:
     def read() -> Response:
         asked = request.args
         try:
-            path = uploads.path(asked.get("key", ""), asked.get("name", ""))
+            path = uploads.path(asked.get("key", ""))
         except ValueError as error:
             return jsonify(error=str(error), channels=[])
         try:
