@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 # ratio of the ends of a frequency axis below which every tick is a plain number
 _FEW_DECADES = 50.0
+# curves whose names have room inside
+_NAMES = 4
 _OFFSETS = [(13, 3), (-13, 3), (3, -10), (3, 10)]
 
 
@@ -274,7 +276,9 @@ def nyquist(
         if of:
             ax.set(xlabel=f"real part in {of}", ylabel=f"imaginary part in {of}")
         if several or any(one.label for one in curves):
-            ax.legend()
+            # many names lie beside the curves, and not on them
+            beside = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
+            ax.legend(**(beside if len(ax.lines) > _NAMES else {}))
     return ax
 
 

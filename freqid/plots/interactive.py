@@ -11,6 +11,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError, choice
 from freqid.plots.spectra import POINTS, envelope
 from freqid.plots.style import on_dark
+from freqid.plots.windows import VEIL
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
 Backend: TypeAlias = Literal["matplotlib", "plotly"]
 P = ParamSpec("P")
@@ -115,6 +117,10 @@ def _axes(source: Figure, ax: Axes, suffix: str) -> dict[str, Part]:
             "anchor": f"{'y' if letter == 'x' else 'x'}{suffix}", "zeroline": False,
             "showline": True, "linecolor": "#808080", "ticks": "outside",
         }  # fmt: skip
+        if log:
+            axis["exponentformat"] = "power"
+        if label.startswith("phase"):
+            axis["dtick"] = 45 if abs(ends[1] - ends[0]) <= 270 else 90
         if letter == "x" and f"{first}" != (suffix or "1"):
             axis["matches"] = "x" if first == 1 else f"x{first}"
         if letter == "x" and not any(t.get_visible() for t in ax.get_xticklabels()):
@@ -152,14 +158,21 @@ def _traces(ax: Axes) -> Iterator[Part]:
                 yield _area(corners, area.get_facecolor()[0])
         elif isinstance(area, LineCollection):
             yield from _segments(area)
-    for patch in ax.patches:
-        if isinstance(patch, Patch):
-            outlines = patch.get_transform().transform_path(patch.get_path()).to_polygons()
-            for each in outlines:
-                at = np.asarray(ax.transData.inverted().transform(each))
-                yield _area(at, patch.get_facecolor())
+    patches = [p for p in ax.patches if isinstance(p, Patch)]
+    for patch in patches:
+        if patch.get_gid() != VEIL:
+            yield from _outlines(ax, patch, patch.get_facecolor())
     for line in ax.lines:
         yield _line(line)
+    for patch in patches:
+        if patch.get_gid() == VEIL:
+            # plotly's own paper
+            yield from _outlines(ax, patch, (*((0.07,) * 3 if on_dark() else (1.0,) * 3), 0.65))
+
+
+def _outlines(ax: Axes, patch: Patch, colour: object) -> Iterator[Part]:
+    for each in patch.get_transform().transform_path(patch.get_path()).to_polygons():
+        yield _area(np.asarray(ax.transData.inverted().transform(each)), colour)
 
 
 def _line(line: Line2D) -> Part:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+# what lies over curves that were not fitted
+VEIL = "veil"
+
+
 def fitted_band(things: Sequence[Drawable]) -> tuple[float, float] | None:
     """The band (Hz) that holds those of all estimates, None where one has none."""
     bands = [t.band for t in things if isinstance(t, Estimate)]
@@ -68,5 +72,7 @@ def look_at(
             for begin, end in ((left, fitted[0] * UNITS[unit]), (fitted[1] * UNITS[unit], right)):
                 if end > begin:
                     paper = axis.get_facecolor()
-                    axis.axvspan(begin, end, color=paper, alpha=0.65, linewidth=0, zorder=2.4)
+                    axis.axvspan(
+                        begin, end, color=paper, alpha=0.65, linewidth=0, zorder=2.4, gid=VEIL
+                    )
             axis.set_xlim(left, right)

@@ -83,8 +83,7 @@ def _responses(est: Estimate) -> list[Figure]:
     return [
         _figure(
             f"Frequency response, {measured.input_names[i]} to {measured.output_names[o]}",
-            "Drag to zoom, double-click to see all again. The data are the ratio of "
-            "the DFTs, whose scatter at weak lines is no fault of the model.",
+            _of_the_data(est),
             bode_traces(bode_curve(data, model, (o, i), scattered=True), "markers")
             + bode_traces(bode_curve(fitted, model, (o, i))),
             520,
@@ -94,6 +93,17 @@ def _responses(est: Estimate) -> list[Figure]:
         )
         for o, i in np.ndindex(*measured.response.shape[:2])
     ]
+
+
+def _of_the_data(est: Estimate) -> str:
+    """What is said of the points."""
+    zoom = "Drag to zoom, double-click to see all again."
+    if isinstance(est.data[0], FrequencyResponse):
+        return f"{zoom} The data are the response that was fitted."
+    return (
+        f"{zoom} The data are the ratio of the DFTs, whose scatter at weak lines is no fault of "
+        "the model."
+    )
 
 
 def _decades(low: float, high: float) -> Part:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 from freqid.checks import InputError
 from freqid.data import Record
 from freqid.fitting import Estimate, Verdict as Graded
-from freqid.lti import ZeroOrderHold
+from freqid.lti import InputHolds, PeriodicHold
 from freqid.models import GreyBox
 from freqid.pages.report.figures import records
+from freqid.plots import hold_in_words
 from freqid.validation import compare, hold_bias
 
 # experiments that a page can carry
@@ -41,8 +42,13 @@ def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
 def validated(est: Estimate, record: Record) -> Graded:
     """The verdict with what another record says of the model."""
     found = est.verdict
-    worst = float(compare(est, record, band=est.band).fit_percent.min())
     known = records(est)
+    if any(record is own for own in known):
+        raise InputError(
+            "validation is a record that was fitted, which the estimate explains by itself; give "
+            "another one"
+        )
+    worst = float(compare(est, record, band=est.band).fit_percent.min())
     own = float(compare(est, known[0], band=est.band).fit_percent.min()) if known else 100.0
     if worst > own - _WORSE * max(100 - own, _LEAST):
         said = f"another record is explained to {worst:.4g} %"
@@ -73,9 +79,11 @@ def data(est: Estimate) -> list[tuple[str, str]]:
     rows = [(f"experiment {i + 1}", repr(d)[1:-1]) for i, d in enumerate(est.data[:_EXPERIMENTS])]
     if len(est.data) > _EXPERIMENTS:
         rows.append(("and", f"{len(est.data) - _EXPERIMENTS} more"))
-    assumed = repr(est.hold)
-    if isinstance(est.hold, ZeroOrderHold):
-        assumed = f"zero-order hold of {1e3 * est.hold.period:g} ms"
+    assumed = "none: the plant itself, band-limited"
+    if isinstance(est.hold, PeriodicHold):
+        assumed = f"{hold_in_words(est.hold)} of {1e3 * est.hold.period:g} ms"
+    elif isinstance(est.hold, InputHolds):
+        assumed = ", ".join(h.name for h in est.hold.holds)
     return [
         *rows,
         ("hold in the fit", assumed),
@@ -83,7 +91,7 @@ def data(est: Estimate) -> list[tuple[str, str]]:
         ("explained of what was fitted", f"{est.fit_percent:.4g} %"),
         ("cost", f"{est.cost:.6g}"),
         ("starts", f"{est.n_agreed} of {est.n_starts} agree"),
-        ("converged", f"{'yes' if est.converged else 'no'}: {est.message}"),
+        ("converged", "yes" if est.converged else f"no: {est.message}"),
     ]
 
 
