@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -37,14 +38,14 @@ def multisine(
     period: float,
     dt: float,
     periods: int = 1,
-    crest: str = "minimise",
+    crest: Literal["minimise", "schroeder", "random"] = "minimise",
     seed: int = 0,
     rms: float = 1.0,
     powers: ArrayLike | None = None,
     *,
     n_inputs: int = 1,
     orthogonal: bool = False,
-    grid: str = "full",
+    grid: Literal["full", "odd", "odd-odd", "log"] = "full",
 ) -> FloatArray:
     """A periodic sum of cosines at multiples of 1/period in ``band``, (N,) or (N, inputs).
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import scipy
 
@@ -20,7 +22,7 @@ def chirp(
     f1: float,
     duration: float,
     dt: float,
-    method: str = "linear",
+    method: Literal["linear", "log"] = "linear",
     phase: float = 0,
     amplitude: float = 1,
 ) -> FloatArray:

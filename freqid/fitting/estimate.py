@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -255,7 +255,10 @@ class Estimate(Questioned, Shown):
         return pole_scatter(*self._unknowns)
 
     def intervals(
-        self, method: str = "linear", level: float = 0.95, progress: bool = False
+        self,
+        method: Literal["linear", "profile"] = "linear",
+        level: float = 0.95,
+        progress: bool = False,
     ) -> pd.DataFrame:
         """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -33,8 +33,8 @@ def select_order(
     hold: Hold | str | None = None,
     band: tuple[float, float] | None = None,
     feedthrough: bool | None = False,
-    initial_state: str = "estimate",
-    criterion: str = "mdl",
+    initial_state: Literal["estimate", "zero", "steady"] = "estimate",
+    criterion: Literal["aic", "mdl", "cross_validation"] = "mdl",
     delays: Iterable[int] = (0,),
     stable: bool = False,
     progress: bool = False,
@@ -75,7 +75,7 @@ def select_order(
     late = [whole("delays", q, least=0) for q in tried]
     if not late:
         raise InputError("delays is empty; give at least one, such as range(4)")
-    reading = Reading.of(data, hold, band, initial_state=initial_state)  # type: ignore[arg-type]
+    reading = Reading.of(data, hold, band, initial_state=initial_state)
     n_inputs = channel_counts(data)[1]
     through = [False, True] if feedthrough is None else [feedthrough]
     rows = []

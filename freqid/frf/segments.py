@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import scipy
@@ -22,7 +23,7 @@ _TIED = 0.01
 # samples whose segments are taken at once
 _PIECE = 1 << 19
 # samples that are transformed at once: more leave the processor's cache
-_NEAR = 1 << 18
+_NEAR = 160_000
 
 # segments that show where in one the input acts; relative difference of some that are the same
 _SHOWN, _SAME = 16, 1e-6
@@ -153,13 +154,21 @@ def taper(window: Window, length: int) -> FloatArray:
     """The window's samples, (length,); ValueError for what is none."""
     try:
         given = isinstance(window, (list, np.ndarray))
-        w = np.asarray(window) if given else scipy.signal.get_window(window, length)
+        w = np.asarray(window) if given else _by_name(window, length)  # type: ignore[arg-type]
     except (TypeError, ValueError, IndexError) as error:
         raise InputError(f"window={window!r:.60} is none that scipy knows: {error}") from None
     if w.dtype.kind not in "fiu" or not np.isfinite(w).all() or not w.any():
         raise InputError("window must hold finite real numbers that are not all zero")
     if w.shape != (length,):
         raise InputError(f"window has shape {w.shape}; expected ({length},), one for each sample")
+    return w
+
+
+@lru_cache(maxsize=8)
+def _by_name(window: object, length: int) -> FloatArray:
+    """The samples of a window that scipy knows; each block of a stream asks for them again."""
+    w: FloatArray = scipy.signal.get_window(window, length)
+    w.flags.writeable = False
     return w
 
 

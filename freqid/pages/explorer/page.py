@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -111,6 +112,8 @@ def _built(
     app = dash.Dash(
         "freqid", title="freqid explorer", update_title="", serve_locally=True,
         suppress_callback_exceptions=True, index_string=page(),
+        # plotly.js is five megabytes as it stands
+        compress=find_spec("flask_compress") is not None,
     )  # fmt: skip
     app.layout = outside(dash)
     answers = Answers(subjects)

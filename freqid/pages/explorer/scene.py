@@ -68,6 +68,7 @@ class Scene:
         step = -(-len(frf.frequency) // _POINTS)
         return FrequencyResponse(
             frf.frequency[::step], frf.response[..., ::step], dt=frf.dt, hold=frf.hold,
+            variance=None if frf.variance is None else frf.variance[..., ::step],
             input_names=frf.input_names, output_names=frf.output_names, units=frf.units,
         )  # fmt: skip
 
