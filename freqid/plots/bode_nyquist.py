@@ -104,7 +104,9 @@ def bode(
         look_at(amplitude, phase, window, fitted, unit)
 
     # axes that were given may hold other curves
-    held = ax is not None and any(each.lines for each in np.ravel(np.asarray(ax, dtype=object)))
+    held = ax is not None and any(
+        getattr(each, "lines", ()) for each in np.ravel(np.asarray(ax, dtype=object))
+    )
     window = window_of(responses, curves) if omega is None and not held else None
     fitted = fitted_band(responses)
     outputs, inputs = _channels(curves)
