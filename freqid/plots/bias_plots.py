@@ -14,9 +14,10 @@ from freqid.excitation import InputSpectrum
 from freqid.fitting import Estimate
 from freqid.lti import Hold, PeriodicHold, as_hold
 from freqid.models import Model
-from freqid.plots.bode_nyquist import bode, nyquist
+from freqid.plots.bode_plots import bode
 from freqid.plots.curves import resonances
 from freqid.plots.heat_maps import heat_map
+from freqid.plots.nyquist_plots import nyquist
 from freqid.plots.style import Panels, context, ink, line, several_axes, stacked
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError, an, choice, whole
 from freqid.data import FrequencyResponse, Record
 from freqid.fitting import Estimate
-from freqid.plots.bode_nyquist import bode
+from freqid.plots.bode_plots import bode
 from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
 from freqid.plots.interactive import Backend, offers_plotly
 from freqid.plots.style import Panels, drawing, ink, line, stacked

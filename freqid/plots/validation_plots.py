@@ -9,7 +9,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, flag, table_with
 from freqid.data import FrequencyResponse
-from freqid.plots.bode_nyquist import bode
+from freqid.plots.bode_plots import bode
 from freqid.plots.interactive import Backend, offers_plotly
 from freqid.plots.spectra import peaks, worst_stretch
 from freqid.plots.style import Panels, drawing, ink, line, stacked

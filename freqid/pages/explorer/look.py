@@ -46,7 +46,11 @@ a { color: inherit; } .links a { margin-right: 1.2rem; }
 .controls .dash-slider-dot { background: var(--rail) !important; }
 #hold label, #plant label, .controls [class*=slider] [class*=mark], .controls summary {
   color: var(--ink) !important; }
-.controls .dash-dropdown, .controls .dash-dropdown * { color: #1a1a1a !important; }
+.dash-dropdown, .dash-dropdown *, .dash-dropdown-content, .dash-dropdown-content * {
+  color: var(--ink) !important; }
+.dash-dropdown, .dash-dropdown-content, .dash-dropdown-search,
+.dash-dropdown-search-container {
+  background: var(--tint) !important; border-color: var(--rail) !important; }
 .wide { grid-column: 1 / -1; } .graph.words { overflow-y: auto; height: 23rem; }
 .words h2 { margin: 0.2rem 0 0.4rem; font-size: 0.95rem; font-weight: 600; }
 .words ul { padding-left: 1.1rem; margin: 0.3rem 0; } .words p { margin: 0.3rem 0; }
@@ -55,6 +59,7 @@ a { color: inherit; } .links a { margin-right: 1.2rem; }
 #drop button, #drop select { font: inherit; color: var(--ink); background: var(--tint);
   border: 1px solid var(--rail); border-radius: 0.3rem; padding: 0.3rem 0.6rem; max-width: 100%; }
 #drop p { margin: 0.4rem 0 0; min-height: 1.2em; } #drop label { display: block; margin: 0.3rem 0; }
+@media (max-width: 40rem) { .verdict { height: 7.2em; } }
 @media (max-width: 62rem) { .columns, .graphs { grid-template-columns: minmax(0, 1fr); } }
 </style><script>
 // values of the sliders of frequencies and of factors are logarithms

@@ -5,6 +5,7 @@ Built on Dash, an extra. The page listens on the loopback address only, unless t
 
 from __future__ import annotations
 
+import logging
 import socket
 import threading
 from collections.abc import Sequence
@@ -61,6 +62,8 @@ def explore(
     print(f"freqid explorer: http://{host}:{free}/  (stop with Ctrl-C)", flush=True)
     allowed = None if allow_remote else _LOOPBACK
     app, answers = _built(record, allowed, plant, source)
+    # a page for one reader on this machine needs no list of its requests, nor a server's advice
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
     # while the browser opens: what it asks first is then known, and the libraries are loaded
     threading.Thread(target=answers.of, args=(answers.subjects.first.first,), daemon=True).start()
     app.run(host=host, port=str(free), debug=False)
