@@ -213,7 +213,7 @@ def aliased(e: Evidence) -> Iterator[Finding]:
     if e.aliased > _FOLDED:
         yield Finding(
             "aliased",
-            f"{100 * e.aliased:.2g} % of the input's power lay above the Nyquist limit when the "
+            f"{100 * e.aliased:.3g} % of the input's power lay above the Nyquist limit when the "
             "record was decimated, and is folded into what is fitted; use "
             "decimate(factor, keep_input=True), or antialias=True",
             number=e.aliased,

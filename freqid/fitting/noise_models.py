@@ -123,7 +123,12 @@ class MeasuredNoise(NoiseModel):
         if isinstance(data, Record):
             return cls()
         if data.variance is None:
-            raise InputError("weights='noise' needs frf.variance, and this response has none")
+            known = ""
+            if data.coherence is not None:
+                known = "; of n averages it is abs(G)**2 (1 - coherence) / (n coherence)"
+            raise InputError(
+                f"weights='noise' needs frf.variance, and this response has none{known}"
+            )
         return ResponseNoise()
 
     @property

@@ -75,6 +75,7 @@ class Questioned:
         mode of a black box. Columns: how many ``parts``, ``value``, the largest ``shift`` in
         standard errors and in ``percent``, ``p_value`` of all together, ``std``, and ``widened``,
         the standard error by the parts' own scatter where that is more than noise (p < 0.001).
+        Empty for an estimate that was read from a file, which does not hold the data.
         Source: Birge, Physical Review 40, 1932.
         """
         if self.inquiry is None:

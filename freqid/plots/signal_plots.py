@@ -73,9 +73,16 @@ def plot_coherence(
     if frf.coherence is None:
         raise InputError("frf has no coherence; an average over segments or repeats has one")
     with drawing(ax) as ax:
-        for index, pair in enumerate(np.ndindex(frf.response.shape[:2])):
-            name = f"{(frf.input_names or 'u')[pair[1]]} to {(frf.output_names or 'y')[pair[0]]}"
-            ax.plot(frf.frequency * UNITS[unit], frf.coherence[pair], label=name, **line(index))
+        for o, i in np.ndindex(frf.coherence.shape[:2]):
+            of = (frf.output_names or "y")[o]
+            name = f"{(frf.input_names or 'u')[i]} to {of}"
+            if frf.coherence.shape[1] > 1 and (frf.coherence[o] == frf.coherence[o, :1]).all():
+                # the multiple coherence of an output is one curve, told of each of its inputs
+                if i:
+                    continue
+                name = f"all inputs to {of}"
+            index = o * frf.coherence.shape[1] + i
+            ax.plot(frf.frequency * UNITS[unit], frf.coherence[o, i], label=name, **line(index))
         ax.set(ylim=(0, 1.02), ylabel="coherence", xlabel=f"frequency / {unit}", xscale="log")
         ax.legend()
     return ax

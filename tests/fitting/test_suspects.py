@@ -308,3 +308,28 @@ def test_a_worse_minimum_with_values_that_are_not_told_is_a_doubt():
     whole = fq.fit(plant, record)
     assert whole.cost < est.cost / 1.003
     assert whole.verdict.grade == "trust"
+
+
+def analyser(plant, seed, **more):
+    """The plant's own response as an analyser with errors of 1 % at each line tells it."""
+    f = np.linspace(5, 90, 250)
+    G = plant.frequency_response(2 * np.pi * f).response[0, 0]
+    z = np.random.default_rng(seed).standard_normal((2, len(f)))
+    return fq.FrequencyResponse(f, G * (1 + 0.01 * (z[0] + 1j * z[1]) / np.sqrt(2)), **more)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_errors_that_are_a_share_are_told_the_way_out(plant, seed):
+    frf = analyser(plant, seed)
+    alike = fq.fit(plant, frf)
+    assert [w for w in alike.warnings if w.endswith("fit with error='log'")], alike.warnings
+    share = fq.fit(plant, frf, error="log")
+    assert share.verdict.grade == "trust"
+    for name in share.names:
+        assert abs(share[name] - plant[name]) < 4.5 * share.parameters["std"][name]
+
+
+def test_a_coherence_alone_is_no_variance(plant):
+    frf = analyser(plant, 0, coherence=np.full(250, 0.999))
+    with pytest.raises(ValueError, match=r"abs\(G\)\*\*2 \(1 - coherence\)"):
+        fq.fit(plant, frf, weights="noise")

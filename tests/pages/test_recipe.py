@@ -144,3 +144,31 @@ def test_of_the_command_line_with_decimation(file, tmp_path):
     # what the screen says of it the page says too
     for said in re.findall(r"(?:witness|note|warning)[^:]*: (.*)", run.stdout):
         assert said[:60] in html.unescape(page), said
+
+
+SCRIPT = """
+import sys
+
+import numpy as np
+
+GAIN = 900.0
+{own}
+est = fq.fit(plant, fq.read(sys.argv[1], inputs="u"))
+est.report("page.html")
+print(*est.values.tolist(), sep="\\n")
+"""
+
+
+@pytest.mark.parametrize("uses", ["np.eye(1)", "GAIN * np.eye(1)"], ids=["alone", "of a script"])
+def test_of_a_plant_in_a_script(uses, file, tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT.format(own=OWN.replace("[[1.0]]", uses)))
+    run = subprocess.run(
+        [sys.executable, "script.py", file], cwd=tmp_path, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    code = html.unescape(re.search(r'<pre id="call">(.*?)</pre>', page, re.S)[1])
+    assert ("model = ..." in code) == ("GAIN" in uses), code
+    if "GAIN" not in uses:
+        values = np.array(run.stdout.split(), dtype=float)
+        np.testing.assert_allclose(again(code, tmp_path), values, rtol=1e-9)

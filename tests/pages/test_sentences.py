@@ -2,9 +2,11 @@
 
 import dataclasses
 
+import pytest
+
 import freqid as fq
 from freqid.fitting.findings import Finding
-from freqid.pages.report.sentences import verdict
+from freqid.pages.report.sentences import validated, verdict
 
 
 def test_only_what_is_serious_is_held_against_an_estimate(plant, slow):
@@ -15,3 +17,10 @@ def test_only_what_is_serious_is_held_against_an_estimate(plant, slow):
     found = verdict(dataclasses.replace(est, signs=[minor, serious, serious, "somebody's own"]))
     assert not found.trusted
     assert found.text.startswith("Edge of a bound: d=0 is at its bound: 0")
+
+
+def test_the_record_that_was_fitted_validates_nothing(plant, slow):
+    est = fq.fit(plant, slow, band=(10, 80))
+    same = fq.Record(slow.u, slow.y, slow.dt, hold=slow.hold)
+    with pytest.raises(ValueError, match="a record that was fitted"):
+        validated(est, same)

@@ -75,6 +75,15 @@ def test_nyquist_record_and_coherence(plant, slow):
         fq.bode("plant")
 
 
+def test_multiple_coherence_is_one_curve_of_each_output():
+    of = np.array([[[0.9, 0.8], [0.9, 0.8]], [[0.7, 0.6], [0.7, 0.6]]])
+    names = {"input_names": ["left", "right"], "output_names": ["x", "z"]}
+    frf = fq.FrequencyResponse([1.0, 2], np.ones((2, 2, 2)), coherence=of, **names)
+    ax = fq.plot_coherence(frf)
+    assert [line.get_label() for line in ax.lines] == ["all inputs to x", "all inputs to z"]
+    assert [line.get_ydata()[1] for line in ax.lines] == [0.8, 0.6]
+
+
 def test_frequency_response_to_control_and_back(slow):
     frf = fq.etfe(slow, band=(10, 80))
     back = fq.FrequencyResponse.from_control(frf.to_control(), hold=frf.hold)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
+from freqid.data import FrequencyResponse
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import changing, measurement, plant
@@ -233,6 +234,8 @@ class Inquiry:
         else:
             what = words(a.name, a.test.size, a.unit, a.detail)
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
+        if a.name == "another mode" and all(_equally_weighted(r) for r in self.readings):
+            text += "; where errors are a share of the response, fit with error='log'"
         small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS
         if a.name == "unsteady":
             # halves that differ leave the mean of both where it is
@@ -275,3 +278,9 @@ class Inquiry:
         frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
         frame.index.name = "suspect"
         return frame
+
+
+def _equally_weighted(reading: Reading) -> bool:
+    """Whether errors of a response were taken to be of one size at all of its lines."""
+    plain = reading.noise.plain and not reading.logarithmic
+    return isinstance(reading.data, FrequencyResponse) and plain

@@ -44,13 +44,16 @@ def _band(scene: Scene) -> tuple[float, float]:
 def bode_figure(shown: Scene) -> Part:
     """Amplitude above phase, the chirp's band shaded."""
     curves = list(_curves(shown))
-    # one plant's phase begins where the others' does
+    # one plant's phase begins where the others' does, and points are put next to what fits them
     along = curves[0].response
+    fitted = next((one.response for one in curves if one.label == "estimate"), along)
     data = [
         part
         for one in curves
         for part in bode_traces(
-            bode_curve(one, along, scattered=one.label == "measured"),
+            bode_curve(one, fitted, scattered=True)
+            if one.label == "measured"
+            else bode_curve(one, along),
             "markers" if one.label == "measured" else "lines",
         )
     ]

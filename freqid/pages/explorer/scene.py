@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -78,9 +79,11 @@ class Scene:
         own record tells.
         """
         plant, dt = self.state.model(), self.slow.dt
-        omega = 2 * np.pi * _frequencies(plant, self.state, 0.5 / dt)
         held_for = dict.fromkeys((self.held, dt))
         estimate = self.estimate.model if self.estimate is not None else None
+        # of one's own plant the modes are where the estimate has them, not where it began
+        plants = [m for m in (plant, estimate) if isinstance(m, GreyBox)]
+        omega = 2 * np.pi * _frequencies(plants, self.state, 0.5 / dt)
         with rounding_said():
             found = {
                 f"{self.truth}, ZOH at {1e3 * period:g} ms": plant.frequency_response(
@@ -138,8 +141,9 @@ def rounding_said() -> AbstractContextManager[None]:
     return warnings.catch_warnings(action="ignore", category=RuntimeWarning)
 
 
-def _frequencies(model: GreyBox, state: State, nyquist: float) -> FloatArray:
-    dense = [c * (1 + 0.5 * np.linspace(-1, 1, 121) ** 3) for c in resonances(model)]
+def _frequencies(plants: Iterable[GreyBox], state: State, nyquist: float) -> FloatArray:
+    modes = [c for plant in plants for c in resonances(plant)]
+    dense = [c * (1 + 0.5 * np.linspace(-1, 1, 121) ** 3) for c in modes]
     f = np.concatenate(
         [np.geomspace(min(max(state.low / 4, 0.2), nyquist / 50), nyquist, 160), *dense]
     )

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import inspect
 import math
 import re
-from collections.abc import Mapping
+import types
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -20,14 +22,15 @@ _MOST = 100
 
 
 def recipe(est: Estimate) -> str:
-    """The lines; what no file or module holds stands there as ``...`` with what it was."""
+    """The lines; ``...`` with what it was stands for what cannot be read, imported or written."""
     if not est.call:
         return "(made without fit)"
     today = datetime.datetime.now(datetime.UTC).date()
     call, _, told = est.call.partition("\n# model = ")
     if len(est.names) > _MOST or len(est.data) > _MOST:
         return f"# {today}, {versions()}\n{est.call}"
-    imports, plant = _grey_box(est) if isinstance(est.model, GreyBox) else ([], _black_box(told))
+    grey = isinstance(est.model, GreyBox)
+    imports, code, plant = _grey_box(est) if grey else ([], [], _black_box(told))
     data = [_data(d) for d in est.data]
     if len(data) > 1:
         call = call.replace(f"[{len(data)} data sets]", "data", 1)
@@ -35,7 +38,7 @@ def recipe(est: Estimate) -> str:
     else:
         lines = [f"data = {code}  # {said}" for code, said in data]
     return "\n".join(
-        [f"# {today}, {versions()}", *imports, "import freqid as fq", "",
+        [f"# {today}, {versions()}", *imports, "import freqid as fq", "", *code,
          f"model = {plant or f'...  # {told}'}", *lines, f"est = {call}"]
     )  # fmt: skip
 
@@ -56,22 +59,30 @@ def _black_box(told: str) -> str | None:
     return re.sub(r"\b([A-Z]\w*\()", r"fq.\1", told)
 
 
-def _grey_box(est: Estimate) -> tuple[list[str], str | None]:
-    """What is to be imported, and the plant as the fit began with it; None for a function that no
-    module holds.
+def _grey_box(est: Estimate) -> tuple[list[str], list[str], str | None]:
+    """What is to be imported and written, and the plant as the fit began with it; None for a
+    function that can be neither.
     """
     model = est.model
     began = dict(zip(est.names, est.nominal, strict=True))
     own = {n: v for n, v in began.items() if n in model.values and math.isfinite(v)}
     if (short := _ready_made(model.with_values(**own))) is not None:
-        return [], short
+        return [], [], short
     written = model_to_dict(model)
-    paths = {key: written[key] for key in ("matrices", "jacobian")}
-    if paths["matrices"] is None or (model.jacobian is not None and paths["jacobian"] is None):
-        return [], None
-    imports, names = [], {}
-    for key, path in paths.items():
+    imports: list[str] = []
+    code: list[str] = []
+    names: dict[str, str] = {}
+    for key in ("matrices", "jacobian"):
+        path, function = written[key], getattr(model, key)
+        if function is None:
+            continue
         if path is None:
+            spelled = _spelled(function)
+            if spelled is None:
+                return [], [], None
+            imports += [line for line in spelled[0] if line not in imports]
+            code += [spelled[1], ""]
+            names[key] = function.__name__
             continue
         module, _, name = path["function"].partition(":")
         imports.append(f"from {module} import {name.partition('.')[0]}")
@@ -92,7 +103,26 @@ def _grey_box(est: Estimate) -> tuple[list[str], str | None]:
     ]
     lines = ["fq.GreyBox(", f"    {names['matrices']},", "    ["]
     lines += [f"        {row}," for row in rows] + ["    ],", *more, ")"]
-    return imports, "\n".join(lines)
+    return imports, code, "\n".join(lines)
+
+
+def _spelled(function: Callable[..., object]) -> tuple[list[str], str] | None:
+    """Imports and text of a function that uses nothing else of its script; None for others."""
+    if not isinstance(function, types.FunctionType) or not function.__name__.isidentifier():
+        return None
+    used = inspect.getclosurevars(function)
+    if used.nonlocals or not all(isinstance(g, types.ModuleType) for g in used.globals.values()):
+        return None
+    try:
+        text = inspect.getsource(function)
+    except (OSError, TypeError):
+        return None
+    imports = [
+        f"import {module.__name__}" + (f" as {name}" if name != module.__name__ else "")
+        for name, module in used.globals.items()
+        if module.__name__ != "freqid"
+    ]
+    return (imports, text.rstrip()) if text.startswith("def ") else None
 
 
 def _ready_made(model: GreyBox) -> str | None:

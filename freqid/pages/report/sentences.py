@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from freqid.checks import InputError
 from freqid.data import Record
-from freqid.fitting import Estimate, Verdict as Graded
+from freqid.fitting import Estimate, Verdict as Graded, data_digest
 from freqid.lti import InputHolds, PeriodicHold
 from freqid.models import GreyBox
 from freqid.pages.report.figures import records
@@ -43,7 +43,7 @@ def validated(est: Estimate, record: Record) -> Graded:
     """The verdict with what another record says of the model."""
     found = est.verdict
     known = records(est)
-    if any(record is own for own in known):
+    if any(data_digest(record) == data_digest(own) for own in known):
         raise InputError(
             "validation is a record that was fitted, which the estimate explains by itself; give "
             "another one"
