@@ -25,7 +25,7 @@ from freqid.data.remembered import (
     kept_reference,
     kept_step,
 )
-from freqid.data.time_column import EPOCHS, time_named, with_time
+from freqid.data.time_column import EPOCHS, of_this_world, time_named, with_time
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -221,9 +221,10 @@ def _times(frame: pd.DataFrame) -> FloatArray | None:
     if pd.api.types.is_datetime64_any_dtype(column) or pd.api.types.is_timedelta64_dtype(column):
         column = (column - column.iloc[0]) / pd.Timedelta(seconds=1)
     try:
-        return np.asarray(column, dtype=float)
+        times = np.asarray(column, dtype=float)
     except (TypeError, ValueError):
         raise InputError("column 'time' holds values that are not numbers of seconds") from None
+    return of_this_world("time", times)
 
 
 def _channels(

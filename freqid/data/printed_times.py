@@ -16,6 +16,8 @@ _STEPS = 10_000
 # samples that tell a period, and the part of it that it must be known to
 # to be taken, and that to which a rate of two digits is
 _FEW, _KNOWN, _PLAIN = 8, 1e-3, 1e-2
+# beyond it doubles are whole numbers
+_WHOLE = 2.0**53
 
 
 def printed_period(times: FloatArray) -> tuple[float, float] | None:
@@ -25,7 +27,8 @@ def printed_period(times: FloatArray) -> tuple[float, float] | None:
     that of a rate in few digits that is as near.
     """
     count = len(times)
-    if count < _FEW or not np.isfinite(times).all():
+    # where doubles are whole numbers they tell no digits
+    if count < _FEW or not (np.abs(times) < _WHOLE).all():
         return None
     number, t = np.arange(count), times - times[0]
     period, start = np.polyfit(number, t, 1)

@@ -45,6 +45,8 @@ _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms
 _DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
 _DAY = 86_400.0
+# beyond it a difference may be more than a double holds
+_BEYOND = 1e300
 # a number, however its thousands are marked
 _NUMERAL = r"[+-]?\d[\d.,' ]*([eEdD][+-]?\d+)?"
 
@@ -122,7 +124,8 @@ def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | Non
     if x.dtype.kind not in "fiu":
         return first if _is_stamp(x) else None
     values = x.to_numpy(dtype=float)
-    gaps = np.diff(values)
+    with np.errstate(over="ignore", invalid="ignore"):
+        gaps = np.diff(values)
     even = np.isfinite(values).all() and gaps.min() > 0
     if even and np.abs(gaps - gaps.mean()).max() <= _EVEN * gaps.mean():
         return first
@@ -178,7 +181,7 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
                 f"column {name!r} holds {column.iloc[0]!r}, which is neither a number nor a time"
             )
         return in_seconds(name, converted, unit)
-    values = _less_the_first(column.to_numpy())
+    values = of_this_world(name, _less_the_first(column.to_numpy()))
     suffix = re.search(_SUFFIX, name.casefold())
     wanted = unit or (suffix[1] if suffix else "")
     if wanted:
@@ -193,6 +196,18 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
         if least < size < most:
             return _scaled(values - values[0], scale), f"{text} since 1970"
     return values, "s"
+
+
+def of_this_world(name: str, seconds: FloatArray) -> FloatArray:
+    """Times whose differences a double can hold; InputError names the first row of others."""
+    beyond = np.abs(seconds) > _BEYOND
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        raise InputError(
+            f"column {name!r} holds {seconds[row]:g} in row {row}, which is no time; mend or leave "
+            "out the row"
+        )
+    return seconds
 
 
 def _less_the_first(values: Array) -> FloatArray:

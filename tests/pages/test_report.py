@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.pages.report.figures import figures
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +57,25 @@ def test_what_was_done_on_the_way_is_said(tmp_path):
     est.report(tmp_path / "r.html")
     assert est.notes
     assert est.notes[0].split(":")[0] in (tmp_path / "r.html").read_text().replace("&#39;", "'")
+
+
+def test_one_record_of_two_inputs_shows_the_response_of_each(tmp_path):
+    def two(a, b):
+        return [[-a, 0.2], [0, -b]], [[a, 0], [0, b]], [[1, 0], [0.3, 1]], None
+
+    plant = fq.GreyBox(
+        two, [fq.Parameter("a", 10.0), fq.Parameter("b", 30.0)], inputs=["left", "right"],
+        outputs=["x", "z"],
+    )  # fmt: skip
+    u = np.random.default_rng(0).standard_normal((4000, 2))
+    est = fq.fit(plant, fq.simulate(plant, u, 1e-2).with_noise(0.01, seed=1))
+    drawn = [f for f in figures(est) if f.title.startswith("Frequency response")]
+    assert [f.title for f in drawn] == [
+        f"Frequency response, {i} to {o}" for o in ("x", "z") for i in ("left", "right")
+    ]
+    assert all("local polynomials" in f.note for f in drawn)
+    for pair, figure in zip(np.ndindex(2, 2), drawn, strict=True):
+        points = next(part for part in figure.data if part["name"] == "data")
+        f, shown = np.array(points["x"]), np.array(points["y"])
+        G = plant.frequency_response(2 * np.pi * f, fq.ZeroOrderHold(1e-2)).response[pair]
+        np.testing.assert_allclose(shown, np.abs(G), atol=0.03)

@@ -259,3 +259,27 @@ def test_line_ends_of_any_machine_are_line_ends(tmp_path):
         path.write_bytes(end.join(["time,u,y", "s,V,m", *rows, ""]).encode())
         records.append(fq.read(path))
     assert all(np.array_equal(r.y, 2.0 * np.arange(9)) for r in records)
+
+
+@pytest.mark.parametrize("largest", [1e18, 1e200, 1.7e308])
+@pytest.mark.parametrize("where", [0, 30, N - 1])
+def test_times_beyond_all_digits(largest, where, tmp_path):
+    for sign in (1, -1):
+        times = T.copy()
+        times[where] = sign * largest
+        if where == 30:
+            times[31] = -sign * largest
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(tmp_path / f"odd{sign}.h5", "w") as file:
+            for name, values in {"time": times, "u": np.sin(T), "y": np.cos(T)}.items():
+                file[name] = values
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(InputError, match=r"odd-?1\.h5"):
+                fq.read(tmp_path / f"odd{sign}.h5", inputs="u", outputs="y")
+
+
+@pytest.mark.filterwarnings("error")
+def test_values_beyond_all_differences_beside_no_time(tmp_path):
+    pd.DataFrame({"u": [1.7e308, -1.7e308] * 30, "y": T}).to_csv(tmp_path / "a.csv", index=False)
+    assert fq.read(tmp_path / "a.csv", inputs="u", dt=0.01).n_samples == N

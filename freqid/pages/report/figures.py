@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import FrequencyResponse, Record
+from freqid.data import FrequencyResponse, LocalResponse, Record
 from freqid.fitting import Estimate
-from freqid.frf import etfe
+from freqid.frf import etfe, local_polynomial
 from freqid.lti import PeriodicHold
 from freqid.plots import (
     COLOURS,
@@ -31,6 +31,8 @@ from freqid.validation import compare
 
 # points of a curve that a page can carry
 _POINTS = 2000
+# samples of a record of several inputs whose response is shown
+_MOST = 200_000
 _DATA: Style = {"color": "#7f7f7f"}
 _BLACK, _BLUE, _ORANGE = (Style(color=colour) for colour in COLOURS[:3])
 
@@ -83,7 +85,7 @@ def _responses(est: Estimate) -> list[Figure]:
     return [
         _figure(
             f"Frequency response, {measured.input_names[i]} to {measured.output_names[o]}",
-            _of_the_data(est),
+            _of_the_data(est, measured),
             bode_traces(bode_curve(data, model, (o, i), scattered=True), "markers")
             + bode_traces(bode_curve(fitted, model, (o, i))),
             520,
@@ -95,11 +97,13 @@ def _responses(est: Estimate) -> list[Figure]:
     ]
 
 
-def _of_the_data(est: Estimate) -> str:
+def _of_the_data(est: Estimate, measured: FrequencyResponse) -> str:
     """What is said of the points."""
     zoom = "Drag to zoom, double-click to see all again."
     if isinstance(est.data[0], FrequencyResponse):
         return f"{zoom} The data are the response that was fitted."
+    if isinstance(measured, LocalResponse):
+        return f"{zoom} The data are told apart by input with local polynomials."
     return (
         f"{zoom} The data are the ratio of the DFTs, whose scatter at weak lines is no fault of "
         "the model."
@@ -123,6 +127,13 @@ def _measured(est: Estimate) -> FrequencyResponse | None:
     same = [r for r in records(est) if r.n_samples == first.n_samples and r.dt == first.dt]
     try:
         return etfe(same if first.n_inputs > 1 else first, est.band)
+    except InputError:
+        pass
+    # several inputs at once are told apart where the response is smooth from line to line
+    if first.n_inputs < 2 or first.n_samples > _MOST:
+        return None
+    try:
+        return local_polynomial(first, band=est.band)
     except InputError:
         return None
 
