@@ -283,3 +283,15 @@ def test_times_beyond_all_digits(largest, where, tmp_path):
 def test_values_beyond_all_differences_beside_no_time(tmp_path):
     pd.DataFrame({"u": [1.7e308, -1.7e308] * 30, "y": T}).to_csv(tmp_path / "a.csv", index=False)
     assert fq.read(tmp_path / "a.csv", inputs="u", dt=0.01).n_samples == N
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).max == np.finfo(float).max, reason="no long doubles")
+@pytest.mark.filterwarnings("error")
+def test_long_doubles_that_no_double_holds(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    y = np.cos(T).astype(np.longdouble)
+    y[7] = np.longdouble(10) ** 4000
+    with h5py.File(tmp_path / "long.h5", "w") as file:
+        file["time"], file["u"], file["y"] = T, np.sin(T), y
+    with pytest.raises(InputError, match=r"long\.h5.*y.*7"):
+        fq.read(tmp_path / "long.h5", inputs="u", outputs="y")

@@ -43,7 +43,9 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
         try:
             x = np.squeeze(np.asarray(in_numbers(value)))
             # complex samples stay so: who uses that column is told
-            x = x if x.dtype.kind == "c" and x.imag.any() else x.real.astype(float)
+            # a long double beyond a double is no number, as whoever uses that column is told
+            with np.errstate(over="ignore", invalid="ignore"):
+                x = x if x.dtype.kind == "c" and x.imag.any() else x.real.astype(float)
         except (TypeError, ValueError):
             continue
         if not x.size:
