@@ -199,8 +199,8 @@ class Record(Signals):
     ) -> Record:
         """The record with white Gaussian noise on every output.
 
-        ``std`` is its standard deviation, one for all outputs or one for each; ``snr`` (dB) says
-        instead how much more power each output has than its noise, its mean left out. Raises
+        ``std`` is its standard deviation, one or one an output; ``snr`` (dB) the power of outputs
+        over it, means left out. An input drawn with the same ``seed`` is this very noise. Raises
         ValueError for a negative or non-finite ``std``, another number of them, or both or none.
         """
         size = noise_sizes(self.outputs, std, snr)
