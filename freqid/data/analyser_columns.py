@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -110,7 +111,7 @@ def _magnitude(names: Sequence[str], phase: str | None, units: Mapping[str, str]
 
 def _common(a: str, b: str) -> int:
     """How many letters two names begin with alike."""
-    return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), len(b))
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(a, b, strict=False)))
 
 
 def _in_decibel(name: str, units: Mapping[str, str]) -> bool:

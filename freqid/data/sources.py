@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
+
+import numpy as np
 
 from freqid.lti import Hold, InputHolds
 
@@ -29,67 +32,57 @@ def source(data: object) -> str | None:
         return None
 
 
-def that_reads(function: Callable[P, Made]) -> Callable[P, Made]:
-    """A function that reads data, which remembers how it was called."""
+def _remembering(
+    function: Callable[P, Made],
+    begin: Callable[[Sequence[object]], tuple[str | None, Sequence[str | None], Sequence[object]]],
+) -> Callable[P, Made]:
+    """The function, of whose results the call is known: ``begin`` splits its positional arguments
+    into what it is called on, texts of data, and the others.
+    """
 
     @wraps(function)
     def called(*args: P.args, **options: P.kwargs) -> Made:
         found = function(*args, **options)
-        given = _written(args, options)
-        if given is not None:
-            _CALLS[found] = f"fq.{function.__name__}({given})"
+        owner, data, others = begin(args)
+        given = [in_python(v) for v in (*others, *options.values())]
+        told = [*data, *given[: len(others)]]
+        told += [t and f"{n}={t}" for n, t in zip(options, given[len(others) :], strict=True)]
+        if owner is not None and None not in told and all(map(str.isidentifier, options)):
+            _CALLS[found] = f"{owner}.{function.__name__}({', '.join(map(str, told))})"
         return found
 
     return called
+
+
+def that_reads(function: Callable[P, Made]) -> Callable[P, Made]:
+    """A function that reads data, which remembers how it was called."""
+    return _remembering(function, lambda args: ("fq", (), args))
 
 
 def that_follows(method: Callable[P, Made]) -> Callable[P, Made]:
     """A method of data that makes others of them, which remember how: ``.decimate(10)``."""
-
-    @wraps(method)
-    def called(*args: P.args, **options: P.kwargs) -> Made:
-        found = method(*args, **options)
-        before = source(args[0])
-        given = _written(args[1:], options)
-        if before is not None and given is not None:
-            _CALLS[found] = f"{before}.{method.__name__}({given})"
-        return found
-
-    return called
+    return _remembering(method, lambda args: (source(args[0]), (), args[1:]))
 
 
 def that_estimates(function: Callable[P, Made]) -> Callable[P, Made]:
     """A function of records that makes a response, which remembers the call and theirs."""
 
-    @wraps(function)
-    def called(*args: P.args, **options: P.kwargs) -> Made:
-        found = function(*args, **options)
+    def begin(args: Sequence[object]) -> tuple[str, list[str | None], Sequence[object]]:
         first = args[0] if args else None
-        several = list(first) if isinstance(first, list | tuple) else [first]
-        read = [source(d) for d in several]
-        given = _written(args[1:], options)
-        if given is not None and None not in read:
-            data = f"[{', '.join(map(str, read))}]" if isinstance(first, list | tuple) else read[0]
-            more = f", {given}" if given else ""
-            _CALLS[found] = f"fq.{function.__name__}({data}{more})"
-        return found
+        if not isinstance(first, list | tuple):
+            return "fq", [source(first)], args[1:]
+        each = [source(record) for record in first]
+        return "fq", [None if None in each else f"[{', '.join(map(str, each))}]"], args[1:]
 
-    return called
-
-
-def _written(args: Sequence[object], options: Mapping[str, object]) -> str | None:
-    """Arguments as they stand in a call; None where one of them cannot be written."""
-    texts = [in_python(v) for v in (*args, *options.values())]
-    if None in texts or not all(name.isidentifier() for name in options):
-        return None
-    named = zip(["" for _ in args] + [f"{name}=" for name in options], texts, strict=True)
-    return ", ".join(f"{name}{text}" for name, text in named)
+    return _remembering(function, begin)
 
 
 def in_python(value: object) -> str | None:
     """A value as Python writes it after ``import freqid as fq``; None for what is too much."""
     if hasattr(value, "tolist"):
-        # of numpy or pandas
+        # of numpy or pandas, of which long ones are not looked through
+        if np.asarray(value).size > _FEW:
+            return None
         value = value.tolist()
     if isinstance(value, Mapping):
         items = {repr(k): in_python(v) for k, v in value.items()}
@@ -109,5 +102,7 @@ def in_python(value: object) -> str | None:
         return f"fq.{value!r}"
     if isinstance(value, Path):
         return repr(str(value))
+    if isinstance(value, float) and not math.isfinite(value):
+        return f"float({str(value)!r})"
     known = value is None or isinstance(value, str | bool | int | float)
     return (repr(str(value)) if isinstance(value, str) else repr(value)) if known else None

@@ -158,7 +158,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         verdict=Verdict(verdict["grade"], list(verdict["reasons"])),
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"])
                   for w in kept["findings"]],
-        parameters=with_tied(table, est, Z95),
+        _parameters=with_tied(table, est, Z95),
         digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip

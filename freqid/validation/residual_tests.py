@@ -21,7 +21,6 @@ from freqid.fitting import Estimate, in_order_of, line_errors, met
 from freqid.lti import Hold
 from freqid.models import ModelLike, as_model
 from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
-from freqid.validation.residual_table import residual_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,6 +66,7 @@ def residual_test(
     >>> bool(fq.residual_test(fq.first_order(), record)["passed"].all())
     True
     """
+    from freqid.validation.residual_table import ResidualTable
 
     lags = whole("lags", lags)
     if isinstance(record, StampedRecord):
@@ -124,7 +124,7 @@ def residual_test(
             told = _coherence(e[:, o], u[:, i], record.dt, limits)
             if told is not None:
                 rows.append(_row("coherence", output, name, *told))
-    table = residual_table(rows)
+    table = ResidualTable(rows)
     table.attrs["correlations"] = [
         {"test": t, "output": o, "input": i, "values": v.tolist(), "limit": float(lim)}
         for t, o, i, v, lim in curves
@@ -174,6 +174,7 @@ def _coherence(
 
 def _of_response(c: Comparison) -> pd.DataFrame:
     """What is left of a response, in units of its own standard error, line by line."""
+    from freqid.validation.residual_table import ResidualTable
 
     frf = c.record
     assert isinstance(frf, FrequencyResponse)
@@ -202,7 +203,7 @@ def _of_response(c: Comparison) -> pd.DataFrame:
             rows.append(
                 _row("whiteness", output, name, z, float(null.isf(_LEVEL)), float(null.sf(z)))
             )
-    table = residual_table(rows)
+    table = ResidualTable(rows)
     table.attrs["correlations"] = []
     return table
 

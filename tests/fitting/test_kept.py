@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import freqid as fq
@@ -147,3 +148,16 @@ def test_what_is_refused(tmp_path):
     path.write_text(json.dumps(good)[:200])
     with pytest.raises(ValueError, match="is not JSON"):
         fq.load(path)
+
+
+def test_intervals_inside_bounds_are_kept(tmp_path):
+    u = fq.chirp(10, 80, 2, 1e-3)
+    record = fq.simulate(fq.two_mass(fm=1e-6), u, 1e-3).with_noise(1.0, seed=7)
+    est = fq.fit(fq.two_mass().with_bounds(fm=(0.0, 1.0)), record, band=(10, 80))
+    assert est.parameters.loc["fm", "lower"] == 0.0
+    assert est["fm"] - 1.96 * est.parameters.loc["fm", "std"] < 0
+    est.save(tmp_path / "a.json")
+    kept = fq.load(tmp_path / "a.json").parameters
+    pd.testing.assert_frame_equal(kept, est.parameters)
+    kept.loc["fm", "value"] = 1.0
+    assert fq.load(tmp_path / "a.json").parameters.loc["fm", "value"] != 1.0

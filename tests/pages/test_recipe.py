@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.data import in_python
 
 
 @pytest.fixture(scope="module")
@@ -159,16 +160,33 @@ print(*est.values.tolist(), sep="\\n")
 """
 
 
-@pytest.mark.parametrize("uses", ["np.eye(1)", "GAIN * np.eye(1)"], ids=["alone", "of a script"])
-def test_of_a_plant_in_a_script(uses, file, tmp_path):
-    (tmp_path / "script.py").write_text(SCRIPT.format(own=OWN.replace("[[1.0]]", uses)))
+@pytest.mark.parametrize(
+    ("taken", "uses"),
+    [
+        ("a, b", "np.eye(1)"), ("a, b", "[[float(bool(freqid.__version__))]]"),
+        ("a, b", "GAIN * np.eye(1)"), ("a, b, c=GAIN", "c * np.eye(1)"),
+        ("a, b", "(lambda: GAIN * np.eye(1))()"),
+    ],
+    ids=["alone", "freqid", "of a script", "a default of it", "a function inside"],
+)  # fmt: skip
+def test_of_a_plant_in_a_script(taken, uses, file, tmp_path):
+    own = OWN.replace("[[1.0]]", uses).replace("a, b):", f"{taken}):")
+    own = own.replace("import freqid as fq", "import freqid\nimport freqid as fq")
+    (tmp_path / "script.py").write_text(SCRIPT.format(own=own))
     run = subprocess.run(
         [sys.executable, "script.py", file], cwd=tmp_path, capture_output=True, text=True,
         check=True,
     )  # fmt: skip
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     code = html.unescape(re.search(r'<pre id="call">(.*?)</pre>', page, re.S)[1])
-    assert ("model = ..." in code) == ("GAIN" in uses), code
-    if "GAIN" not in uses:
+    assert ("model = ..." in code) == ("GAIN" in taken + uses), code
+    if "GAIN" not in taken + uses:
         values = np.array(run.stdout.split(), dtype=float)
         np.testing.assert_allclose(again(code, tmp_path), values, rtol=1e-9)
+
+
+def test_numbers_that_are_none_are_written_as_python_reads_them():
+    for value in (np.inf, -np.inf, (10.0, np.inf), {"k": np.float64(-np.inf)}):
+        assert eval(in_python(value)) == value
+    assert np.isnan(eval(in_python(np.nan)))
+    assert in_python(np.zeros(10**6)) is None

@@ -1,6 +1,7 @@
 """Noise weights, error bars and validation against simulation and closed forms."""
 
 import dataclasses
+import pickle
 import re
 
 import control
@@ -330,3 +331,11 @@ def test_a_residual_test_draws_itself(plant, slow):
     assert len(axes) == len(table.attrs["correlations"])
     assert "lag / samples" in axes[-1].get_xlabel()
     assert type(table[table["passed"]]).__name__ == "DataFrame"
+
+
+def test_the_table_of_a_test_can_be_pickled(plant, slow):
+    table = fq.residual_test(plant, slow)
+    again = pickle.loads(pickle.dumps(table))
+    assert again.equals(table)
+    assert again.attrs == table.attrs
+    assert type(again) is type(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import datetime
 import inspect
@@ -110,19 +111,32 @@ def _spelled(function: Callable[..., object]) -> tuple[list[str], str] | None:
     """Imports and text of a function that uses nothing else of its script; None for others."""
     if not isinstance(function, types.FunctionType) or not function.__name__.isidentifier():
         return None
-    used = inspect.getclosurevars(function)
-    if used.nonlocals or not all(isinstance(g, types.ModuleType) for g in used.globals.values()):
-        return None
     try:
         text = inspect.getsource(function)
     except (OSError, TypeError):
         return None
+    if not text.startswith("def ") or function.__closure__:
+        return None
+    heading = ast.parse(text).body[0]
+    assert isinstance(heading, ast.FunctionDef)
+    parts = [heading.args, *([heading.returns] if heading.returns else [])]
+    names = {n.id for part in parts for n in ast.walk(part) if isinstance(n, ast.Name)}
+    names |= _names_in(function.__code__)
+    used = {n: function.__globals__[n] for n in sorted(names) if n in function.__globals__}
+    if not all(isinstance(g, types.ModuleType) for g in used.values()):
+        return None
     imports = [
         f"import {module.__name__}" + (f" as {name}" if name != module.__name__ else "")
-        for name, module in used.globals.items()
-        if module.__name__ != "freqid"
+        for name, module in used.items()
+        if name != "fq"
     ]
-    return (imports, text.rstrip()) if text.startswith("def ") else None
+    return imports, text.rstrip()
+
+
+def _names_in(code: types.CodeType) -> set[str]:
+    """Names that code, or a function inside it, looks up around it, attributes among them."""
+    inside = [_names_in(c) for c in code.co_consts if isinstance(c, types.CodeType)]
+    return set(code.co_names).union(*inside)
 
 
 def _ready_made(model: GreyBox) -> str | None:
