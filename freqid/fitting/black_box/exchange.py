@@ -19,6 +19,8 @@ from freqid.fitting.black_box.rational_lines import Fitted, RationalLines
 _ROUNDS, _TRIED, _GAIN = 4, 4, 1e-4
 # places of narrow modes, half as wide as so many lines, and of wide ones at so many radii
 _NARROW, _LINES_WIDE, _WIDE, _RADII = 160, 2.0, 24, (0.6, 0.9, 0.97)
+# where no mode explains this part of what the least missed one is worth none takes its place
+_WORTH = 0.05
 # steps of a descent on trial
 TRIAL_STEPS = 12
 # poles that are closer than this part of their distance from the circle are one
@@ -56,16 +58,36 @@ def _same(poles: ComplexArray, others: ComplexArray) -> bool:
     return bool((apart.min(axis=1) <= _NEAR * np.abs(1 - np.abs(poles))).all())
 
 
+def _least_worth(lines: RationalLines, best: Fitted) -> float:
+    """What the cost rises by without the real pole, or the pair, that is least missed; of one alone
+    nothing, for what stands next to it is not all that it explains.
+    """
+    groups = [[p] if p.imag == 0 else [p, p.conj()] for p in best.poles[best.poles.imag >= 0]]
+    if len(groups) == 1:
+        return 0.0
+    rest = [np.concatenate(groups[:i] + groups[i + 1 :]) for i in range(len(groups))]
+    return min(map(lines.cost, rest)) - best.cost
+
+
 def _asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
-    """The pairs, and the real pole, that explain most of what is left, one for each place."""
+    """The pairs, and the real pole, that explain most of what is left, one for each place; none
+    where each explains little beside the mode whose place it would take.
+    """
     real = np.array(_REAL, complex)
     costs = [lines.cost(np.append(best.poles, r)) for r in real]
-    return [*pairs_asked_for(lines, best, _TRIED), real[[int(np.argmin(costs))]]]
+    pairs, most = pairs_asked_for(lines, best, _TRIED)
+    if max(most, best.cost - min(costs)) < _WORTH * _least_worth(lines, best):
+        return []
+    return [*pairs, real[[int(np.argmin(costs))]]]
 
 
 @np.errstate(all="ignore")
-def pairs_asked_for(lines: RationalLines, best: Fitted, count: int) -> list[ComplexArray]:
-    """So many pairs of poles that explain most of what is left, one for each place."""
+def pairs_asked_for(
+    lines: RationalLines, best: Fitted, count: int
+) -> tuple[list[ComplexArray], float]:
+    """So many pairs of poles that explain most of what is left, one for each place, and how much
+    of the cost the first of them does.
+    """
     pairs = _candidates(lines.w)
     gains = _gains(lines, lines.residual(best), pairs)
     picked: list[ComplexArray] = []
@@ -76,7 +98,7 @@ def pairs_asked_for(lines: RationalLines, best: Fitted, count: int) -> list[Comp
             picked.append(np.array([p, p.conj()]))
         if len(picked) == count:
             break
-    return picked
+    return picked, float(gains.max(initial=0.0))
 
 
 def _candidates(w: ComplexArray) -> ComplexArray:
@@ -95,10 +117,11 @@ def _candidates(w: ComplexArray) -> ComplexArray:
 
 def _gains(lines: RationalLines, left: ComplexArray, poles: ComplexArray) -> FloatArray:
     """What a pair of poles alone explains of what is left, (poles,)."""
-    section = lines.driven / ((lines.w - poles[:, None]) * (lines.w - poles[:, None].conj()))
-    second = section * lines.w
-    a, b = (np.abs(section) ** 2).sum(axis=1), (np.abs(second) ** 2).sum(axis=1)
-    c = (section.conj() * second).real.sum(axis=1)
-    x, y = (section.conj() @ left).real, (second.conj() @ left).real
+    w = lines.w
+    # the columns of the numerator's two terms are s and s w: all sums of products from those of s
+    s = lines.driven / ((w - poles[:, None]) * (w - poles[:, None].conj()))
+    power = np.square(s.real) + np.square(s.imag)
+    a, c, b = (power @ np.array([np.ones(len(w)), w.real, np.abs(w) ** 2]).T).T
+    x, y = (s @ np.array([left.conj(), w * left.conj()]).T).real.T
     gains = (b * x**2 - 2 * c * x * y + a * y**2) / (a * b - c**2)
     return np.where(np.isfinite(gains), gains, 0)

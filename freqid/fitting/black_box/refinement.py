@@ -106,7 +106,7 @@ def with_a_pair(
     own, unit = lines.below(poles), lines.sizes[0] ** 2
     if own is None:
         raise np.linalg.LinAlgError("the poles stand for no model")
-    tried = [*pairs, *pairs_asked_for(lines, own, 1)]
+    tried = [*pairs, *pairs_asked_for(lines, own, 1)[0]]
     met = [lines.below(np.append(own.poles, pair), TRIAL_STEPS) for pair in tried]
     best = min((f for f in met if f is not None), key=lambda f: f.cost, default=own)
     if len(best.poles) == len(poles) or best.cost * unit > worth:
