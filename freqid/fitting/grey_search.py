@@ -81,9 +81,9 @@ def _search(
     if found is None:
         every = sum(e.n_lines for e in spectral)
         share = sum(e.n_lines for e in few) / every
-        found = _searched(Surveyed(structure, at_lines, floor, lines, share), scout, options)
-        partial_ = share < 1 and options.n_starts is None
-        if partial_ and (not found.sure or (not in_time and _misled(objective, found))):
+        part = share < 1 and options.n_starts is None
+        found = _searched(Surveyed(structure, at_lines, floor, lines, share, part), scout, options)
+        if part and (not found.sure or (not in_time and _misled(objective, found))):
             # what so many lines leave open more of them may tell
             more = thinned_to(spectral, _MORE * lines)
             wide = Objective(structure, more)
@@ -115,13 +115,16 @@ def _misled(objective: Objective, found: Found) -> bool:
 
 @dataclass(frozen=True)
 class Surveyed:
-    """What is searched: a structure on about so many ``lines`` of its data, a ``share`` of all."""
+    """What is searched: a structure on about so many ``lines`` of its data, a ``share`` of all;
+    whether more of them may follow, being only a ``part``.
+    """
 
     structure: GreyStructure
     readings: Sequence[Reading]
     floor: float
     lines: int
     share: float
+    part: bool = False
 
 
 def _searched(
@@ -151,7 +154,7 @@ def _searched(
     hidden = partial(_hidden, structure, [r.hold for r in readings])
     aliased = (lambda x: False) if hidden(start) else hidden
     guide = guide_of(beside, structure, few, data.share)
-    search = Search(scout, guide, data.floor, aliased, deepened)
+    search = Search(scout, guide, data.floor, aliased, deepened, data.part)
     if beside is None and isinstance(structure, PlacedStructure):
         # nothing says when it is enough, and each start is a fit of everything
         search.most = _ALONE

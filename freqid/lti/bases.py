@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from freqid.checks import Array, ComplexArray, FloatArray
+from freqid.checks import Array, BoolArray, ComplexArray, FloatArray
 from freqid.lti.eigen_basis import EigenBasis
 from freqid.lti.schur_basis import SchurBasis
 from freqid.lti.state_space import StateSpace
@@ -68,25 +68,41 @@ def basis_of(at: StateSpace, derivative: StateSpace | None = None) -> Basis:
 def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> EigenBasis:
     """A batch of plants (S, …) in their eigenvectors; not finite where those are badly conditioned.
 
-    The states are balanced as those of the first finite plant are, which the others resemble.
+    The states are balanced as those of the first finite plant are, which the others may resemble;
+    those that do not are balanced on their own.
     """
     if derivative is None:
         derivative = at.still()
     finite = np.asarray(np.all([np.isfinite(M).all(axis=(1, 2)) for M in at], axis=0))
     first = int(np.argmax(finite))
+    A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1]))
     scale = _state_scale(StateSpace(*(np.nan_to_num(M[first]) for M in at)))
-    A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1])) * scale / scale[:, None]
-    eigenvalues, V = np.linalg.eig(A)
+    eigenvalues, V, inverse, good = _eigenvectors_of_many(A, scale)
+    others = np.flatnonzero(finite & ~good)
+    if len(others):
+        own = np.array([_state_scale(StateSpace(*(M[i] for M in at))) for i in others])
+        found = _eigenvectors_of_many(A[others], own)
+        eigenvalues[others], V[others], inverse[others], good[others] = found
+    eigenvalues[~(finite & good)] = np.nan
+    return EigenBasis(at, derivative, (eigenvalues, V, inverse))
+
+
+def _eigenvectors_of_many(
+    A: FloatArray, scale: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray, BoolArray]:
+    """Eigenvalues, V and V⁻¹ of A (S, n, n) by the scales (n,) or (S, n) of the states, and which
+    are well conditioned.
+    """
+    eigenvalues, V = np.linalg.eig(A * scale[..., None, :] / scale[..., :, None])
     V = V.astype(complex, copy=False)
     # a defective matrix has eigenvectors that are parallel, and no inverse
     volume: Array = np.abs(np.linalg.det(V))
     singular = ~(volume > 1 / WORST_CONDITION**2)
     V[singular] = np.eye(V.shape[-1])
     inverse = np.linalg.inv(V)
-    bad = singular | ~finite | ~(np.abs(inverse).max(axis=(1, 2)) * len(scale) < WORST_CONDITION)
-    eigenvalues = eigenvalues.astype(complex)
-    eigenvalues[bad] = np.nan
-    return EigenBasis(at, derivative, (eigenvalues, V * scale[:, None], inverse / scale))
+    well = np.abs(inverse).max(axis=(1, 2)) * A.shape[-1] < WORST_CONDITION
+    vectors = V * scale[..., :, None], inverse / scale[..., None, :]
+    return eigenvalues.astype(complex), *vectors, np.asarray(well & ~singular)
 
 
 def eigenvalues_and_derivatives(A: FloatArray, dA: FloatArray) -> tuple[ComplexArray, ComplexArray]:

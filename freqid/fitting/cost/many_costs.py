@@ -65,6 +65,17 @@ class ManyCosts:
         self.Y = np.stack([e.lines.Y for e in experiments])
         self.energy = np.array([e.energy for e in experiments])
 
+    @classmethod
+    def repeated(
+        cls, structure: GreyStructure, experiment: SpectralExperiment, count: int
+    ) -> ManyCosts:
+        """Those of one record at ``count`` points."""
+        made = cls(structure, [experiment])
+        made.U = np.broadcast_to(made.U, (count, *made.U.shape[1:]))
+        made.Y = np.broadcast_to(made.Y, (count, *made.Y.shape[1:]))
+        made.energy = np.repeat(made.energy, count)
+        return made
+
     def thinned(self, part: float, evenly: bool = False) -> ManyCosts:
         """About a ``part`` of the lines, weighted so that costs stay comparable."""
         kept, weight = self.first.lines.spread(part, evenly)

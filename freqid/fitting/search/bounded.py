@@ -70,7 +70,10 @@ def within_bounds(
         if small or idle >= _IDLE or damping > _MOST:
             # on the way to a bound that it may not reach it is no minimum
             ends = reach == 1 or gain <= _COARSE * point.cost
-            return (x, point, "minimum" if ends else "edge") if small or taken else None
+            if not (small or taken):
+                return None
+            at, there = _onto(objective, x, point, step)
+            return at, there, "minimum" if ends else "edge"
         trial = objective.point(x + step)
         won = -np.inf if trial is None else point.cost - trial.cost
         if trial is not None and won > _TAKEN * gain:
@@ -86,6 +89,18 @@ def within_bounds(
             continue
         damping, growth = damping * growth, 2 * growth
     return None if point is None else (x, point, "limit")
+
+
+def _onto(
+    objective: Objective, x: FloatArray, point: Point, step: FloatArray
+) -> tuple[FloatArray, Point]:
+    """The end of a search, on the bounds that a last step would reach."""
+    lower, upper = objective.structure.lower, objective.structure.upper
+    at = np.where(x + step <= lower, lower, np.where(x + step >= upper, upper, x))
+    if (at == x).all() or np.abs(at - x).max() > _LAST_STEP:
+        return x, point
+    there = objective.point(at)
+    return (x, point) if there is None else (at, there)
 
 
 def _small(step: FloatArray, gain: float, least: float) -> bool:

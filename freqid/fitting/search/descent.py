@@ -115,6 +115,8 @@ def _fallen(objective: Objective) -> str:
 
 # a Gauss-Newton step of this relative size needs no second look: the next one is its square
 _LAST_STEP = 1e-7
+# such steps in a row
+_STRAIGHT = 12
 
 
 def polish(
@@ -129,13 +131,26 @@ def polish(
 
     The unknowns are of order one. A step below ``last_step`` is taken without a second look.
     """
+    end, x = _straight_down(objective, x, last_step, tolerance)
+    return minimise(objective, x, tolerance, limit) if end is None else end
+
+
+def straight_down(objective: Objective, x: FloatArray) -> Solution | None:
+    """Where a few Gauss-Newton steps lead, each to less; None where one does not."""
+    return _straight_down(objective, x, _LAST_STEP, 1e-14)[0]
+
+
+def _straight_down(
+    objective: Objective, x: FloatArray, last_step: float, tolerance: float
+) -> tuple[Solution | None, FloatArray]:
+    """The end of Gauss-Newton steps that all went down, and the last point that did."""
     point = objective.point(x)
     P = len(x)
-    for _ in range(12):
+    for _ in range(_STRAIGHT):
         if point is None or len(point.triangle) <= P:
             break
         if point.cost <= objective.rounding:
-            return Solution(x, point, True, "The cost is down to rounding.")
+            return Solution(x, point, True, "The cost is down to rounding."), x
         step, c = _gauss_newton(point), point.triangle[:P, P]
         if step is None or _outside(objective.structure, x + step):
             break
@@ -145,12 +160,12 @@ def polish(
             triangle = point.triangle.copy()
             triangle[:P, P] = 0
             end = Point(triangle, point.initial, [p * left for p in point.parts])
-            return Solution(x + step, end, True, "Gauss-Newton steps became negligible.")
+            return Solution(x + step, end, True, "Gauss-Newton steps became negligible."), x
         trial = objective.point(x + step)
         if trial is None or trial.cost > point.cost:
             break
         x, point = x + step, trial
-    return minimise(objective, x, tolerance, limit)
+    return None, x
 
 
 def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
