@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.fitting.cost.many_starts import many_starts
 from freqid.fitting.cost.nuisance import Delay, HoldPeriod
+from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.reading import Reading
 from freqid.lti import sampled_response
 from freqid.lti.eigen_basis import EigenBasis
 from freqid.lti.polynomials import PolynomialBasis
@@ -121,3 +124,33 @@ def test_a_sampled_plant_has_as_many_inputs_as_its_columns():
         assert G.shape == (outputs, inputs, len(OMEGA))
         wanted = model.to_control().sample(DT)(np.exp(1j * OMEGA * DT), squeeze=False)
         np.testing.assert_allclose(G, wanted, rtol=1e-9)
+
+
+def test_plants_of_a_batch_do_not_lose_one_another():
+    """One that ran away to 1e14 gave its scale to all others, and left them without a response."""
+    model = fq.drivetrain(3)
+    structure = GreyStructure(model)
+    wild = np.where(np.array(structure.names) == "J2", 3e14, 1.0)
+    points = np.array([wild, structure.start, 1.3 * structure.start])
+    G, dG = structure.sensitivities(points, OMEGA, fq.ZeroOrderHold(DT))
+    for i in (1, 2):
+        alone, slopes = sampled_response(structure.realise(points[i]), OMEGA, fq.ZeroOrderHold(DT))
+        assert G[i] == pytest.approx(alone, rel=1e-9)
+        assert np.abs(dG[i] - slopes).max() <= 1e-8 * np.abs(slopes).max()
+
+
+def test_a_batch_of_starts_has_the_cost_of_each():
+    record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 2, 1e-3), 1e-3).decimate(2)
+    record = record.with_noise(0.02 * record.y.std(), seed=1)
+    structure = GreyStructure(fq.two_mass())
+    experiment = Reading.of(record, "zoh", None).lines()
+    objective = Objective(structure, [experiment])
+    x = structure.start * np.random.default_rng(1).uniform(0.8, 1.2, (5, len(structure.start)))
+    cost, gradient, curvature = many_starts(structure, [experiment], 5, 10**9).normal(
+        x, np.arange(5)
+    )
+    for i, row in enumerate(x):
+        point = objective.point(row)
+        assert cost[i] == pytest.approx(point.cost, rel=1e-9)
+        assert gradient[i] == pytest.approx(point.jacobian.T @ point.residual, rel=1e-6)
+        assert curvature[i] == pytest.approx(point.jacobian.T @ point.jacobian, rel=1e-6)
