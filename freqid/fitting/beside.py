@@ -284,14 +284,13 @@ def guide_of(
 ) -> Guide:
     """What a search on some lines, a ``share`` of all, aims at."""
     if beside is None:
-        targets = log_targets(experiments, None)
-        return Guide(targets)
+        return Guide(partial(log_targets, experiments, None))
     smooth = beside.at_place
     blunted = partial(log_targets, experiments, smooth, ROUND_LINES)
     # a hold whose period is unknown is not one that the black box has
     bound = None if structure.unknown else bound_of(beside, structure, share)
     settled = all(b.solution.converged for b in beside.boxes)
-    targets = log_targets(experiments, smooth)
+    aims = partial(log_targets, experiments, smooth)
     if bound is None:
-        return Guide(targets, None, blunted, settled=settled)
-    return Guide(targets, bound, blunted, partial(beside.distances, experiments[0]))
+        return Guide(aims, None, blunted, settled=settled)
+    return Guide(aims, bound, blunted, partial(beside.distances, experiments[0]))

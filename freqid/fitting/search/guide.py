@@ -14,7 +14,7 @@ from freqid.fitting.search.stopping import Bound
 _BLUNT = 1.0
 
 
-def _nothing(damping: float = 0.0) -> Sequence[LogResponse]:
+def _nothing(damping: float) -> Sequence[LogResponse]:
     return []
 
 
@@ -24,17 +24,22 @@ def _nowhere() -> Sequence[BoxDistance]:
 
 @dataclass(frozen=True)
 class Guide:
-    """Targets of the first stage from one start, empty for none; ``blunted`` gives those of many
-    starts together, at a damping of the responses, and ``near`` the distances from the black
-    boxes themselves. ``bound`` is what these cost on the same lines, None where there are none;
-    they are ``settled`` where they have come to a minimum.
+    """``aims`` gives the targets of the first stage from one start, empty for none; ``blunted``
+    those of many starts together, at a damping of the responses, and ``near`` the distances from
+    the black boxes themselves. ``bound`` is what these cost on the same lines, None where there
+    are none; they are ``settled`` where they have come to a minimum.
     """
 
-    targets: Sequence[LogResponse]
+    aims: Callable[[], Sequence[LogResponse]]
     bound: Bound | None = None
     blunted: Callable[[float], Sequence[LogResponse]] = _nothing
     near: Callable[[], Sequence[BoxDistance]] = _nowhere
     settled: bool = True
+
+    @cached_property
+    def targets(self) -> Sequence[LogResponse]:
+        """Those of one start, found when they are asked for."""
+        return self.aims()
 
     @cached_property
     def rounds(self) -> list[Sequence[LogResponse]]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy
 
-from freqid.checks import ComplexArray, FloatArray, IntArray
+from freqid.checks import Array, ComplexArray, FloatArray, IntArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.objective import Structure
@@ -23,31 +23,47 @@ _LINES = 160
 _REACH = 16.0
 
 
-class LogStructure:
+class Logarithms:
+    """Unknowns (…, P) by their logarithms beside a start, where that is not zero."""
+
+    def __init__(self, start: FloatArray) -> None:
+        self.start, self.log = start, start != 0
+
+    @property
+    def begin(self) -> FloatArray:
+        """Where the unknowns are those of the start."""
+        return np.where(self.log, 0.0, self.start)
+
+    def some(self, which: Array) -> Logarithms:
+        """Those of some of many starts."""
+        return Logarithms(self.start[which])
+
+    def value(self, xi: FloatArray) -> FloatArray:
+        """The unknowns at xi."""
+        reach = np.clip(np.where(self.log, xi, 0), -_REACH, _REACH)
+        return np.where(self.log, self.start * np.exp(reach), xi)
+
+    def slope(self, xi: FloatArray) -> FloatArray:
+        """Derivative of each unknown by its own logarithm."""
+        x = self.value(xi)
+        return np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
+
+
+class LogStructure(Logarithms):
     """A structure with every unknown that is not zero at the start replaced by its logarithm."""
 
     def __init__(self, inner: Structure, start: FloatArray) -> None:
-        self.inner, self.start = inner, start
-        self.log = start != 0
+        super().__init__(start)
+        self.inner = inner
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.array([inner.lower, inner.upper]) / np.where(self.log, start, 1)
             ends = np.where(self.log, np.log(np.maximum(ends, 0)), ends)
         ends.sort(axis=0)
         self.lower, self.upper = ends
 
-    def value(self, xi: FloatArray) -> FloatArray:
-        """The inner unknowns at xi."""
-        reach = np.clip(np.where(self.log, xi, 0), -_REACH, _REACH)
-        return np.where(self.log, self.start * np.exp(reach), xi)
-
     def realise(self, xi: FloatArray) -> Realisation:
         """The plant and its derivatives by xi."""
         return self.inner.realise(self.value(xi)).scaled(self.slope(xi))
-
-    def slope(self, xi: FloatArray) -> FloatArray:
-        """Derivative of each inner unknown by its own, (P,)."""
-        x = self.value(xi)
-        return np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
 
     def describe(self, xi: FloatArray) -> str:
         """The trial point in the user's words."""

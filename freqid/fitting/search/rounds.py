@@ -11,7 +11,7 @@ from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.many_starts import many_starts
 from freqid.fitting.cost.objective import Objective, ScannableStructure
-from freqid.fitting.search.batched import descend
+from freqid.fitting.search.batched import Answers, descend
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.log_stage import LogStructure
@@ -84,37 +84,51 @@ class Rounds:
                     continue
                 yield from self._below(promised)
             before = self.best
-            alike = yield from self._followed(places)
+            alike, apart = yield from self._followed(places)
             if near and not looked:
                 # signs that the first stage keeps, and what no start has met
                 own = Place(self.best.x, np.inf, 0)
-                yield from self._below(nearest([own, *places], self.structure, near))
+                yield from self._below(nearest([own, *apart], self.structure, near))
             # those that agree count when all that the round found was looked at
             same = alike > 0 and self.best.cost >= before.cost * (1 - _SAME)
             yield 0, alike, self.best if same else None, True
 
-    def _followed(self, places: Sequence[Place]) -> Generator[Visit, None, int]:
-        """The minima below places on the true cost; how many walks lead to the best so far."""
+    def _followed(
+        self, places: Sequence[Place]
+    ) -> Generator[Visit, None, tuple[int, Sequence[Place]]]:
+        """The minima below places on the true cost; how many walks lead to the best so far, and the
+        places that do not.
+        """
         self._least_log_cost = min([self._least_log_cost, *(place.cost for place in places)])
         hopeful = [p for p in places if p.cost <= HOPELESS * self._least_log_cost]
-        together = self._together(hopeful)
-        if together is None:
+        found = self._together(hopeful)
+        if found is None:
             for place in hopeful[:_FOLLOWED]:
                 end = self._one(np.clip(place.x, self.structure.lower, self.structure.upper))
                 if end is not None:
                     yield 0, place.visits, end, False
-            return 0
-        alike, others = together
-        for x, visits in others:
+            return 0, places
+        own, cost = found.cost[0], found.cost[1:]
+        alike = np.abs(cost - own) <= _SAME * own
+        last, count = -np.inf, 0
+        for i in np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable"):
+            if not cost[i] <= _WORSE * own or count == _FOLLOWED:
+                break
+            if alike[i] or cost[i] - last <= _SAME * own:
+                continue
+            last, count = cost[i], count + 1
             try:
-                yield 0, visits, polish(self.objective, x, limit=LIMIT, tolerance=ROUGH), False
+                x = found.values[1 + i]
+                end = polish(self.objective, x, limit=LIMIT, tolerance=ROUGH)
             except InputError:
                 continue
-        return alike
+            yield 0, hopeful[i].visits, end, False
+        agreed = [p for p, same in zip(hopeful, alike, strict=True) if same]
+        return sum(p.visits for p in agreed), [p for p in places if p not in agreed]
 
-    def _together(self, places: Sequence[Place]) -> tuple[int, list[tuple[FloatArray, int]]] | None:
-        """How many walks descend to the best so far, on some of the lines, and where others end,
-        unless that is well above; None where places are followed one by one.
+    def _together(self, places: Sequence[Place]) -> Answers | None:
+        """Where the best so far and the places lead on some of the lines; None where they are
+        followed one by one.
         """
         experiments = cast("Sequence[SpectralExperiment]", self.objective.experiments)
         batch = many_starts(self.structure, experiments, len(places) + 1, _LINES)
@@ -125,20 +139,7 @@ class Rounds:
             found = descend(batch, begin, last_step=_LAST_STEP, limit=_STEPS, gain=_KEPT)
         except Exception:  # the user's function may raise anything at one of the points
             return None
-        own, cost = found.cost[0], found.cost[1:]
-        if not np.isfinite(own):
-            return None
-        alike, last = 0, -np.inf
-        others: list[tuple[FloatArray, int]] = []
-        for i in np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable"):
-            if not cost[i] <= _WORSE * own or len(others) == _FOLLOWED:
-                break
-            if abs(cost[i] - own) <= _SAME * own:
-                alike += places[i].visits
-            elif cost[i] - last > _SAME * own:
-                others.append((found.values[1 + i], places[i].visits))
-                last = cost[i]
-        return alike, others
+        return found if np.isfinite(found.cost[0]) else None
 
     def _alike(self, places: Sequence[Place]) -> int:
         """How many walks lead as near to the black box as the best so far, where none leads nearer.
@@ -182,7 +183,7 @@ class Rounds:
         kept = LogStructure(self.objective.structure, x)
         second = Objective(kept, self.objective.experiments)
         try:
-            near = polish(second, np.where(kept.log, 0.0, x), _FIRST_STEP, LIMIT, _KEPT)
+            near = polish(second, kept.begin, _FIRST_STEP, LIMIT, _KEPT)
             return polish(self.objective, kept.value(near.x), limit=LIMIT, tolerance=ROUGH)
         except InputError:
             return None

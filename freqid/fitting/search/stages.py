@@ -30,6 +30,8 @@ _FIRST_LIMIT, _FIRST_STEP = 80, 0.02
 _DEEPENED = 3
 # evaluations of the last descent, which may follow a valley without an end
 _LAST_LIMIT = 400
+# part of the cost below which nothing is left to gain
+_EXACT = 1e-14
 # relative gain of the cost that ends a first stage
 _FIRST_GAIN = 1e-3
 
@@ -185,7 +187,7 @@ class Search:
     def _first_stage(self, start: FloatArray) -> FloatArray | None:
         structure = LogStructure(self.objective.structure, start)
         first_stage = Objective(structure, self.guide.targets)
-        xi = np.where(structure.log, 0.0, start)
+        xi = structure.begin
         try:
             # to a minimum which need only be near that of the second stage
             walked = polish(first_stage, xi, _FIRST_STEP, _FIRST_LIMIT, _FIRST_GAIN)
@@ -199,7 +201,11 @@ class Search:
         return structure.value(walked.x)
 
     def _finished(self, found: Found) -> Found:
-        """The best minimum, run to the end: its start was cut short, or ended roughly."""
+        """The best minimum, run to its end where its start was cut short or ended roughly."""
+        point = found.solution.point
+        left = point.triangle[:-1, -1]
+        if found.solution.converged and left @ left <= _EXACT * point.cost:
+            return found
         again = polish(self.objective, found.solution.x, limit=_LAST_LIMIT)
         if again.cost > found.solution.cost:
             return found

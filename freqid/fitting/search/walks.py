@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from freqid.checks import Array, FloatArray
 from freqid.fitting.cost.box_distance import BoxDistance
 from freqid.fitting.cost.objective import ScannableStructure
 from freqid.fitting.search.batched import descend
-from freqid.fitting.search.log_stage import LogResponse, LogStructure
+from freqid.fitting.search.log_stage import Logarithms, LogResponse
 
 # steps far off the axis, where resonances are smooth, and on it; the last step of a walk
 _SMOOTH, _SHARP, _LAST_STEP = 12, 40, 1e-3
@@ -32,21 +31,19 @@ class _LogBatch:
 
     def __init__(
         self,
-        structures: Sequence[LogStructure],
+        inner: ScannableStructure,
+        starts: FloatArray,
         targets: Sequence[LogResponse],
         leash: float,
     ) -> None:
-        self.structures, self.targets = structures, targets
-        energy = sum(t.energy for t in targets)
-        self.energy = np.full(len(structures), energy)
-        self.inner = cast(ScannableStructure, structures[0].inner)
-        self.leash = leash
+        self.inner, self.targets, self.leash = inner, targets, leash
+        self.unknowns = Logarithms(starts)
+        self.energy = np.full(len(starts), sum(t.energy for t in targets))
 
     def normal(self, x: FloatArray, which: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Cost, JᵀR and JᵀJ of some."""
-        some = [self.structures[i] for i in which]
-        values = np.array([s.value(row) for s, row in zip(some, x, strict=True)])
-        by = np.array([s.slope(row) for s, row in zip(some, x, strict=True)])
+        some = self.unknowns.some(which)
+        values, by = some.value(x), some.slope(x)
         rows = []
         for target in self.targets:
             at = target.omega, target.hold, target.place
@@ -82,7 +79,7 @@ def _sums(
     return np.einsum("sk,sk->s", r, r), (J @ r[..., None])[..., 0], J @ J.swapaxes(-1, -2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Place:
     """Where walks have led: the unknowns, the first stage's cost, and how many came here."""
 
@@ -104,12 +101,11 @@ def walked(
     x = starts
     cost = np.zeros(len(x))
     for i, now in enumerate(targets):
-        structures = [LogStructure(inner, row) for row in x]
-        batch = _LogBatch(structures, now, leashed * _LEASH * sum(t.n_rows for t in now))
-        begin = np.array([np.where(s.log, 0.0, s.start) for s in structures])
+        batch = _LogBatch(inner, x, now, leashed * _LEASH * sum(t.n_rows for t in now))
         limit = _SHARP if i == len(targets) - 1 else _SMOOTH
-        found = descend(batch, begin, last_step=_LAST_STEP, limit=limit, gain=_GAIN)
-        x = np.array([s.value(row) for s, row in zip(structures, found.values, strict=True)])
+        unknowns = batch.unknowns
+        found = descend(batch, unknowns.begin, last_step=_LAST_STEP, limit=limit, gain=_GAIN)
+        x = unknowns.value(found.values)
         cost = found.cost
     return _places(x, cost)
 
