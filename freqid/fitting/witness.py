@@ -41,8 +41,9 @@ from freqid.models import Model, observed_order
 _LEVEL = 0.01
 # gap between the costs, relative, in which no better minimum can hide
 _TOUCHES = 1e-3
-# relative standard error of a parameter that the data leave open; starts that have to agree then
-_OPEN, _WANTED = 0.5, 4
+# relative standard error of a parameter that the data leave open; starts that have to agree then,
+# and the level of the gap below which not even that tells that there is no minimum in it
+_OPEN, _WANTED, _RARE = 0.5, 4, 0.2
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
@@ -167,7 +168,7 @@ class Testimony:
                 "minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
                 "the right hold"
             )
-        if gap > _TOUCHES and undetermined and self.n_agreed < _WANTED:
+        if gap > _TOUCHES and undetermined and (self.n_agreed < _WANTED or p < _RARE):
             return "absent", (
                 f"a black box of order {order} explains the data no better ({numbers}), but they "
                 "are too noisy for it to tell one minimum from another"

@@ -54,6 +54,18 @@ def test_plants_whose_black_box_was_lost_itself(studies, case):
     assert est.cost <= from_truth.cost * (1 + studies[0].WORSE)
 
 
+@pytest.mark.parametrize("case", [46, 135, 203])
+def test_plants_that_the_data_leave_open_are_not_called_complete(studies, case):
+    """Costs 0.2 to 3 % above another minimum, in noise as large as the signal."""
+    from search import plants
+
+    plant, record, _, rng = plants.random_experiment(case)
+    est = fq.fit(plant, record, start=plants.moved(plant, rng, 3.0))
+    least = min(est.cost, fq.fit(plant, record).cost, fq.fit(plant, record, n_starts=30).cost)
+    missed = est.cost > least * (1 + studies[0].WORSE)
+    assert not (missed and est.witness.verdict == "complete")
+
+
 def test_a_valley_without_an_end_is_not_unanimity(studies):
     """Every start of a dozen drifts along it, to one cost, and the minimum is elsewhere."""
     from search import plants

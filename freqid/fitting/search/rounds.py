@@ -26,11 +26,11 @@ LIMIT, ROUGH = 120, 1e-10
 # places of a round that are followed up
 _FOLLOWED = 6
 # lines on which they are followed together; steps at the most, and the last of them
-_LINES, _STEPS, _LAST_STEP = 150, 40, 1e-4
+_LINES, _STEPS, _LAST_STEP, _ENDED = 150, 40, 1e-4, 1e-8
 # ends that cost so many times the best one's on these lines cost more on all
 _WORSE = 1.5
 # costs on these lines that agree to this belong to one minimum
-_SAME = 1e-4
+_SAME = 1e-6
 # what a place may promise beyond the best so far, for a promise is not exact; costs, as parts of
 # a black box's, that are alike
 _PROMISED, _LIKE = 2.0, 1e-5
@@ -136,7 +136,7 @@ class Rounds:
             return None
         begin = np.array([self.best.x, *(place.x for place in places)])
         try:
-            found = descend(batch, begin, last_step=_LAST_STEP, limit=_STEPS, gain=_KEPT)
+            found = descend(batch, begin, last_step=_LAST_STEP, limit=_STEPS, gain=_ENDED)
         except Exception:  # the user's function may raise anything at one of the points
             return None
         return found if np.isfinite(found.cost[0]) else None
