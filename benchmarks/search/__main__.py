@@ -13,13 +13,14 @@ from pathlib import Path
 
 from table import show
 
-from . import minima, orders, speed, store, witness
+from . import minima, orders, responses, speed, store, witness
 
 PARTS = {
     "minima": (minima.one, minima.summary, 5000),
     "near": (partial(minima.one, factor=1.2), minima.summary, 1000),
     "witness": (witness.one, witness.summary, 4000),
     "orders": (orders.one, orders.summary, 100),
+    "responses": (responses.one, responses.summary, 500),
     "speed": (speed.one, speed.summary, len(speed.CASES)),
 }
 
