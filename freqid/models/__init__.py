@@ -24,6 +24,7 @@ from freqid.models.transfer_function import (
     TransferFunction,
     chained,
     coefficients,
+    polynomials,
     rational_model,
 )
 from freqid.models.written import (

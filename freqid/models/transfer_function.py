@@ -171,9 +171,10 @@ def _chain_matrices(
     return A * scale, B * scale, C, D
 
 
-def rational_model(model: GreyBox, zeros: int, delay: float = 0.0) -> ContinuousModel:
-    """Polynomials in s of a chained grey box: the model that a user sees."""
-    at = model.state_space()
+def polynomials(at: StateSpace, zeros: int) -> tuple[FloatArray, FloatArray]:
+    """Denominator (poles + 1,) and numerators (outputs, inputs, zeros + 1) in s of a chained grey
+    box's matrices, highest powers first.
+    """
     p, m = at.D.shape
     n = len(at.A) // m
     a = np.real(np.poly(at.A[:n, :n]))
@@ -185,8 +186,14 @@ def rational_model(model: GreyBox, zeros: int, delay: float = 0.0) -> Continuous
             # det(sI − A + b c) = a(s) + c adj(sI − A) b
             full = np.real(np.poly(A - np.outer(b, c))) - a + at.D[o, i] * a
             numerators[o, i] = full[n - zeros :]
+    return a, numerators
+
+
+def rational_model(model: GreyBox, zeros: int, delay: float = 0.0) -> ContinuousModel:
+    """Polynomials in s of a chained grey box: the model that a user sees."""
+    at = model.state_space()
     names = tuple(model.inputs or ()), tuple(model.outputs or ())
-    return ContinuousModel(at, a, numerators, *names, delay)
+    return ContinuousModel(at, *polynomials(at, zeros), *names, delay)
 
 
 def coefficients(model: ContinuousModel) -> tuple[list[str], FloatArray]:

@@ -34,6 +34,7 @@ from freqid.models import (
     TransferFunction,
     chained,
     coefficients,
+    polynomials,
     rational_model,
 )
 
@@ -162,8 +163,13 @@ def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float)
         delay = x[structure.count] * unit if structure.unknown else spec.delay
         return rational_model(structure.at(x), spec.zeros, float(delay))
 
+    def polynomial_values(x: FloatArray) -> FloatArray:
+        matrices = structure.model.state_space(**structure.physical(x))
+        a, numerators = polynomials(matrices, spec.zeros)
+        return np.append(numerators, a[1:])
+
     def described(points: FloatArray) -> FloatArray:
-        values = np.array([coefficients(at(x))[1] for x in points])
+        values = np.array([polynomial_values(x) for x in points])
         late = points[:, structure.count :] * structure.scale[structure.count :]
         return np.concatenate([values, late], axis=1)
 
