@@ -85,7 +85,9 @@ class RationalLines:
         for e, end in zip(experiments, ends, strict=True):
             if e.transient is not None:
                 own = np.zeros(len(self.w), complex)
-                own[end - e.n_lines : end] = e.transient.factor
+                # of several poles that fold onto one only the one next to the line bends it
+                aliases = e.transient.aliases
+                own[end - e.n_lines : end] = aliases * e.transient.factor[::aliases]
                 self.free.append(own)
 
     def minimum(self, poles: ComplexArray) -> Fitted | None:

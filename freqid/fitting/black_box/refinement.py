@@ -51,7 +51,7 @@ def first_model(
     A descent ends with a step that gains the part ``gain`` of the cost. Raises ValueError where the
     lines are too few.
     """
-    if not all(e.single and e.one_to_one for e in experiments):
+    if not all(e.rational for e in experiments):
         return identify(experiments, order, feedthrough)
     # of very many lines a part will do: its minimum is next to that of all
     few = thinned_to(experiments, _LINES)

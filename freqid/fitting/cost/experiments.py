@@ -203,6 +203,13 @@ class SpectralExperiment:
         return self.lines.Y.shape[:2] == (1, 1) and self.lines.U.shape[:2] == (1, 1)
 
     @property
+    def rational(self) -> bool:
+        """Whether it is a rational function of one point at each line, the transient of a hold that
+        is remembered from a faster rate only nearly.
+        """
+        return self.single and self.lines.aliases == 1
+
+    @property
     def one_to_one(self) -> bool:
         """Whether each line takes the resolvent at one point alone."""
         free = self.transient.aliases if self.transient else 1
