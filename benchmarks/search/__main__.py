@@ -3,6 +3,7 @@
     cd benchmarks; python -m search              all of it: hours, resumed where it was interrupted
     cd benchmarks; python -m search --quick      a hundredth, about five minutes
     cd benchmarks; python -m search witness      one part
+    cd benchmarks; python -m search near --first 1000 --out again      other cases
 
 One line of a CSV file a case in ``--out``; delete it to begin anew.
 """
@@ -31,12 +32,13 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("search_results"))
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--count", type=int)
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
     given = parser.parse_args()
     for name in given.parts or PARTS:
         one, summary, count = PARTS[name]
         if given.quick:
             count = max(count // 100, 4)
-        cases = range(min(given.count or count, count))
+        cases = range(given.first, given.first + min(given.count or count, count))
         for row in summary(store.resumed(given.out / f"{name}.csv", cases, one)):
             show(*row)
 

@@ -166,8 +166,10 @@ class Search:
         beside the descent from the start. Raises InputError where that cannot be computed.
         """
         near = straight_down(self.objective, start)
-        if near is not None and rule.sure(Found(near)):
-            return Found(near)
+        if near is not None and rule.bound is not None:
+            straight = Found(near)
+            if rule.sure(straight) or rule.convinced(straight):
+                return straight
         walked = self._first_stage(start) if self.guide.targets else None
         if walked is not None and self.objective.point(walked) is not None:
             found = Found(polish(self.objective, walked, limit=LIMIT, tolerance=ROUGH))
