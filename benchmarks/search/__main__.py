@@ -39,8 +39,12 @@ def main():
         if given.quick:
             count = max(count // 100, 4)
         cases = range(given.first, given.first + min(given.count or count, count))
-        for row in summary(store.resumed(given.out / f"{name}.csv", cases, one)):
+        table = store.resumed(given.out / f"{name}.csv", cases, one)
+        for row in summary(table):
             show(*row)
+        if name == "speed" and not given.quick:
+            print(*speed.grid(table), sep="\n")
+            speed.picture(table, given.out / "speed.png")
 
 
 if __name__ == "__main__":

@@ -100,6 +100,41 @@ def one(case):
     }  # fmt: skip
 
 
+def picture(table, path):
+    """The grid: each way of reading a record, its ratios over the number of samples."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 4, figsize=(10, 3.2), sharey=True, layout="constrained")
+    for ax, (reading, part) in zip(axes, table.groupby("reading", sort=False), strict=True):
+        ratios = part.groupby("samples")["ratio"]
+        low, middle, high = ratios.min(), ratios.median(), ratios.max()
+        ax.fill_between(middle.index, low, high, color="C0", alpha=0.2, linewidth=0, label="range")
+        ax.loglog(middle.index, middle, "o-", color="C0", label="median")
+        right = part[part["leastsq_right"] & (part["start"] != "truth")]
+        ax.loglog(
+            right["samples"], right["ratio"], ".", color="C1", label="20 % off, leastsq right"
+        )
+        ax.axhline(1, color="0.5", linewidth=0.8)
+        ax.set_title(reading)
+        ax.set_xlabel("samples at full rate")
+        ax.set_xticks(middle.index, [f"{n // 1000}k" for n in middle.index])
+        ax.minorticks_off()
+    axes[0].set_ylabel("time of fit / time of leastsq")
+    axes[0].legend(fontsize=8)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def grid(table):
+    """Rows of the grid: median and range of the ratio, by reading and samples."""
+    for reading, part in table.groupby("reading", sort=False):
+        cells = [
+            f"{r.median():.2g} ({r.min():.2g} to {r.max():.2g})"
+            for _, r in part.groupby("samples")["ratio"]
+        ]
+        yield f"| {reading} | " + " | ".join(cells) + " |"
+
+
 def summary(table):
     """Rows for the printed table."""
     off = table[(table["start"] != "truth") & table["leastsq_right"]]

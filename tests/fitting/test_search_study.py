@@ -1,5 +1,6 @@
 """The short version of the studies in ``benchmarks/search``: a few cases of each."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -41,6 +42,37 @@ def test_orders_and_witness(studies):
     _, orders, _, witness = studies
     assert [orders.one(case)["mdl"] for case in range(3)] == [4, 4, 4]
     assert all(0 <= witness.one(case)["p"] <= 1 for case in range(4))
+
+
+@pytest.mark.parametrize("case", range(9))
+def test_responses_come_as_near_as_their_noise_allows(benchmarks, case):
+    """Orders 4 to 12 without a sample time: the noise, seen through the tangent at the truth."""
+    from search import responses
+
+    order, poles, residues, s, G, noise, std = responses.experiment(case)
+    frf = fq.FrequencyResponse(s.imag / (2 * np.pi), G + noise, variance=std**2)
+    est = fq.fit(fq.TransferFunction(order - 1, order), frf, weights="noise")
+    off = est.model.frequency_response(s.imag).response - G
+    bound = responses.cramer_rao(poles, residues, s, noise[0, 0], std[0, 0])
+    assert np.linalg.norm(off / std) <= 1.1 * bound
+
+
+def test_the_grid_of_times_is_drawn(benchmarks, tmp_path):
+    from search import speed
+
+    cells = [speed.CASES[i] for i in range(0, len(speed.CASES), 7)]
+    table = pd.DataFrame(
+        {
+            "samples": [c[0] for c in cells],
+            "start": [c[2] for c in cells],
+            "reading": [c[3] for c in cells],
+            "ratio": np.linspace(0.1, 9, len(cells)),
+            "leastsq_right": True,
+        }
+    )
+    speed.picture(table, tmp_path / "grid.png")
+    assert (tmp_path / "grid.png").stat().st_size > 5000
+    assert len(list(speed.grid(table))) == len(speed.READINGS)
 
 
 @pytest.mark.parametrize("case", [540, 582, 586, 1198])
