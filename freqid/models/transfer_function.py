@@ -172,21 +172,33 @@ def _chain_matrices(
 
 
 def polynomials(at: StateSpace, zeros: int) -> tuple[FloatArray, FloatArray]:
-    """Denominator (poles + 1,) and numerators (outputs, inputs, zeros + 1) in s of a chained grey
-    box's matrices, highest powers first.
+    """Denominator (…, poles + 1) and numerators (…, outputs, inputs, zeros + 1) in s of a chained
+    grey box's matrices (…), highest powers first.
     """
-    p, m = at.D.shape
-    n = len(at.A) // m
-    a = np.real(np.poly(at.A[:n, :n]))
-    numerators = np.zeros((p, m, zeros + 1))
+    p, m = at.D.shape[-2:]
+    n = at.A.shape[-1] // m
+    a = _characteristic(at.A[..., :n, :n])
+    numerators = np.zeros((*a.shape[:-1], p, m, zeros + 1))
     for o in range(p):
         for i in range(m):
             block = slice(i * n, (i + 1) * n)
-            A, b, c = at.A[block, block], at.B[block, i], at.C[o, block]
+            A, b, c = at.A[..., block, block], at.B[..., block, i], at.C[..., o, block]
             # det(sI − A + b c) = a(s) + c adj(sI − A) b
-            full = np.real(np.poly(A - np.outer(b, c))) - a + at.D[o, i] * a
-            numerators[o, i] = full[n - zeros :]
+            full = _characteristic(A - b[..., :, None] * c[..., None, :]) - a
+            full = full + at.D[..., o, i, None] * a
+            numerators[..., o, i, :] = full[..., n - zeros :]
     return a, numerators
+
+
+def _characteristic(A: FloatArray) -> FloatArray:
+    """det(sI − A) of matrices (…, n, n), highest power first, (…, n + 1)."""
+    roots = np.linalg.eigvals(A).astype(complex)
+    a = np.ones((*roots.shape[:-1], 1), complex)
+    for k in range(roots.shape[-1]):
+        none = np.zeros_like(a[..., :1])
+        shifted = np.concatenate([none, a], axis=-1) * roots[..., k, None]
+        a = np.concatenate([a, none], axis=-1) - shifted
+    return np.asarray(a.real)
 
 
 def rational_model(model: GreyBox, zeros: int, delay: float = 0.0) -> ContinuousModel:

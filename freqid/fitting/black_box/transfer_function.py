@@ -23,7 +23,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.reading import Reading, read_for
-from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.sufficiency import enough_rows, told_apart
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
@@ -83,7 +83,7 @@ def fit_transfer_function(
         structure = GreyStructure(model, None, unknown, known, anonymous=True)
         objective = Objective(structure, experiments)
         if objective.point(structure.start) is not None:
-            solution = minimise(objective, structure.start, limit=100 if estimated else None)
+            solution = polish(objective, structure.start, limit=100 if estimated else None)
             ends.append((solution, objective, delay))
 
     for delay in _delays(spec, readings, omega, unit):
@@ -98,7 +98,7 @@ def fit_transfer_function(
         descend(_by_chance(spec.poles, omega, rng), best[2])
     solution, objective, _ = min(ends, key=lambda end: end[0].cost)
     agreed = sum(end[0].cost <= (1 + _SAME) * solution.cost for end in ends)
-    est = _estimate(spec, Minimum(objective, minimise(objective, solution.x)), first.hold, unit)
+    est = _estimate(spec, Minimum(objective, polish(objective, solution.x)), first.hold, unit)
     return dataclasses.replace(est, n_starts=len(ends), n_agreed=agreed)
 
 
@@ -163,15 +163,11 @@ def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float)
         delay = x[structure.count] * unit if structure.unknown else spec.delay
         return rational_model(structure.at(x), spec.zeros, float(delay))
 
-    def polynomial_values(x: FloatArray) -> FloatArray:
-        matrices = structure.model.state_space(**structure.physical(x))
-        a, numerators = polynomials(matrices, spec.zeros)
-        return np.append(numerators, a[1:])
-
     def described(points: FloatArray) -> FloatArray:
-        values = np.array([polynomial_values(x) for x in points])
-        late = points[:, structure.count :] * structure.scale[structure.count :]
-        return np.concatenate([values, late], axis=1)
+        own, late = np.split(points * structure.scale, [structure.count], axis=1)
+        matrices = structure.model.linearise_many(own, structure.physical_names).at
+        a, numerators = polynomials(matrices, spec.zeros)
+        return np.concatenate([numerators.reshape(len(a), -1), a[:, 1:], late], axis=1)
 
     found = at(minimum.x)
     named = [*coefficients(found)[0], *(nuisance.name for nuisance in structure.unknown)]
