@@ -45,6 +45,18 @@ def test_random_responses_are_explained_to_their_noise(order, seed):
     assert abs(est.cost - expected) < 5 * np.sqrt(400)
 
 
+@pytest.mark.parametrize("case", [59, 69, 79])
+def test_channels_that_subspace_poles_did_not_explain(benchmarks, case):
+    """Costs 200 to 900 times those of the noise, and forty seconds until they were found."""
+    from search import responses
+
+    _, _, _, s, G, noise, std = responses.experiment(case)
+    frf = fq.FrequencyResponse(s.imag / (2 * np.pi), G + noise, variance=std**2)
+    est = fq.fit(fq.TransferFunction(7, 8), frf, weights="noise")
+    assert est.cost < 1.1 * 4 * 400
+    assert est.n_evaluations < 50
+
+
 def test_two_by_two_of_order_eight():
     frf = measured(8, 2, 2, 0)
     est = fq.fit(fq.TransferFunction(7, 8), frf, weights="noise")

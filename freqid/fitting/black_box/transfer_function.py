@@ -9,10 +9,11 @@ from typing import cast
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import Band, FrequencyResponse, channel_counts, common_names, input_dt
+from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.refinement import first_model
+from freqid.fitting.black_box.response_poles import folded, poles_of_responses, unheld
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.black_box.subspace import identify
 from freqid.fitting.cost.charts import Chart
@@ -26,7 +27,7 @@ from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.sufficiency import enough_rows, told_apart
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
+from freqid.lti import Hold, PeriodicHold
 from freqid.models import (
     ContinuousModel,
     GreyBox,
@@ -40,16 +41,14 @@ from freqid.models import (
 
 # frequencies over which poles are spread to begin from
 _SPREAD = 20
-# evaluations of a black box that begins another
-_STEPS = 40
+# evaluations from one start, and of the last descent from the best
+_DESCENT, _LAST = 100, 1000
 # samples of delay that are tried, and how many of these delays are followed
 _LONGEST, _FOLLOWED = 24, 6
 # eighths of a turn at the top of a response that are tried
 _TURNS = 160
 # costs that differ by no more than this part are of one minimum
 _SAME = 1e-6
-# lines on which a delay is looked for
-_FEW = 400
 
 
 @fits(TransferFunction, black_box=True)
@@ -83,7 +82,7 @@ def fit_transfer_function(
         structure = GreyStructure(model, None, unknown, known, anonymous=True)
         objective = Objective(structure, experiments)
         if objective.point(structure.start) is not None:
-            solution = polish(objective, structure.start, limit=100 if estimated else None)
+            solution = polish(objective, structure.start, limit=_DESCENT)
             ends.append((solution, objective, delay))
 
     for delay in _delays(spec, readings, omega, unit):
@@ -98,7 +97,9 @@ def fit_transfer_function(
         descend(_by_chance(spec.poles, omega, rng), best[2])
     solution, objective, _ = min(ends, key=lambda end: end[0].cost)
     agreed = sum(end[0].cost <= (1 + _SAME) * solution.cost for end in ends)
-    est = _estimate(spec, Minimum(objective, polish(objective, solution.x)), first.hold, unit)
+    est = _estimate(
+        spec, Minimum(objective, polish(objective, solution.x, limit=_LAST)), first.hold, unit
+    )
     return dataclasses.replace(est, n_starts=len(ends), n_agreed=agreed)
 
 
@@ -121,7 +122,7 @@ def _delays(
     if spec.delay != "estimate":
         return [float(spec.delay)]
     shape, tried = channel_counts(readings[0].data), []
-    responses = all(isinstance(r.data, FrequencyResponse) and _unheld(r) for r in readings)
+    responses = all(isinstance(r.data, FrequencyResponse) and unheld(r) for r in readings)
     # a response tells delays of up to a turn between two of its lines
     gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
     step = np.pi / 4 / omega[-1]
@@ -130,7 +131,7 @@ def _delays(
         try:
             if responses:
                 delay = q * step
-                point = _folded(spec.poles, readings, omega, delay)[2]
+                point = folded(spec.poles, readings, omega, delay)[2]
             else:
                 delay = max(q - 0.5, 0.0) * unit
                 point = _in_step_cost(spec.poles, [in_step(r, (q,) * shape[1]) for r in readings])
@@ -192,8 +193,8 @@ def _starting_poles(
     """Poles to begin from: those of a sampled black box taken to s, and spread ones behind them."""
     starts = []
     try:
-        if all(isinstance(r.data, FrequencyResponse) and _unheld(r) for r in readings):
-            return [_folded(spec.poles, readings, omega, delay, _STEPS)[0]]
+        if all(isinstance(r.data, FrequencyResponse) and unheld(r) for r in readings):
+            return poles_of_responses(spec, readings, omega, delay)
         if delay:
             sampled = _first_guess(spec.poles, readings, delay)
         else:
@@ -212,45 +213,6 @@ def _starting_poles(
     if spec.poles % 2:
         spread = np.append(spread, -omega.mean())
     return [*starts, spread]
-
-
-def _unheld(reading: Reading) -> bool:
-    return not isinstance(reading.hold, PeriodicHold)
-
-
-def _folded(
-    order: int, readings: Sequence[Reading], omega: FloatArray, delay: float, steps: int = 0
-) -> tuple[ComplexArray, float, float]:
-    """Poles in s of continuous responses with a delay (s) taken off, from a sampled black box on
-    the folded axis; α, and what the black box leaves.
-
-    z = (1 + s/α)/(1 − s/α) takes the imaginary axis once round the unit circle and a rational
-    function of s to one of z, of the same order and with feedthrough (McKelvey, Akçay and Ljung,
-    IEEE Trans. Automatic Control 41, 1996, section V).
-    """
-    alpha = float(np.exp(np.log(omega[[0, -1]]).mean()))
-    folded = []
-    for r in readings:
-        frf = r.data
-        assert isinstance(frf, FrequencyResponse)
-        ahead = frf.response * np.exp(1j * frf.omega * delay)
-        at = np.arctan(frf.omega / alpha) / np.pi
-        turned = FrequencyResponse(at, ahead, variance=frf.variance, dt=1.0)
-        kept = None
-        if r.band is not None:
-            kept = Band(*(np.arctan(2 * np.pi * f / alpha) / np.pi for f in r.band))
-        folded.append(r.with_(data=turned, hold=ZeroOrderHold(1.0), band=kept, delayed=False))
-    lines, plane = lines_in_plane(folded, None if steps else _FEW)
-    # a subspace is enough to tell one delay from another
-    begin = first_model(lines, order, True) if steps else identify(lines, order, True)
-    chart = Chart(begin, True, plane, 1.0)
-    objective = Objective(chart, lines)
-    x = np.zeros(chart.size)
-    if steps:
-        x = polish(objective, x, limit=steps, tolerance=1e-6).x
-    point = objective.point(x)
-    z = np.linalg.eigvals(chart.in_z(x).A).astype(complex)
-    return alpha * (z - 1) / (z + 1), alpha, np.inf if point is None else point.cost
 
 
 def _first_guess(order: int, readings: Sequence[Reading], delay: float) -> ComplexArray:

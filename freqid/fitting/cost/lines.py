@@ -60,6 +60,13 @@ class Lines:
         kept: BoolArray = np.any(self.scale > 0, axis=(0, 1))
         return kept
 
+    def measured(self) -> tuple[FloatArray, ComplexArray, FloatArray]:
+        """Of a response: omega (K,) in rad/s, the values (outputs, inputs, K), and what multiplies
+        their errors.
+        """
+        size = np.where(self.scale > 0, self.scale, 1.0)
+        return self.omega, self.Y / size if self.inside else self.Y, self.scale
+
     def error(self, values: ComplexArray) -> ComplexArray:
         """Values (…, outputs, channels, K) with the weights that are not inside yet."""
         return values if self.inside else values * self.scale
