@@ -99,7 +99,8 @@ class Evidence:
     a black box whose motions grow, the surest by ``growth`` standard errors; ``out_of_sight`` modes
     (Hz) above the Nyquist frequency;
     ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
-    rounding of the matrices moves the response, with the sentence on it.
+    rounding of the matrices moves the response, with the sentence on it. ``tied`` are parameters of
+    which an expression decides, with that and their values.
     """
 
     parameters: Sequence[Parameter]
@@ -116,6 +117,7 @@ class Evidence:
     out_of_sight: Sequence[float] = ()
     aliased: float = 0.0
     rounding: tuple[float, str] = (0.0, "")
+    tied: Sequence[tuple[Parameter, str, float]] = ()
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -175,6 +177,18 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
                     f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
                 )
                 yield Finding("edge of a bound", sentence, number=float(value))
+
+
+@sign
+def tied_beyond_a_bound(e: Evidence) -> Iterator[Finding]:
+    """A parameter that its tie takes out of its bounds."""
+    for p, expression, value in e.tied:
+        if not p.lower <= value <= p.upper:
+            sentence = (
+                f"{p.name}={value:.6g}, tied to {expression!r}, lies outside its bounds "
+                f"[{p.lower:g}, {p.upper:g}], which a tie does not keep; bound what it is tied to"
+            )
+            yield Finding("edge of a bound", sentence, number=value)
 
 
 @sign

@@ -197,6 +197,7 @@ def _estimate(
         out_of_sight=out_of_sight(np.linalg.eigvals(plant.A).astype(complex), hold),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading),
+        tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
     )
     return Estimate(
         model=model,

@@ -71,3 +71,17 @@ def test_a_kept_estimate_has_them_again(record, tmp_path):
         rtol=1e-12,
     )
     assert est.to_dict()["parameters"]["Ja"]["value"] == pytest.approx(est["Ja"])
+
+
+def test_a_tie_that_leaves_its_bounds_is_named():
+    """The bounds of a tied parameter are none of the search's: nothing was said of them."""
+    record = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 4, 1e-3), 1e-3).with_noise(0.2, seed=5)
+    tied = fq.two_mass().with_bounds(Ja=(10, 12)).tie(Ja="2e4 * Jm")
+    est = fq.fit(tied, record)
+    assert est.model["Ja"] > 12
+    said = [w for w in est.warnings if w.kind == "edge of a bound"]
+    assert len(said) == 1
+    assert "Ja=" in said[0]
+    assert "[10, 12]" in said[0]
+    wide = fq.fit(fq.two_mass().with_bounds(Ja=(1, 40)).tie(Ja="2e4 * Jm"), record)
+    assert not [w for w in wide.warnings if w.kind == "edge of a bound"]

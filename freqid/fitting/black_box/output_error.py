@@ -97,6 +97,10 @@ def _nested(
 
     options = spec.feedthrough, spec.stable
     own = begun(nested_model(lines, spec.order, *options, more, seed))
+    if not spec.stable and _unstable(own):
+        # motions that grow explain noise, and lead away from what stable ones explain better
+        tame = nested_model(lines, spec.order, spec.feedthrough, True, more, seed)
+        own = min([own, begun(tame)], key=lambda t: t[1].cost)
     chained = all(e.single and e.one_to_one for e in lines)
     if not chained and more:
         rng = np.random.default_rng(seed)
@@ -118,6 +122,12 @@ def _nested(
         seen = np.column_stack([C, np.linalg.norm(C, axis=1)])
         tried.append(begun(inputs_of(lines, wider, seen, spec.feedthrough)))
     return min(tried, key=lambda t: t[1].cost)
+
+
+def _unstable(found: Descent) -> bool:
+    """Whether a pole lies outside of the unit circle."""
+    chart, solution, _ = found
+    return bool((np.abs(np.linalg.eigvals(chart.in_z(solution.x).A)) > 1).any())
 
 
 def within_circle(start: StateSpace) -> StateSpace:
