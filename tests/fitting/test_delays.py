@@ -236,3 +236,24 @@ def test_a_delay_and_weights_go_together(late):
         given = np.linspace(1, 3, 301)
         assert fq.fit(plant, record, weights=given).witness.verdict != "absent"
     assert complete.count("complete") >= 5, complete
+
+
+def test_a_delay_that_a_zero_may_take_over_has_no_errors_to_trust():
+    """Errors of 1e7, or none, were given and trusted where the numerator's first power is zero."""
+
+    def mode(w, z, g):
+        return [[0, w], [-w * w / w, -2 * z * w]], [[0], [g * w]], [[1, 0]], None
+
+    plant = fq.GreyBox(
+        mode, [fq.Parameter(n, v) for n, v in (("w", 40.0), ("z", 0.08), ("g", 1.5))]
+    )
+    u = np.random.default_rng(2).standard_normal(500)
+    fast = np.concatenate([np.zeros(281), np.repeat(u, 100)])[: 500 * 100]
+    record = fq.Record(u, fq.simulate(plant, fast, 1e-4).y[::100], 0.01).with_noise(0.05, seed=1)
+    est = fq.fit(fq.TransferFunction(1, 2, delay="estimate"), record)
+    assert est.model.delay == pytest.approx(0.0281, abs=1e-3)
+    std = est.parameters["std"]
+    assert not std.isna().any()
+    assert std.max() > 1e3 * std.min()
+    assert any(w.kind == "not identifiable" for w in est.warnings)
+    assert est.verdict.grade != "trust"

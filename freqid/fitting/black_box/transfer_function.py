@@ -22,6 +22,7 @@ from freqid.fitting.cost.nuisance import Delay
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, polish
@@ -47,6 +48,8 @@ _DESCENT, _LAST = 100, 1000
 _LONGEST, _FOLLOWED = 24, 6
 # eighths of a turn at the top of a response that are tried
 _TURNS = 160
+# columns of the Jacobian that are parallel to this leave no errors to tell
+_PARALLEL = 1e-5
 # costs that differ by no more than this part are of one minimum
 _SAME = 1e-6
 
@@ -172,7 +175,23 @@ def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float)
 
     found = at(minimum.x)
     named = [*coefficients(found)[0], *(nuisance.name for nuisance in structure.unknown)]
-    return coefficient_estimate(found, named, described, minimum, hold, unit)
+    est = coefficient_estimate(found, named, described, minimum, hold, unit)
+    if structure.unknown and _confused(minimum):
+        # a zero next to infinity is, to first order, one more delay
+        sentence = (
+            "the delay and the numerator's highest power: next to this minimum one does what the "
+            "other does; fit with one zero less, or give the delay"
+        )
+        est = dataclasses.replace(est, signs=[*est.signs, Finding("not identifiable", sentence)])
+    return est
+
+
+def _confused(minimum: Minimum) -> bool:
+    """Whether the data do not tell some of the unknowns from others."""
+    J = minimum.point.jacobian
+    norms = np.linalg.norm(J, axis=0)
+    singular = np.linalg.svd(J / np.where(norms > 0, norms, 1), compute_uv=False)
+    return bool(singular[-1] < _PARALLEL * singular[0])
 
 
 def _edges(reading: Reading) -> tuple[float, float]:

@@ -213,7 +213,9 @@ class Spread:
         if self.change.ndim == 1:
             return inner * np.outer(self.change, self.change)
         covariance: FloatArray = self.change @ inner @ self.change.T
-        return covariance
+        # where unknowns cancel one another what is left of them is rounding
+        lost = np.diag(np.diag(covariance) < 0)
+        return np.where(lost, np.inf, covariance)
 
     def known(self, unknown: float) -> FloatArray:
         """Covariance of the unknowns with ``unknown`` for what is infinite."""
