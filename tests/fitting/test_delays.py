@@ -242,7 +242,7 @@ def test_a_delay_that_a_zero_may_take_over_has_no_errors_to_trust():
     """Errors of 1e7, or none, were given and trusted where the numerator's first power is zero."""
 
     def mode(w, z, g):
-        return [[0, w], [-w * w / w, -2 * z * w]], [[0], [g * w]], [[1, 0]], None
+        return [[0, w], [-w, -2 * z * w]], [[0], [g * w]], [[1, 0]], None
 
     plant = fq.GreyBox(
         mode, [fq.Parameter(n, v) for n, v in (("w", 40.0), ("z", 0.08), ("g", 1.5))]
