@@ -29,6 +29,8 @@ _FOLLOWED = 6
 _LINES, _STEPS, _LAST_STEP, _ENDED = 150, 40, 1e-4, 1e-8
 # ends that cost so many times the best one's on these lines cost more on all
 _WORSE = 1.5
+# a minimum on all lines costs less than this part of its own on these where it is none of theirs
+_MOVED = 0.97
 # costs on these lines that agree to this belong to one minimum
 _SAME = 1e-6
 # what a place may promise beyond the best so far, for a promise is not exact; costs, as parts of
@@ -108,27 +110,34 @@ class Rounds:
                 if end is not None:
                     yield 0, place.visits, end, False
             return 0, places
-        own, cost = found.cost[0], found.cost[1:]
+        ended, started = found
+        own, cost = ended.cost[0], ended.cost[1:]
         alike = np.abs(cost - own) <= _SAME * own
-        last, count = -np.inf, 0
-        for i in np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable"):
-            if not cost[i] <= _WORSE * own or count == _FOLLOWED:
-                break
-            if alike[i] or cost[i] - last <= _SAME * own:
-                continue
-            last, count = cost[i], count + 1
-            try:
-                x = found.values[1 + i]
-                end = polish(self.objective, x, limit=LIMIT, tolerance=ROUGH)
-            except InputError:
-                continue
-            yield 0, hopeful[i].visits, end, False
         agreed = [p for p, same in zip(hopeful, alike, strict=True) if same]
-        return sum(p.visits for p in agreed), [p for p in places if p not in agreed]
+        count = sum(p.visits for p in agreed)
+        if own < _MOVED * started:
+            # the best so far was no minimum here, or not the one that the others agree on
+            yield from self._end(ended.values[0], count)
+            count = 0
+        last, followed = -np.inf, 0
+        for i in np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable"):
+            if not cost[i] <= _WORSE * own or followed == _FOLLOWED:
+                break
+            if not alike[i] and cost[i] - last > _SAME * own:
+                last, followed = cost[i], followed + 1
+                yield from self._end(ended.values[1 + i], hopeful[i].visits)
+        return count, [p for p in places if p not in agreed]
 
-    def _together(self, places: Sequence[Place]) -> Answers | None:
-        """Where the best so far and the places lead on some of the lines; None where they are
-        followed one by one.
+    def _end(self, x: FloatArray, visits: int) -> Iterator[Visit]:
+        """The minimum below a place on all lines, to which so many walks have led."""
+        try:
+            yield 0, visits, polish(self.objective, x, limit=LIMIT, tolerance=ROUGH), False
+        except InputError:
+            return
+
+    def _together(self, places: Sequence[Place]) -> tuple[Answers, float] | None:
+        """Where the best so far and the places lead on some of the lines, and what it cost there
+        before; None where they are followed one by one.
         """
         experiments = cast("Sequence[SpectralExperiment]", self.objective.experiments)
         batch = many_starts(self.structure, experiments, len(places) + 1, _LINES)
@@ -136,10 +145,11 @@ class Rounds:
             return None
         begin = np.array([self.best.x, *(place.x for place in places)])
         try:
+            started = float(batch.normal(begin[:1], np.arange(1))[0][0])
             found = descend(batch, begin, last_step=_LAST_STEP, limit=_STEPS, gain=_ENDED)
         except Exception:  # the user's function may raise anything at one of the points
             return None
-        return found if np.isfinite(found.cost[0]) else None
+        return (found, started) if np.isfinite(found.cost[0]) else None
 
     def _alike(self, places: Sequence[Place]) -> int:
         """How many walks lead as near to the black box as the best so far, where none leads nearer.
