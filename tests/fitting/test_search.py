@@ -278,3 +278,21 @@ def test_a_witness_beside_responses_of_the_plant_itself(plant):
     wrong = fq.fit(start, response(1, 100, chain), weights="noise")
     assert wrong.verdict.grade != "trust"
     assert "another mode" in [w.kind for w in wrong.warnings], wrong.warnings
+
+
+@pytest.mark.parametrize("w", [24.0, 29.5, 41.0])
+def test_walks_that_agree_on_a_lobe_are_not_believed(w):
+    """All of a dozen starts ended in one lobe of a narrow resonance, at twice the least cost."""
+    plant = fq.GreyBox(
+        lambda w, z: ([[0, w], [-w, -2 * z * w]], [[0], [w]], [[1, 0]], None),
+        [fq.Parameter("w", w), fq.Parameter("z", 0.0018, fixed=True)],
+    )
+    t = 0.01 * np.arange(300)
+    u = sum(np.sin(2 * np.pi * f * t + f) for f in (0.7, 2.1, 4.4, 9.3))
+    for seed in range(4):
+        clean = fq.simulate(plant, u, 0.01)
+        record = clean.with_noise(float(clean.y.std()), seed=seed)
+        truth = fq.fit(plant, record)
+        for factor in (0.45, 0.6, 1.7, 2.5):
+            est = fq.fit(plant, record, start={"w": factor * w})
+            assert est.cost <= truth.cost * (1 + 1e-6)

@@ -23,6 +23,8 @@ from freqid.fitting.search.walks import Place, distance, nearest, walked
 HOPELESS = 4.0
 # evaluations of a start, and the relative gain of the cost that ends it: the best is run to its end
 LIMIT, ROUGH = 120, 1e-10
+# scattered points that are looked at on the true cost, and how many of them are followed
+_GLANCES, _SEEN = 64, 3
 # places of a round that are followed up
 _FOLLOWED = 6
 # lines on which they are followed together; steps at the most, and the last of them
@@ -86,7 +88,8 @@ class Rounds:
                     continue
                 yield from self._below(promised)
             before = self.best
-            alike, apart = yield from self._followed(places)
+            seen = [] if looked or number > 1 else self._seen(start, seed)
+            alike, apart = yield from self._followed(places, seen)
             if near and not looked:
                 # signs that the first stage keeps, and what no start has met
                 own = Place(self.best.x, np.inf, 0)
@@ -95,14 +98,31 @@ class Rounds:
             same = alike > 0 and self.best.cost >= before.cost * (1 - _SAME)
             yield 0, alike, self.best if same else None, True
 
+    def _seen(self, start: FloatArray, seed: int) -> list[Place]:
+        """Scattered points that cost least on some of the lines: walks that aim at one response
+        may all end in one place for that, and agree on nothing.
+        """
+        points = around(self.structure, start, _GLANCES, seed)
+        experiments = cast("Sequence[SpectralExperiment]", self.objective.experiments)
+        batch = many_starts(self.structure, experiments, _GLANCES, _LINES)
+        if batch is None:
+            return []
+        try:
+            cost = batch.normal(points, np.arange(_GLANCES))[0]
+        except Exception:  # the user's function may raise anything at one of the points
+            return []
+        order = np.argsort(np.where(np.isfinite(cost), cost, np.inf), kind="stable")
+        return [Place(points[i], float(cost[i]), 1) for i in order[:_SEEN]]
+
     def _followed(
-        self, places: Sequence[Place]
+        self, places: Sequence[Place], seen: Sequence[Place]
     ) -> Generator[Visit, None, tuple[int, Sequence[Place]]]:
-        """The minima below places on the true cost; how many walks lead to the best so far, and the
-        places that do not.
+        """The minima below places on the true cost, and below what was ``seen`` of it; how many
+        walks lead to the best so far, and the places that do not.
         """
         self._least_log_cost = min([self._least_log_cost, *(place.cost for place in places)])
         hopeful = [p for p in places if p.cost <= HOPELESS * self._least_log_cost]
+        hopeful += [p for p in seen if np.isfinite(p.cost)]
         found = self._together(hopeful)
         if found is None:
             for place in hopeful[:_FOLLOWED]:
