@@ -89,11 +89,11 @@ class Rounds:
                 yield from self._below(promised)
             before = self.best
             seen = [] if looked or number > 1 else self._seen(start, seed)
-            alike, apart = yield from self._followed(places, seen)
+            alike = yield from self._followed(places, seen)
             if near and not looked:
                 # signs that the first stage keeps, and what no start has met
                 own = Place(self.best.x, np.inf, 0)
-                yield from self._below(nearest([own, *apart], self.structure, near))
+                yield from self._below(nearest([own, *places], self.structure, near))
             # those that agree count when all that the round found was looked at
             same = alike > 0 and self.best.cost >= before.cost * (1 - _SAME)
             yield 0, alike, self.best if same else None, True
@@ -116,9 +116,9 @@ class Rounds:
 
     def _followed(
         self, places: Sequence[Place], seen: Sequence[Place]
-    ) -> Generator[Visit, None, tuple[int, Sequence[Place]]]:
+    ) -> Generator[Visit, None, int]:
         """The minima below places on the true cost, and below what was ``seen`` of it; how many
-        walks lead to the best so far, and the places that do not.
+        walks lead to the best so far.
         """
         self._least_log_cost = min([self._least_log_cost, *(place.cost for place in places)])
         hopeful = [p for p in places if p.cost <= HOPELESS * self._least_log_cost]
@@ -129,12 +129,11 @@ class Rounds:
                 end = self._one(np.clip(place.x, self.structure.lower, self.structure.upper))
                 if end is not None:
                     yield 0, place.visits, end, False
-            return 0, places
+            return 0
         ended, started = found
         own, cost = ended.cost[0], ended.cost[1:]
         alike = np.abs(cost - own) <= _SAME * own
-        agreed = [p for p, same in zip(hopeful, alike, strict=True) if same]
-        count = sum(p.visits for p in agreed)
+        count = sum(p.visits for p, same in zip(hopeful, alike, strict=True) if same)
         if own < _MOVED * started:
             # the best so far was no minimum here, or not the one that the others agree on
             yield from self._end(ended.values[0], count)
@@ -146,7 +145,7 @@ class Rounds:
             if not alike[i] and cost[i] - last > _SAME * own:
                 last, followed = cost[i], followed + 1
                 yield from self._end(ended.values[1 + i], hopeful[i].visits)
-        return count, [p for p in places if p not in agreed]
+        return count
 
     def _end(self, x: FloatArray, visits: int) -> Iterator[Visit]:
         """The minimum below a place on all lines, to which so many walks have led."""
