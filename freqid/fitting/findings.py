@@ -183,7 +183,8 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
 def tied_beyond_a_bound(e: Evidence) -> Iterator[Finding]:
     """A parameter that its tie takes out of its bounds."""
     for p, expression, value in e.tied:
-        if not p.lower <= value <= p.upper:
+        slack = _AT_BOUND * abs(value)
+        if not p.lower - slack <= value <= p.upper + slack:
             sentence = (
                 f"{p.name}={value:.6g}, tied to {expression!r}, lies outside its bounds "
                 f"[{p.lower:g}, {p.upper:g}], which a tie does not keep; bound what it is tied to"

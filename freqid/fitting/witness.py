@@ -44,6 +44,8 @@ _TOUCHES = 1e-3
 # relative standard error of a parameter that the data leave open; starts that have to agree then,
 # and the level of the gap below which not even that tells that there is no minimum in it
 _OPEN, _WANTED, _RARE = 0.5, 4, 0.2
+# part of the data's energy from which on noise outweighs what is explained, and makes many minima
+_DROWNED = 0.5
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
@@ -139,7 +141,7 @@ class Testimony:
         p = float(scipy.stats.f.sf(f, top, max(told, 1)))
         numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
         gap = grey.cost / cost - 1
-        verdict, sentence = self._verdict(order, numbers, p, gap, self._open())
+        verdict, sentence = self._verdict(order, numbers, p, gap)
         return Witness(verdict, sentence, cost, float(f), p, (top, bottom))
 
     def _alike(self, order: int, cost: float, gap: float) -> Witness:
@@ -159,16 +161,16 @@ class Testimony:
         std = np.sqrt(np.diag(Spread(np.ones(len(self.minimum.x)), self.minimum).covariance))
         return bool((std > _OPEN * np.abs(self.minimum.x)).any())
 
-    def _verdict(
-        self, order: int, numbers: str, p: float, gap: float, undetermined: bool
-    ) -> tuple[Verdict, str]:
+    def _verdict(self, order: int, numbers: str, p: float, gap: float) -> tuple[Verdict, str]:
         if p < _LEVEL:
             return "lacking", (
                 f"a black box of order {order} explains the data better ({numbers}): a better "
                 "minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
                 "the right hold"
             )
-        if gap > _TOUCHES and undetermined and (self.n_agreed < _WANTED or p < _RARE):
+        told = self.n_agreed >= _WANTED and p >= _RARE
+        drowned = self.minimum.cost > _DROWNED * self.minimum.objective.energy
+        if gap > _TOUCHES and (drowned or (self._open() and not told)):
             return "absent", (
                 f"a black box of order {order} explains the data no better ({numbers}), but they "
                 "are too noisy for it to tell one minimum from another"

@@ -146,9 +146,7 @@ def test_a_batch_of_starts_has_the_cost_of_each():
     experiment = Reading.of(record, "zoh", None).lines()
     objective = Objective(structure, [experiment])
     x = structure.start * np.random.default_rng(1).uniform(0.8, 1.2, (5, len(structure.start)))
-    cost, gradient, curvature = many_starts(structure, [experiment], 5, 10**9).normal(
-        x, np.arange(5)
-    )
+    cost, gradient, curvature = many_starts(structure, [experiment], 5).normal(x, np.arange(5))
     for i, row in enumerate(x):
         point = objective.point(row)
         assert cost[i] == pytest.approx(point.cost, rel=1e-9)

@@ -8,11 +8,10 @@ is taken away.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.black_box.pole_groups import fewer_poles, in_groups, joined
 from freqid.fitting.black_box.rational_lines import Fitted, RationalLines
 
 # how often modes are exchanged at the most, how many are tried each time, and the least gain
@@ -28,11 +27,8 @@ _NEAR = 0.5
 # real poles that are tried
 _REAL = (-0.9, -0.5, 0.2, 0.5, 0.8, 0.95, 0.99)
 
-# so many of some poles, the least missed taken away
-Fewer = Callable[[RationalLines, ComplexArray, int], ComplexArray]
 
-
-def exchanged(lines: RationalLines, best: Fitted, fewer: Fewer) -> Fitted:
+def exchanged(lines: RationalLines, best: Fitted) -> Fitted:
     """The least minimum to which exchanges of one mode lead, ``best`` itself where none does."""
     order, first = len(best.poles), best
     for _ in range(_ROUNDS):
@@ -41,7 +37,7 @@ def exchanged(lines: RationalLines, best: Fitted, fewer: Fewer) -> Fitted:
             larger = lines.below(np.append(best.poles, added), TRIAL_STEPS)
             if larger is None:
                 continue
-            poles = fewer(lines, larger.poles, order)
+            poles = fewer_poles(lines.cost, larger.poles, order)
             found = None if _same(poles, best.poles) else lines.below(poles, TRIAL_STEPS)
             if found is not None and found.cost < best.cost and len(found.poles) == order:
                 best = found
@@ -62,10 +58,10 @@ def _least_worth(lines: RationalLines, best: Fitted) -> float:
     """What the cost rises by without the real pole, or the pair, that is least missed; of one alone
     nothing, for what stands next to it is not all that it explains.
     """
-    groups = [[p] if p.imag == 0 else [p, p.conj()] for p in best.poles[best.poles.imag >= 0]]
+    groups = in_groups(best.poles)
     if len(groups) == 1:
         return 0.0
-    rest = [np.concatenate(groups[:i] + groups[i + 1 :]) for i in range(len(groups))]
+    rest = [joined(groups[:i] + groups[i + 1 :]) for i in range(len(groups))]
     return min(map(lines.cost, rest)) - best.cost
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.black_box.exchange import TRIAL_STEPS, exchanged, pairs_asked_for
+from freqid.fitting.black_box.pole_groups import fewer_poles
 from freqid.fitting.black_box.rational_lines import (
     FEW,
     FOLLOWED,
@@ -84,7 +85,7 @@ def exchanged_model(
     before = lines.below(poles)
     if before is None or before.cost <= lines.rounding:
         return None
-    after = exchanged(lines, before, fewer_poles)
+    after = exchanged(lines, before)
     return None if after is before else lines.state_space(after)
 
 
@@ -177,7 +178,7 @@ def nested_model(
     if best is None or len(best.poles) < order:
         return identify(experiments, order, feedthrough)
     if not _believed(lines, best):
-        best = exchanged(lines, best, fewer_poles)
+        best = exchanged(lines, best)
     if few is not experiments:
         lines = RationalLines(experiments, feedthrough, stable)
         best = lines.below(best.poles) or best
@@ -241,25 +242,6 @@ def _begun(lines: RationalLines, order: int) -> Iterator[ComplexArray]:
         if more == 0:
             yield poles
         elif (larger := lines.minimum(poles)) is not None:
-            yield fewer_poles(lines, larger.poles, order)
+            yield fewer_poles(lines.cost, larger.poles, order)
     if order > FEW:
         yield nowhere
-
-
-def fewer_poles(lines: RationalLines, poles: ComplexArray, order: int) -> ComplexArray:
-    """``order`` of the poles: taken away are, in turn, the real ones and pairs least missed."""
-    groups = [[p] if p.imag == 0 else [p, p.conj()] for p in poles[poles.imag >= 0]]
-    while (over := sum(map(len, groups)) - order) > 0:
-        # where one pole too many is half of a pair, a real one takes the pair's place
-        spare: list[complex] = [] if over > 1 or any(len(g) == 1 for g in groups) else [0.0]
-        tried = []
-        for i, group in enumerate(groups):
-            if len(group) - len(spare) <= over:
-                rest = [*groups[:i], *groups[i + 1 :], *([spare] if spare else [])]
-                tried.append((lines.cost(_joined(rest)), rest))
-        groups = min(tried, key=lambda t: t[0])[1]
-    return _joined(groups)
-
-
-def _joined(groups: Sequence[Sequence[complex]]) -> ComplexArray:
-    return np.array([pole for group in groups for pole in group], complex)

@@ -32,7 +32,7 @@ def poles_of_responses(
     spec: TransferFunction, readings: Sequence[Reading], omega: FloatArray, delay: float
 ) -> list[ComplexArray]:
     """Poles to begin from of continuous responses: those of vector fitting and, unless these leave
-    no more than the noise, those of a black box on the folded axis.
+    no more than the noise of a single channel, those of a black box on the folded axis.
     """
     channels, noise, count = [], 0.0, 0
     for r in readings:
@@ -42,14 +42,17 @@ def poles_of_responses(
             told = weight[i, j] > 0
             channels.append((1j * at[told], G[i, j, told], weight[i, j, told]))
             count += int(told.sum())
-            # that of a complex value is twice that of a real one
-            noise += np.nan_to_num(2 * told.sum() * (r.noise.variance or np.nan))
+            # that of a complex value is twice that of a real one; where it is not known no poles
+            # leave as little
+            noise += 2 * told.sum() * (r.noise.variance or 0.0)
     error, proper = noise / np.sqrt(max(count, 1)), spec.zeros >= spec.poles
     try:
         poles, cost = shared_poles(channels, spec.poles, proper, noise + _CHANCE * error)
     except np.linalg.LinAlgError:
         return [folded(spec.poles, readings, omega, delay, _STEPS)[0]]
-    if cost <= noise + _RARE * error or len(channels) > len(readings):
+    # a subspace of several channels is lost more often than it helps
+    several = len(channels) > len(readings)
+    if several or cost <= noise + _RARE * error:
         return [poles]
     return [folded(spec.poles, readings, omega, delay, _STEPS)[0], poles]
 

@@ -48,8 +48,9 @@ _DESCENT, _LAST = 100, 1000
 _LONGEST, _FOLLOWED = 24, 6
 # eighths of a turn at the top of a response that are tried
 _TURNS = 160
-# columns of the Jacobian that are parallel to this leave no errors to tell
-_PARALLEL = 1e-5
+# combinations of unknowns of which the data show this part of others leave no errors to tell; a
+# delay is open where it is such a part of one
+_PARALLEL, _PART = 1e-4, 0.1
 # costs that differ by no more than this part are of one minimum
 _SAME = 1e-6
 
@@ -176,22 +177,23 @@ def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float)
     found = at(minimum.x)
     named = [*coefficients(found)[0], *(nuisance.name for nuisance in structure.unknown)]
     est = coefficient_estimate(found, named, described, minimum, hold, unit)
-    if structure.unknown and _confused(minimum):
+    if structure.unknown and _delay_is_open(minimum, structure.count):
         # a zero next to infinity is, to first order, one more delay
         sentence = (
-            "the delay and the numerator's highest power: next to this minimum one does what the "
-            "other does; fit with one zero less, or give the delay"
+            "the delay; next to this minimum the coefficients do what it does, as a numerator's "
+            "highest power near zero can; fit with one zero less, or give the delay"
         )
         est = dataclasses.replace(est, signs=[*est.signs, Finding("not identifiable", sentence)])
     return est
 
 
-def _confused(minimum: Minimum) -> bool:
-    """Whether the data do not tell some of the unknowns from others."""
+def _delay_is_open(minimum: Minimum, unknown: int) -> bool:
+    """Whether the other unknowns do all that an ``unknown`` delay does."""
     J = minimum.point.jacobian
     norms = np.linalg.norm(J, axis=0)
-    singular = np.linalg.svd(J / np.where(norms > 0, norms, 1), compute_uv=False)
-    return bool(singular[-1] < _PARALLEL * singular[0])
+    _, s, Vt = np.linalg.svd(J / np.where(norms > 0, norms, 1), full_matrices=False)
+    loose = Vt[s < _PARALLEL * s[0], unknown]
+    return bool((np.abs(loose) > _PART).any())
 
 
 def _edges(reading: Reading) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.black_box.pole_groups import fewer_poles
 from freqid.lti import triangle
 
 # moves of the poles at the most, and the one, relative, after which they stay where they are
@@ -47,7 +48,8 @@ def shared_poles(
         try:
             poles, cost = _moved_on(scaled, _spread(count + more, low / unit, high / unit), proper)
             if more:
-                poles, cost = _moved_on(scaled, _fewer(scaled, poles, count, proper), proper)
+                kept = fewer_poles(lambda p: _moved(scaled, p, proper)[0], poles, count, -1.0)
+                poles, cost = _moved_on(scaled, kept, proper)
         except np.linalg.LinAlgError:
             continue
         if best is None or cost < least:
@@ -68,40 +70,15 @@ def _moved_on(
         cost, following = _moved(channels, poles, proper)
         if cost < least:
             best, least = poles, cost
-        if np.abs(following - poles).max() <= _STILL * np.abs(poles).max():
+        far = np.abs(np.sort_complex(following) - np.sort_complex(poles)).max()
+        if far <= _STILL * np.abs(poles).max():
             break
         poles = following
     return best, least
 
 
-def _fewer(
-    channels: Sequence[Channel], poles: ComplexArray, count: int, proper: bool
-) -> ComplexArray:
-    """``count`` of the poles: taken away are, in turn, the real ones and pairs least missed."""
-    groups = [np.unique([p, p.conj()]) for p in poles[poles.imag >= 0]]
-    while (over := sum(map(len, groups)) - count) > 0:
-        tried = []
-        for i, group in enumerate(groups):
-            rest = groups[:i] + groups[i + 1 :]
-            if len(group) <= over:
-                tried.append((_moved(channels, _joined(rest), proper)[0], i))
-        if not tried:
-            # one pole too many, and all of them in pairs: a real one takes the place of one
-            slow = int(np.argmin([abs(g[0].real) for g in groups]))
-            groups[slow] = np.array([-abs(groups[slow][0])])
-            continue
-        groups.pop(min(tried)[1])
-    return _joined(groups)
-
-
-def _joined(groups: Sequence[ComplexArray]) -> ComplexArray:
-    """All poles, the upper half-plane first."""
-    poles = np.concatenate(groups).astype(complex)
-    return np.concatenate([poles[poles.imag > 0], poles[poles.imag < 0], poles[poles.imag == 0]])
-
-
 def _spread(count: int, low: float, high: float) -> ComplexArray:
-    """Light poles over a band, upper half-plane first, and a real one of an odd number."""
+    """Light poles over a band, and a real one of an odd number."""
     pairs = count // 2
     w = np.geomspace(low, high, pairs) if pairs > 1 else np.full(pairs, np.sqrt(low * high))
     upper = w * (-_LIGHT + 1j)
@@ -109,7 +86,9 @@ def _spread(count: int, low: float, high: float) -> ComplexArray:
 
 
 def _fractions(s: ComplexArray, poles: ComplexArray) -> ComplexArray:
-    """Real combinations of 1/(s − p), (n, K): of a pair their sum, and j times their difference."""
+    """Real combinations of 1/(s − p), (n, K): of real poles themselves, then of pairs their sums,
+    then j times their differences.
+    """
     real, upper = poles[poles.imag == 0], poles[poles.imag > 0]
     one = 1 / (s - real[:, None])
     a, b = 1 / (s - upper[:, None]), 1 / (s - upper.conj()[:, None])
@@ -157,5 +136,4 @@ def _zeros(poles: ComplexArray, residues: FloatArray) -> ComplexArray:
     i, j = np.arange(r, r + m), np.arange(r + m, n)
     A[i, i] = A[j, j] = upper.real
     A[i, j], A[j, i], b[i] = upper.imag, -upper.imag, 2.0
-    found = np.linalg.eigvals(A - np.outer(b, residues)).astype(complex)
-    return _joined([found])
+    return np.linalg.eigvals(A - np.outer(b, residues)).astype(complex)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import Array, FloatArray
-from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.many_costs import ManyCosts, one_shape
 from freqid.fitting.cost.objective import Structure
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -33,10 +33,10 @@ class ManyStarts:
 
 
 def many_starts(
-    structure: Structure, experiments: Sequence[SpectralExperiment], count: int, lines: int
+    structure: Structure, experiments: Sequence[SpectralExperiment], count: int
 ) -> ManyStarts | None:
-    """That on about so many ``lines``; None where starts are computed one by one: beside several
-    places, delays, unknowns of the experiment, bounds, lines that take more than one point.
+    """That of ``count`` starts; None where these are computed one by one: beside several places,
+    delays, unknowns of the experiment, bounds, lines that take more than one point.
     """
     if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
         return None
@@ -46,4 +46,4 @@ def many_starts(
         return None
     if not all(one_shape([e]) for e in experiments):
         return None
-    return ManyStarts(structure, thinned_to(experiments, lines), count)
+    return ManyStarts(structure, experiments, count)

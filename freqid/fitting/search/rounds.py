@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
+from functools import cached_property
 from typing import TypeAlias, cast
 
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.many_starts import many_starts
 from freqid.fitting.cost.objective import Objective, ScannableStructure
 from freqid.fitting.search.batched import Answers, descend
@@ -60,6 +61,12 @@ class Rounds:
         self._least_log_cost = np.inf
         self._known: list[tuple[float, Solution | None]] = []
 
+    @cached_property
+    def _few(self) -> Sequence[SpectralExperiment]:
+        """The experiments on some of their lines."""
+        every = cast("Sequence[SpectralExperiment]", self.objective.experiments)
+        return thinned_to(every, _LINES)
+
     def visits(self, start: FloatArray, seed: int) -> Iterator[Visit]:
         """What is met on the way."""
         left, number = self.rule.limit - 1, 0
@@ -103,8 +110,7 @@ class Rounds:
         may all end in one place for that, and agree on nothing.
         """
         points = around(self.structure, start, _GLANCES, seed)
-        experiments = cast("Sequence[SpectralExperiment]", self.objective.experiments)
-        batch = many_starts(self.structure, experiments, _GLANCES, _LINES)
+        batch = many_starts(self.structure, self._few, _GLANCES)
         if batch is None:
             return []
         try:
@@ -158,8 +164,7 @@ class Rounds:
         """Where the best so far and the places lead on some of the lines, and what it cost there
         before; None where they are followed one by one.
         """
-        experiments = cast("Sequence[SpectralExperiment]", self.objective.experiments)
-        batch = many_starts(self.structure, experiments, len(places) + 1, _LINES)
+        batch = many_starts(self.structure, self._few, len(places) + 1)
         if batch is None:
             return None
         begin = np.array([self.best.x, *(place.x for place in places)])

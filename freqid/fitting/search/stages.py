@@ -165,8 +165,8 @@ class Search:
         A first stage may lead away from what is near: unless its end is sure, it has to stand
         beside the descent from the start. Raises InputError where that cannot be computed.
         """
-        near = straight_down(self.objective, start)
-        if near is not None and rule.bound is not None:
+        near = None if rule.bound is None else straight_down(self.objective, start)
+        if near is not None:
             straight = Found(near)
             if rule.sure(straight) or rule.convinced(straight):
                 return straight
