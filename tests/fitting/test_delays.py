@@ -257,3 +257,9 @@ def test_a_delay_that_a_zero_may_take_over_has_no_errors_to_trust():
     assert std.max() > 1e3 * std.min()
     assert any(w.kind == "not identifiable" for w in est.warnings)
     assert est.verdict.grade != "trust"
+    # the response is as sure as that of the plant itself: what cancels in it is no error of it
+    omega = np.array([5.0, 20.0, 40.0, 80.0])
+    own = fq.fit(plant, fq.Record(u, record.y, 0.01), start={"w": 40.0}, n_starts=1)
+    late = est.frequency_response(omega)
+    assert (late.variance > 0).all()
+    assert (late.variance < 10 * own.frequency_response(omega).variance).all()

@@ -17,11 +17,18 @@ _SILENT = 1e-10
 
 @dataclass(frozen=True)
 class Determined:
-    """(JᵀJ)⁻¹ (P, P), which unknowns are ``loose`` (P,), and the sentences that say why."""
+    """A ``half`` (P, k) of (JᵀJ)⁻¹, which unknowns are ``loose`` (P,), and the sentences that say
+    why.
+    """
 
-    inverse: FloatArray
+    half: FloatArray
     loose: BoolArray
     sentences: list[str]
+
+    @property
+    def inverse(self) -> FloatArray:
+        """(JᵀJ)⁻¹ (P, P) of what the data tell."""
+        return self.half @ self.half.T
 
     def scatter(self, covariance: FloatArray) -> FloatArray:
         """The covariance (P, P), infinite for what is loose."""
@@ -46,7 +53,7 @@ def determined(
         for name, quiet in zip(names, silent, strict=True)
         if quiet
     ]
-    inverse, loose = np.zeros((len(values),) * 2), silent.copy()
+    half, loose = np.zeros((len(values), 0)), silent.copy()
     seen = np.flatnonzero(~silent)
     if len(seen):
         _, s, Vt = np.linalg.svd(jacobian[:, seen] / norms[seen], full_matrices=False)
@@ -60,9 +67,9 @@ def determined(
             members = np.abs(change) > 1e-3
             loose[seen[np.abs(direction) > 1e-4]] = True
             sentences.append(_combination([names[i] for i in seen[members]], change[members]))
-        half = (Vt[~weak] / s[~weak, None]) / norms[seen]
-        inverse[np.ix_(seen, seen)] = half.T @ half
-    return Determined(inverse, loose, sentences)
+        half = np.zeros((len(values), np.count_nonzero(~weak)))
+        half[seen] = ((Vt[~weak] / s[~weak, None]) / norms[seen]).T
+    return Determined(half, loose, sentences)
 
 
 def _combination(names: list[str], change: FloatArray) -> str:

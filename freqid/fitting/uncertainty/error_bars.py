@@ -106,5 +106,5 @@ def response_variance(
     What the data leave open is left out.
     """
     _, J = structure.response(x, omega, hold)
-    variance: FloatArray = np.einsum("apmk,ab,bpmk->pmk", J.conj(), spread.known(0.0), J).real
-    return variance
+    moved = np.tensordot(spread.factor.T, J, (1, 0))
+    return np.asarray((np.abs(moved) ** 2).sum(axis=0))

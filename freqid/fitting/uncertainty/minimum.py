@@ -129,18 +129,24 @@ class Minimum:
         if names:
             return determined(J, self.x, names, np.sqrt(self.objective.energy))
         half = np.linalg.pinv(J)
-        return Determined(half @ half.T, np.zeros(len(half), bool), [])
+        return Determined(half, np.zeros(len(half), bool), [])
 
     @cached_property
     def covariance(self) -> FloatArray:
-        """Covariance of the unknowns (P, P), infinite for what the data leave open.
+        """Covariance of the unknowns (P, P), infinite for what the data leave open."""
+        return self.determined.scatter(self.factor @ self.factor.T)
 
-        H⁻¹ M H⁻¹ with H = JᵀJ, the prior's rows included, and M what the noise, of whatever colour,
-        and the prior make of the gradient (Ljung, System Identification, 1999, section 9.4).
+    @cached_property
+    def factor(self) -> FloatArray:
+        """F (P, k) with F Fᵀ the covariance of what the data tell: where unknowns nearly cancel one
+        another it keeps the digits that the product loses.
+
+        F Fᵀ = H⁻¹ M H⁻¹ with H = JᵀJ, the prior's rows included, and M what the noise, of whatever
+        colour, and the prior make of the gradient (Ljung, System Identification, 1999, section
+        9.4).
         Samples in time, and what is down to rounding, are taken for white.
         """
-        H = self.determined.inverse
-        score = self.score
+        half, score = self.determined.half, self.score
         if score is None and not self.exact:
             score = score_covariance(self.objective, self.x, self.alone)
         if score is None:
@@ -148,10 +154,10 @@ class Minimum:
                 e.inflation if isinstance(e, PeriodicExperiment) else 1 for e in self.experiments
             ]
             wider = self.inflation * float(np.mean(each))
-            return self.determined.scatter(wider * self._level * H)
+            return np.sqrt(wider * self._level) * half
         if self.prior is not None:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
-        return self.determined.scatter(self.inflation * H @ score @ H)
+        return np.sqrt(self.inflation) * half @ root(half.T @ score @ half)
 
     def inside_bounds(
         self, scale: FloatArray, std: FloatArray, lower: FloatArray, upper: FloatArray
@@ -207,17 +213,27 @@ class Spread:
         return self.minimum.covariance
 
     @cached_property
+    def factor(self) -> FloatArray:
+        """F (unknowns, k) with F Fᵀ the covariance of what is known of the unknowns."""
+        if self.given is None and self.minimum is not None:
+            return self.minimum.factor
+        return root(self.known(0.0))
+
+    @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of the named values, (names, names)."""
-        inner = self.of_unknowns
         if self.change.ndim == 1:
-            return inner * np.outer(self.change, self.change)
-        covariance: FloatArray = self.change @ inner @ self.change.T
-        # where unknowns cancel one another what is left of them is rounding
-        lost = np.diag(np.diag(covariance) < 0)
-        return np.where(lost, np.inf, covariance)
+            return self.of_unknowns * np.outer(self.change, self.change)
+        half = self.change @ self.factor
+        return half @ half.T
 
     def known(self, unknown: float) -> FloatArray:
         """Covariance of the unknowns with ``unknown`` for what is infinite."""
         inner = self.of_unknowns
         return np.where(np.isfinite(inner), inner, unknown)
+
+
+def root(matrix: FloatArray) -> FloatArray:
+    """F with F Fᵀ a symmetric matrix, of which rounding may have left less than zero."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0)))
