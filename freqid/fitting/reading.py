@@ -222,8 +222,10 @@ class Reading:
             return PeriodicExperiment(data, self.hold, plane, self.place)
         return self.lines(plane)
 
-    def lines(self, plane: Plane | None = None) -> SpectralExperiment:
-        """The lines of the data as residuals, whatever the domain of the fit."""
+    def lines(
+        self, plane: Plane | None = None, like: SpectralExperiment | None = None
+    ) -> SpectralExperiment:
+        """The lines of the data as residuals, in any domain; with the points of one ``like`` it."""
         # a sampled model of a band-limited input has z at the input's sample time
         hold = self.hold
         if plane is not None and not isinstance(hold, PeriodicHold):
@@ -249,7 +251,7 @@ class Reading:
             s = s.without_zero()
         weights = self.noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
-        made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane)
+        made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane, like)
         made = dataclasses.replace(made, place=self.place)
         whole = self.band is None
         if whole and free and self.noise.to_be_learnt and not self.noise.plain:

@@ -100,11 +100,16 @@ class SpectralExperiment:
         n_real: int = 0,
         lift: int = 1,
         plane: Plane | None = None,
+        like: SpectralExperiment | None = None,
     ) -> SpectralExperiment:
-        """``transient_dt`` is the sample time of the output; None leaves the transient out."""
+        """``transient_dt`` is the sample time of the output; None leaves the transient out. An
+        experiment ``like`` this one lends the points that both have.
+        """
         # the free motion is that of the sampled states, whatever drives them
         seen_by = hold.groups[0][0] if isinstance(hold, InputHolds) else hold
-        if lift > 1 and isinstance(hold, PeriodicHold):
+        if like is not None and plane is None and like._at_the_points_of(lines, hold, lift):
+            z = like.points.z
+        elif lift > 1 and isinstance(hold, PeriodicHold):
             z = on_circle(hold.period * lift * lines.omega)
         else:
             z = points(lines.omega_input.ravel(), seen_by)
@@ -124,6 +129,7 @@ class SpectralExperiment:
         weights: FloatArray,
         transient: bool,
         plane: Plane | None = None,
+        like: SpectralExperiment | None = None,
     ) -> SpectralExperiment:
         """Lines of a record; ``weights`` (K,) or (outputs, K) multiply the squared error."""
         scale = np.sqrt(s.multiplicity * weights / s.n_samples)
@@ -133,7 +139,7 @@ class SpectralExperiment:
             s.omega, s.omega_input, s.U.reshape(len(s.U), 1, -1), s.Y[:, None], scale[:, None]
         )
         lift = len(s.U) // n_inputs
-        return cls.of(lines, hold, s.dt if transient else None, n_real, lift, plane)
+        return cls.of(lines, hold, s.dt if transient else None, n_real, lift, plane, like)
 
     @classmethod
     def of_response(
@@ -186,6 +192,11 @@ class SpectralExperiment:
             lines=dataclasses.replace(self.lines, U=self.lines.U * late),
             points=Points(self.points.z, self.points.U * late),
         )
+
+    def _at_the_points_of(self, lines: Lines, hold: Hold, lift: int) -> bool:
+        """Whether the inputs of lines under a hold act where those of this one do."""
+        same = not self.discrete and self.hold == hold and self.lift == lift
+        return same and np.array_equal(self.lines.omega_input, lines.omega_input)
 
     @property
     def n_lines(self) -> int:

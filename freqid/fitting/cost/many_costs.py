@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,11 @@ class ManyPoints:
         """Those of some of the points."""
         parts = self.residual, self.jacobian, self.transient, self.inverse
         return ManyPoints(*(each[which] for each in parts))
+
+    def moved(self, step: FloatArray) -> ManyPoints:
+        """The same after steps (S, P) over which residuals are straight lines."""
+        more = (step[:, None] @ self.without_transients())[:, 0]
+        return replace(self, residual=self.residual + more)
 
     def normal(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Cost (S,), gradient JᵀR (S, P) and JᵀJ (S, P, P), the transients taken off."""

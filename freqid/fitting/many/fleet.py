@@ -75,7 +75,7 @@ def fit_many(
             ``parallel``.
         verdicts: False leaves out witness, warnings and verdict, which take longer than the fit.
         reading: arguments of ``read`` for paths, ``{"inputs": "torque"}``.
-        chunk: records that are kept, or lost, as one; None takes 8, or 32 without verdicts.
+        chunk: records that are kept, or lost, as one; None takes 8, or 128 without verdicts.
         progress: None shows a bar on a terminal, True also lines in a log, False nothing.
         fit_options: of ``fit``: band, hold, weights, start, …
 

@@ -15,6 +15,7 @@ import numpy as np
 from freqid.checks import FloatArray, IntArray
 from freqid.data import Record
 from freqid.fitting.channel_order import in_order_of
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.many_costs import ManyCosts, one_shape
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.entry import fit
@@ -31,11 +32,11 @@ from freqid.models import GreyBox
 _OPTIONS = {"start", "band", "hold", "seed"}
 # residuals and their derivatives in a batch at a time: more of them leave the processor's cache
 _VALUES = 540_000
-# lines of the first steps; gain and step that end these, the step that ends the others, and how
-# many there are of each at the most
-_LINES, _GAIN, _FIRST_STEP, _LAST_STEP, _LIMIT, _STEPS = 300, 1e-4, 1e-3, 1e-4, 40, 4
-# a step of this part of a standard error is the last, too: after it the cost is flat to ten digits
-_OF_STD = 0.05
+# lines of the first steps; gain and step that end these, and how many there are of each at the most
+_LINES, _GAIN, _FIRST_STEP, _LIMIT, _STEPS = 300, 1e-4, 1e-3, 40, 5
+# after a step of this size, or this part of a standard error, there is one more: the cost is flat to
+# ten digits then; over one of that size residuals are straight lines and their slopes constant
+_LAST_STEP, _OF_STD, _STRAIGHT = 1e-4, 0.05, 1e-7
 # lines that are enough for error bars and doubts
 _ENOUGH = 4000
 # records that are tried from the start, of which the others learn where they may be
@@ -97,12 +98,12 @@ def _of_one_shape(
 ) -> list[Done | None]:
     skip_zero = model.integrates
     band, hold = options.get("band"), options.get("hold")
-    experiments = []
+    experiments: list[SpectralExperiment] = []
     for record in records:
         reading = Reading.of(
             in_order_of(model, record), hold, band, skip_zero=skip_zero,  # type: ignore[arg-type]
         )  # fmt: skip
-        experiments.append(reading.lines())
+        experiments.append(reading.lines(like=experiments[0] if experiments else None))
     structure = GreyStructure(model, checked_start(model, options.get("start")))  # type: ignore[arg-type]
     shape = len(experiments[0].lines.Y), len(experiments[0].lines.U)
     own = model.n_outputs, model.n_inputs
@@ -158,55 +159,57 @@ def _minima_of(every: ManyCosts, near: FloatArray) -> list[Done | None]:
     """Those next to points (S, P), so many at a time as memory is quick with."""
     columns = near.shape[1] + len(every.structure.model.poles) + 1
     size = max(_VALUES // (every.first.n_rows * columns), 1)
+    part = min(_ENOUGH / every.first.n_lines, 1.0)
+    few = every.thinned(part, evenly=True) if part <= 0.5 else every
     found: list[Done | None] = []
     for first in range(0, len(near), size):
         some = slice(first, first + size)
-        found += _minima(every.some(some), near[some])
+        found += _minima(every.some(some), few.some(some), near[some])
     return found
 
 
 @np.errstate(all="ignore")
-def _minima(every: ManyCosts, x: FloatArray) -> list[Done | None]:
-    """Those next to points (S, P)."""
-    structure, lines, x = every.structure, every.first.n_lines, x.copy()
-    certain = np.zeros(len(x), bool)
-    on = np.arange(len(x))
+def _minima(every: ManyCosts, few: ManyCosts, x: FloatArray) -> list[Done | None]:
+    """Those next to points (S, P), error bars and doubts on ``few`` of the lines."""
+    x = x.copy()
+    done: list[Done | None] = [None] * len(x)
+    share = few.first.n_lines / every.first.n_lines
+    near, on = np.zeros(len(x), bool), np.arange(len(x))
     for _ in range(_STEPS):
         # a record that has ended stays where it is, whatever its neighbours do
-        cost, g, H = every.normal(x[on], on)
+        at = every.at(x[on], on)
+        cost, g, H = at.normal()
         inverse, told = inverse_of(H)
         std = np.sqrt(np.einsum("spp->sp", inverse) * (cost / every.first.n_rows)[:, None])
         step = -(inverse @ g[..., None])[..., 0]
         step = np.where(np.isfinite(step).all(axis=1)[:, None], step, 0.0)
         x[on] += step
-        # the step after such a one would be as small as its square, or as a part of it in noise
-        small = (np.abs(step) <= np.maximum(_LAST_STEP, _OF_STD * std)).all(axis=1)
-        certain[on] = told & small
-        on = on[~certain[on]]
+        # those that have left the numbers are not to take the others along
+        told &= np.isfinite(cost)
+        straight = (np.abs(step) <= np.minimum(_STRAIGHT, _OF_STD * std)).all(axis=1)
+        ended = np.flatnonzero((near[on] | straight) & told)
+        near[on] = told & (np.abs(step) <= np.maximum(_LAST_STEP, _OF_STD * std)).all(axis=1)
+        if len(ended):
+            which, last = on[ended], at.some(ended).moved(step[ended])
+            seen = last if few.first is every.first else few.at(x[which], which)
+            left = Left(few.some(which), x[which], seen, inverse[ended], share)
+            for i, each in zip(which, _told(left, last.cost, every.energy[which]), strict=True):
+                done[i] = each
+        on = np.delete(on, ended)
         if not len(on):
             break
-    at = every.at(x)
-    cost, _, H = at.normal()
-    inverse, told = inverse_of(H)
-    # those that have left the numbers are not to take the others along
-    ended = np.flatnonzero(certain & told & np.isfinite(cost))
-    done: list[Done | None] = [None] * len(x)
-    if not len(ended):
-        return done
-    x, cost, energy = x[ended], cost[ended], every.energy[ended]
-    few, at = every.some(ended), at.some(ended)
-    if lines / 2 >= _ENOUGH:
-        few = few.thinned(_ENOUGH / lines, evenly=True)
-        at = few.at(x)
-    left = Left(few, x, at, inverse[ended], few.first.n_lines / lines)
-    for number, i in enumerate(ended):
-        if not left.certain[number]:
-            continue
-        theta, std = x[number] * structure.scale, left.std[number] * structure.scale
-        done[i] = Done(
-            dict(zip(structure.names, theta.tolist(), strict=True)),
-            dict(zip(structure.names, std.tolist(), strict=True)),
-            float(cost[number]),
-            float(100 * (1 - np.sqrt(cost[number] / energy[number]))),
-        )
+    return done
+
+
+def _told(left: Left, cost: FloatArray, energy: FloatArray) -> list[Done | None]:
+    """What is said of minima of a cost (S,) and data of an energy (S,), None where in doubt."""
+    structure = left.costs.structure
+    theta, std = left.x * structure.scale, left.std * structure.scale
+    percent = 100 * (1 - np.sqrt(cost / energy))
+    told = theta.tolist(), std.tolist(), cost.tolist(), percent.tolist()
+    done: list[Done | None] = []
+    for certain, values, errors, each, explained in zip(left.certain, *told, strict=True):
+        values = dict(zip(structure.names, values, strict=True))
+        errors = dict(zip(structure.names, errors, strict=True))
+        done.append(Done(values, errors, each, explained) if certain else None)
     return done
