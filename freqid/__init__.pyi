@@ -54,6 +54,8 @@ from .fitting import (
     select_order as select_order,
 )
 from .frf import (
+    CrossSpectra as CrossSpectra,
+    cross_spectra as cross_spectra,
     distortion as distortion,
     etfe as etfe,
     h1 as h1,

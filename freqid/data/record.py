@@ -24,7 +24,7 @@ from freqid.data.conditions import as_conditions
 from freqid.data.folding import low_pass, power_above
 from freqid.data.frames import record_of, samples_frame
 from freqid.data.printed import as_html, as_text
-from freqid.data.sampling import check_rates, less_trend, noise_sizes, sample_at
+from freqid.data.sampling import check_rates, less_trend, noise_sizes, samples_between
 from freqid.data.selection import as_holds, channel, selected, with_input
 from freqid.data.signals import Signals
 from freqid.data.sources import that_follows
@@ -165,14 +165,8 @@ class Record(Signals):
         >>> Record(np.arange(8.0), np.arange(8.0), dt=0.5).slice(1, 2).y
         array([2., 3.])
         """
-        first = 0 if start is None else sample_at(finite("start", start) / self.dt)
-        last = self.n_samples if stop is None else sample_at(finite("stop", stop) / self.dt)
-        first, last = max(first, 0), min(last, self.n_samples)
-        if last - first < 1:
-            raise InputError(
-                f"start={start}, stop={stop} s leave no sample; the record runs from 0 to "
-                f"{self.duration:g} s"
-            )
+        first, last = samples_between(start, stop, self.dt, self.n_samples)
+        assert last is not None
         M = self.factor
         return replace(
             self,

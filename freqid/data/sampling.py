@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, numbers
+from freqid.checks import FloatArray, InputError, finite, numbers
 
 
 def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
@@ -29,6 +29,25 @@ def check_rates(dt: float, input_dt: float, n_out: int, n_in: int) -> None:
 def sample_at(position: float) -> int:
     """The first sample at or after a position; a sample time off by rounding is that sample."""
     return int(np.ceil(position - 1e-6))
+
+
+def samples_between(
+    start: float | None, stop: float | None, dt: float, count: int | None
+) -> tuple[int, int | None]:
+    """The first sample from ``start`` on and the first from ``stop`` on, both in s.
+
+    Of ``count`` samples, or of as many as come; ValueError where none is left.
+    """
+    first = 0 if start is None else max(sample_at(finite("start", start) / dt), 0)
+    last = count if stop is None else sample_at(finite("stop", stop) / dt)
+    if last is not None and count is not None:
+        last = min(last, count)
+    if last is not None and last - first < 1:
+        runs = "on" if count is None else f"to {count * dt:g} s"
+        raise InputError(
+            f"start={start}, stop={stop} s leave no sample; the record runs from 0 {runs}"
+        )
+    return first, last
 
 
 def noise_sizes(y: FloatArray, std: ArrayLike | None, snr: ArrayLike | None) -> FloatArray:

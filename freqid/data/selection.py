@@ -14,6 +14,7 @@ from freqid.lti import Hold, InputHolds, as_hold
 
 if TYPE_CHECKING:
     from freqid.data.record import Record
+    from freqid.data.streams import Stream
 
 
 def channel(record: Record, name: str) -> FloatArray:
@@ -31,19 +32,31 @@ def selected(
     record: Record, inputs: Sequence[str] | str | None, outputs: Sequence[str] | str | None
 ) -> Record:
     """The record with some of its channels, in the order given."""
-    u_names = _names("inputs", inputs, record.input_names)
-    y_names = _names("outputs", outputs, record.output_names)
+    u_names, y_names = channels_of(record, inputs, outputs)
     u = record.inputs[:, [record.input_names.index(n) for n in u_names]]
     y = record.outputs[:, [record.output_names.index(n) for n in y_names]]
-    hold = record.hold
-    if isinstance(hold, InputHolds):
-        hold = hold.of([record.input_names.index(n) for n in u_names])
     kept = {*u_names, *y_names, "reference"}
     return dataclasses.replace(
         record,
-        u=_flat(u), y=_flat(y), hold=hold, input_names=u_names, output_names=y_names,
+        u=flat(u), y=flat(y), hold=hold_of(record, u_names),
+        input_names=u_names, output_names=y_names,
         units={n: unit for n, unit in record.units.items() if n in kept},
     )  # fmt: skip
+
+
+def channels_of(
+    data: Record | Stream, inputs: Sequence[str] | str | None, outputs: Sequence[str] | str | None
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the inputs and outputs that are asked for; ValueError for unknown ones."""
+    return _names("inputs", inputs, data.input_names), _names("outputs", outputs, data.output_names)
+
+
+def hold_of(data: Record | Stream, inputs: Sequence[str]) -> Hold:
+    """What some of the inputs did between their samples."""
+    hold = data.hold
+    if isinstance(hold, InputHolds):
+        return hold.of([data.input_names.index(n) for n in inputs])
+    return hold
 
 
 def with_input(
@@ -102,5 +115,6 @@ def _names(
     return names
 
 
-def _flat(columns: FloatArray) -> FloatArray:
+def flat(columns: FloatArray) -> FloatArray:
+    """One channel as (N,), several as they are, (N, channels)."""
     return columns[:, 0] if columns.shape[1] == 1 else columns

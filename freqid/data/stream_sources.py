@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, finite, listed, positive, unknown, whole
+from freqid.checks import Array, FloatArray, InputError, finite, listed, positive, unknown, whole
 from freqid.data.conditions import as_conditions
 from freqid.data.selection import as_holds
-from freqid.data.stream_files import Found, Source, of_array, of_file
-from freqid.data.streams import BLOCK, Stream
+from freqid.data.stream_files import of_file
+from freqid.data.stream_found import Found, Source, of_array
+from freqid.data.stream_views import from_the_first
+from freqid.data.streams import BLOCK, Stream, as_rows
 from freqid.lti import Hold, ZeroOrderHold
 
 
@@ -23,21 +25,24 @@ def open(
     hold: Hold | str | Mapping[str, Hold | str] | None = None,
     *,
     columns: Sequence[str] | None = None,
-    scale: float = 1.0,
+    scale: float | Sequence[float] | Mapping[str, float] = 1.0,
+    group: str | None = None,
     block: int = BLOCK,
 ) -> Stream:
     """A record that stays where it is: read block by block, in bounded memory.
 
     Args:
-        source: a path (.npy, .h5 with extra ``hdf5``, .parquet with extra ``parquet``), an array or
-            a dask array (N, channels), an iterable of blocks (n, channels), or a function that
-            starts such an iterable anew for each pass.
+        source: a path (.npy, .h5 with extra ``hdf5``, .parquet with extra ``parquet``, .zarr with
+            extra ``zarr``), an array or a dask array (N, channels), an iterable of blocks
+            (n, channels), or a function that starts such an iterable anew for each pass.
         inputs, outputs: channels by name; of two, the first is the input.
         dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set
             ``time`` or ``dt``), or instead of it.
         hold: what the input did, where the file does not remember it; a zero-order hold else.
         columns: names of the channels of arrays and blocks, u and y where not given.
-        scale: what integer samples are multiplied by.
+        scale: what samples, integers for the most part, are multiplied by: one for all, one for
+            each channel that is taken, inputs first, or some by name.
+        group: of an HDF5 or zarr file that holds several groups of arrays.
         block: samples of a block.
 
     Float32 and integer samples are widened block by block. Raises FileNotFoundError for a missing
@@ -49,9 +54,12 @@ def open(
     >>> bool(np.allclose(fq.h1(stream, 500).response, fq.h1(record, 500).response))
     True
     """
-    size, scale = whole("block", block), finite("scale", scale)
+    size = whole("block", block)
     if isinstance(source, (str, Path)):
-        found = of_file(Path(source), size, dt)
+        asked = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
+        found = of_file(Path(source), size, dt, columns, group, asked)
+    elif group is not None:
+        raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
         found = of_array(source, columns, size, type(source).__name__)
     elif callable(source) or isinstance(source, Iterable):
@@ -65,18 +73,11 @@ def open(
         raise InputError(f"dt=None and {found.origin} says no sample time; give dt in s")
     u_names, y_names = _chosen(found.names, inputs, outputs)
     pick = [found.names.index(n) for n in (*u_names, *y_names)]
-    whole_rows = pick == list(range(len(found.names)))
+    factors = _factors(scale, [*u_names, *y_names])
 
-    def blocks() -> Iterator[FloatArray]:
-        for rows in found.blocks():
-            wide = np.asarray(rows)
-            wide = wide[:, None] if wide.ndim == 1 else wide
-            if wide.ndim != 2 or wide.shape[1] != len(found.names):
-                # told by whoever reads it, with the place
-                yield wide
-                continue
-            picked = wide if whole_rows else wide[:, pick]
-            yield picked if scale == 1 else np.asarray(picked, dtype=float) * scale
+    def blocks(first: int) -> Iterator[Array]:
+        for rows in found.blocks(first, pick):
+            yield rows if factors is None else rows * factors
 
     said = found.hold if hold is None else hold
     held = as_holds(said, step, ZeroOrderHold(step), tuple(u_names))
@@ -88,21 +89,62 @@ def open(
 
 def _of_blocks(source: Source, columns: Sequence[str] | None) -> Found:
     names = ["u", "y"] if columns is None else list(columns)
-    if callable(source):
-        return Found(source, names, None, None, "blocks")
-    again = iter(source) is not source
+    again = callable(source) or iter(source) is not source
     used = False
 
-    def blocks() -> Iterable[Source]:
+    def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         nonlocal used
         if used and not again:
             raise InputError(
                 "this iterator of blocks has been used up; give a function that starts it anew"
             )
         used = True
-        return iter(source)
+        started = source() if callable(source) else source
+        for rows in from_the_first(_alike(started, len(names)), first):
+            yield rows if list(which) == list(range(len(names))) else rows[:, which]
 
     return Found(blocks, names, None, None, "blocks")
+
+
+def _alike(blocks: Iterable[Array], width: int) -> Iterator[Array]:
+    """Blocks (n, width) of one kind of numbers; ValueError, with the place, for others."""
+    at, kind = 0, ""
+    for block in blocks:
+        rows = as_rows(block, f"blocks: the block at sample {at}", width)
+        kind = kind or rows.dtype.kind
+        # integers among floating numbers lack their scale
+        if (rows.dtype.kind == "f") != (kind == "f"):
+            raise InputError(
+                f"blocks: the block at sample {at} holds {rows.dtype}, others before it "
+                f"{'floating' if kind == 'f' else 'whole'} numbers; expected one kind"
+            )
+        at += len(rows)
+        yield rows
+
+
+def _listed(given: Sequence[str] | str) -> list[str]:
+    return [given] if isinstance(given, str) else list(given)
+
+
+def _factors(
+    scale: float | Sequence[float] | Mapping[str, float], names: Sequence[str]
+) -> FloatArray | None:
+    """What each channel is multiplied by; None for one, which changes nothing."""
+    if isinstance(scale, Mapping):
+        for name in scale:
+            if name not in names:
+                raise InputError(unknown("scale", name, names))
+        each = [finite(f"scale[{n!r}]", scale.get(n, 1.0)) for n in names]
+    elif isinstance(scale, (Sequence, np.ndarray)) and not isinstance(scale, str):
+        each = [finite("scale", value) for value in scale]
+        if len(each) != len(names):
+            raise InputError(
+                f"scale has {len(each)} values; expected one, or {len(names)}, of "
+                f"{', '.join(names)}"
+            )
+    else:
+        each = [finite("scale", scale)] * len(names)
+    return None if all(value == 1 for value in each) else np.array(each)
 
 
 def _chosen(

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from freqid.checks import Array, FloatArray, InputError, whole
+from freqid.checks import Array, FloatArray, InputError, flag, whole
+from freqid.data.band import Band, as_band
+from freqid.data.conditions import as_conditions
 from freqid.data.record import Record
+from freqid.data.sampling import samples_between
+from freqid.data.selection import as_holds, channels_of, flat, hold_of
+from freqid.data.stream_views import Blocks, every_so_many, filtered, of_columns, part_of
 from freqid.lti import Hold
 
 # samples of a block that is read at once
 BLOCK = 1 << 18
 
-Blocks = Callable[[], Iterator[FloatArray]]
-
 
 @dataclass(frozen=True, eq=False)
 class Stream:
-    """A record that is not in memory: ``h1``, ``h2`` and ``hv`` take it in one pass.
+    """A record that is not in memory: averages, ``periodic`` and ``fit`` take it in one pass.
 
-    Made by ``freqid.open``. ``blocks`` starts a pass: arrays (n, channels), inputs first.
-    ``n_samples`` is None where only a pass tells it.
+    Made by ``freqid.open``; ``slice``, ``decimate``, ``select`` and ``with_band`` are views, which
+    read nothing. ``blocks(first)`` starts a pass at a sample: arrays (n, channels), inputs first.
+    ``n_samples`` is None where only a pass tells it. ``band`` (Hz) is the one in which lines are
+    taken where none is asked for. Of the source, it begins at sample ``begin`` and holds each
+    ``step``-th.
     """
 
     blocks: Blocks
@@ -33,6 +39,9 @@ class Stream:
     n_samples: int | None = None
     origin: str = "stream"
     conditions: Mapping[str, float] = field(default_factory=dict)
+    band: Band | None = None
+    begin: int = 0
+    step: int = 1
 
     # what a record has, and a stream does not
     factor = 1
@@ -53,10 +62,88 @@ class Stream:
         """Nyquist limit in Hz."""
         return 0.5 / self.dt
 
+    def slice(self, start: float | None = None, stop: float | None = None) -> Stream:
+        """The samples from ``start`` up to but not including ``stop``, both in s, as a view.
+
+        Raises ValueError where nothing is left.
+
+        >>> import freqid as fq
+        >>> fq.open(np.arange(16.0).reshape(8, 2), dt=0.5).slice(1, 2).load().y
+        array([5., 7.])
+        """
+        first, last = samples_between(start, stop, self.dt, self.n_samples)
+        known = None if last is None else last - first
+        return replace(
+            self, blocks=part_of(self.blocks, first, last), n_samples=known,
+            begin=self.begin + first * self.step,
+        )  # fmt: skip
+
+    def decimate(self, factor: int, keep_input: bool = False, antialias: bool = False) -> Stream:
+        """Every ``factor``-th sample, as a view, with the hold remembered as it was.
+
+        ``antialias=True`` first runs the same symmetric filter over inputs and outputs, which
+        leaves their relation alone: one up to 0.9 of the new Nyquist frequency, 1e-5 and less above
+        it. Raises ValueError for a factor that is no whole number, or leaves fewer than two
+        samples, and for ``keep_input``: a fit takes a band of the stream as it is at no more cost.
+
+        >>> import freqid as fq
+        >>> fq.open(np.arange(16.0).reshape(8, 2), dt=0.5).decimate(4).load().y
+        array([1., 9.])
+        """
+        factor = whole("factor", factor)
+        if flag("keep_input", keep_input):
+            raise InputError(
+                "keep_input=True: a stream has one rate; fit it as it is, a band of it costs no "
+                "more than a decimated one, or load() it"
+            )
+        left = None if self.n_samples is None else -(-self.n_samples // factor)
+        if left is not None and left < 2:
+            raise InputError(
+                f"factor={factor} leaves {left} of {self.n_samples} samples; take less"
+            )
+        blocks = self.blocks
+        if flag("antialias", antialias) and factor > 1:
+            blocks = filtered(self.checked, factor)
+        return replace(
+            self, blocks=every_so_many(blocks, factor), dt=self.dt * factor, n_samples=left,
+            step=self.step * factor,
+        )  # fmt: skip
+
+    def select(
+        self,
+        inputs: Sequence[str] | str | None = None,
+        outputs: Sequence[str] | str | None = None,
+    ) -> Stream:
+        """The stream with some of its channels, in the order given; ValueError for unknown ones."""
+        u, y = channels_of(self, inputs, outputs)
+        every = (*self.input_names, *self.output_names)
+        columns = [every.index(n) for n in u] + [
+            self.n_inputs + self.output_names.index(n) for n in y
+        ]
+        held = hold_of(self, u)
+        return replace(
+            self, blocks=of_columns(self.blocks, columns), hold=held, input_names=u, output_names=y
+        )
+
+    def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> Stream:
+        """The same samples with another hold remembered, as ``Record.with_hold``."""
+        return replace(self, hold=as_holds(hold, self.dt, self.hold, self.input_names))
+
+    def with_conditions(self, **conditions: float) -> Stream:
+        """The stream with what was set for it, by name, as ``Record.with_conditions``."""
+        return replace(self, conditions=as_conditions({**self.conditions, **conditions}))
+
+    def with_band(self, band: tuple[float, float] | None) -> Stream:
+        """The stream whose lines are taken in a band (Hz) wherever none is asked for.
+
+        Raises ValueError for a band that does not lie below the Nyquist limit.
+        """
+        return replace(self, band=as_band(band, self.nyquist))
+
     def pieces(
-        self, length: int, step: int, size: int = BLOCK
+        self, length: int, step: int, size: int = BLOCK, first: int = 0
     ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-        """Whole segments of ``length`` every ``step`` samples, several at a time.
+        """Whole segments of ``length`` every ``step`` samples from a sample on, several at a time.
 
         Yields their number, inputs (n, inputs) and outputs (n, outputs), views that the next ones
         overwrite; segments run across the borders of blocks. Raises ValueError, saying where, for a
@@ -64,10 +151,20 @@ class Stream:
         """
         per = max(size // step, 1)
         want = (per - 1) * step + length
-        m, have, at = self.n_inputs, 0, 0
+        m, have, at = self.n_inputs, 0, first
         # channel by channel, as they are transformed, and the same memory for all
         held = np.empty((m + self.n_outputs, want))
-        for block in self._checked():
+        failed: InputError | None = None
+        blocks = self.checked(first)
+        while True:
+            try:
+                block = next(blocks, None)
+            except InputError as error:
+                # whole segments before it are worth having
+                failed = error
+                break
+            if block is None:
+                break
             taken = 0
             while taken < len(block):
                 some = block[taken : taken + want - have]
@@ -81,51 +178,66 @@ class Stream:
         if left:
             end = (left - 1) * step + length
             yield left, held[:m, :end].T, held[m:, :end].T
-        elif at == 0:
+        if failed is not None:
+            raise failed
+        if not left and at == 0:
             raise InputError(
                 f"segment={length} is longer than {self.origin}, which ended after {have} samples"
             )
 
     def stretches(self, length: int) -> Iterator[tuple[FloatArray, FloatArray]]:
-        """Inputs (n, inputs) and outputs (n, outputs), ``length`` samples after ``length``; the
-        last may be shorter.
+        """Inputs (n, inputs) and outputs (n, outputs), ``length`` samples after ``length``, views
+        that the next ones overwrite; the last may be shorter.
         """
-        kept: list[Array] = []
-        have = 0
-        for block in self._checked():
-            kept.append(block)
-            have += len(block)
-            while have >= length:
-                rows = np.concatenate(kept).astype(float, copy=False)
-                yield rows[:length, : self.n_inputs], rows[:length, self.n_inputs :]
-                kept, have = [rows[length:]], have - length
-        rows = np.concatenate(kept).astype(float, copy=False) if kept else np.zeros((0, 0))
-        if len(rows):
-            yield rows[:, : self.n_inputs], rows[:, self.n_inputs :]
+        rows, have, m = np.empty((length, self.n_inputs + self.n_outputs)), 0, self.n_inputs
+        for block in self.checked():
+            taken = 0
+            while taken < len(block):
+                some = block[taken : taken + length - have]
+                rows[have : have + len(some)] = some
+                have, taken = have + len(some), taken + len(some)
+                if have == length:
+                    yield rows[:, :m], rows[:, m:]
+                    have = 0
+        if have:
+            yield rows[:have, :m], rows[:have, m:]
 
-    def _checked(self) -> Iterator[Array]:
-        width, at = self.n_inputs + self.n_outputs, 0
-        for block in self.blocks():
-            rows = np.asarray(block)
-            rows = rows[:, None] if rows.ndim == 1 else rows
-            # what is narrower is widened by whoever copies it
-            rows = rows if rows.dtype.kind in "fiu" else np.asarray(rows, dtype=float)
-            if rows.ndim != 2 or rows.shape[1] != width:
-                raise InputError(
-                    f"{self.origin}: the block at sample {at} has shape {rows.shape}; expected "
-                    f"(n, {width})"
-                )
+    def checked(self, first: int = 0) -> Iterator[Array]:
+        """Blocks (n, channels) from a sample on; ValueError, saying where, for what is none."""
+        width, at = self.n_inputs + self.n_outputs, first
+        blocks = self._told(first, lambda: at)
+        for block in blocks:
+            rows = as_rows(block, f"{self.origin}: the block at sample {self._place(at)}", width)
             # a sum shows at once what is not finite; one that is only large is looked at again
             with np.errstate(all="ignore"):
                 total = rows.sum()
             if not np.isfinite(total):
                 bad = ~np.isfinite(rows).all(axis=1)
                 if bad.any():
+                    place = self._place(at + int(np.argmax(bad)))
                     raise InputError(
-                        f"{self.origin}: sample {at + int(np.argmax(bad))} is NaN or infinite"
+                        f"{self.origin}: sample {place} is NaN or infinite; slice() takes what is "
+                        "beside it"
                     )
             at += len(rows)
             yield rows
+
+    def _told(self, first: int, at: Callable[[], int]) -> Iterator[Array]:
+        """The source's blocks; whatever it raises is said with its place."""
+        try:
+            yield from self.blocks(first)
+        except InputError:
+            raise
+        except Exception as error:
+            # a source may be a function of the user's, which may raise anything
+            raise InputError(
+                f"{self.origin}: reading stopped at sample {self._place(at())}: "
+                f"{type(error).__name__}: {error}"
+            ) from error
+
+    def _place(self, at: int) -> int:
+        """The number that a sample has in the source."""
+        return self.begin + at * self.step
 
     def load(self, stop: int | None = None) -> Record:
         """The samples, or the first ``stop`` of them (a number), as a Record in memory."""
@@ -133,14 +245,17 @@ class Stream:
             stop = whole("stop", stop)
         rows: list[Array] = []
         have = 0
-        for block in self._checked():
-            rows.append(block)
+        for block in self.checked():
+            # a source may fill the same memory once more
+            rows.append(np.array(block, dtype=float))
             have += len(block)
             if stop is not None and have >= stop:
                 break
-        every = np.concatenate(rows)[:stop].astype(float, copy=False)
+        if not rows:
+            raise InputError(f"{self.origin} holds no samples")
+        every = np.concatenate(rows)[:stop]
         return Record(
-            _flat(every[:, : self.n_inputs]), _flat(every[:, self.n_inputs :]), self.dt, self.hold,
+            flat(every[:, : self.n_inputs]), flat(every[:, self.n_inputs :]), self.dt, self.hold,
             input_names=self.input_names, output_names=self.output_names,
             conditions=self.conditions,
         )  # fmt: skip
@@ -151,5 +266,20 @@ class Stream:
         return f"<Stream {channels}: {count} at {self.dt:g} s, {self.hold!r}>"
 
 
-def _flat(columns: FloatArray) -> FloatArray:
-    return columns[:, 0] if columns.shape[1] == 1 else columns
+def as_rows(block: Array, what: str, width: int) -> Array:
+    """A block as real rows (n, width); ValueError, which names it, for another."""
+    if isinstance(block, np.ma.MaskedArray) and np.ma.getmaskarray(block).any():
+        raise InputError(f"{what} has masked samples; fill them, or slice() takes what is beside")
+    rows = np.asarray(block)
+    rows = rows[:, None] if rows.ndim == 1 else rows
+    if rows.dtype.kind not in "fiu":
+        # what is narrower is widened by whoever copies it
+        if rows.dtype.kind not in "bO":
+            raise InputError(f"{what} holds {rows.dtype}; expected real numbers")
+        try:
+            rows = np.asarray(rows, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{what} holds {rows.dtype}; expected real numbers") from None
+    if rows.ndim != 2 or rows.shape[1] != width:
+        raise InputError(f"{what} has shape {rows.shape}; expected (n, {width})")
+    return rows

@@ -18,7 +18,6 @@ from freqid.fitting.many import TableStore, fit_many, unordered
 from freqid.fitting.met import data_digest, met, remembered
 from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order
-from freqid.fitting.progress import Bar
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_at_stamps, line_errors
 from freqid.fitting.search.batched import Answers, descend

@@ -113,7 +113,8 @@ def fit(
             weighted by their relative variance where they have one.
         separate: names of parameters that each experiment has for itself: estimated as
             ``fm[0]``, ``fm[1]``, … and shown in ``est.separate``.
-        progress: show on the screen that a long fit is at work.
+        progress: show on the screen how far the pass over a stream is, and that a long fit is at
+            work.
 
     Returns an Estimate. Raises ValueError for arguments that do not fit the data or the model.
 
@@ -142,8 +143,10 @@ def fit(
         choice("reference", reference, ("auto",))
     passed: list[str] = []
     asked_hold = hold
+    flag("progress", progress)
     if isinstance(data, Stream):
-        data, told = _in_one_pass(data, hold, band, {
+        band = data.band if band is None else band
+        data, told = _in_one_pass(data, hold, band, progress, {
             "hold": hold == "estimate", "domain": domain == "time", "separate": bool(separate),
             "initial_state": initial_state != "estimate",
         })  # fmt: skip
@@ -187,7 +190,6 @@ def fit(
     if offset is not None:
         readings = [with_offset(r) for r in readings]
     options = SearchOptions(count, seed, start, estimated, own, near)
-    flag("progress", progress)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
     what, said = type(model).__name__, est.message.rstrip(".")
@@ -224,6 +226,7 @@ def _in_one_pass(
     stream: Stream,
     hold: Hold | str | Mapping[str, Hold | str] | None,
     band: tuple[float, float] | None,
+    progress: bool,
     refused: Mapping[str, bool],
 ) -> tuple[list[Record], str]:
     """The experiments of a stream under the hold that is asked for; what was done, in words."""
@@ -232,7 +235,7 @@ def _in_one_pass(
             raise InputError(f"{name}: what is asked needs the samples of the stream; load() it")
     # a name means the hold at the rate of the stream, not at that of what its band needs
     held = as_holds(hold, stream.dt, stream.hold, stream.input_names)
-    found = stretches(dataclasses.replace(stream, hold=held), band)
+    found = stretches(dataclasses.replace(stream, hold=held), band, progress)
     follow = f"{len(found)} experiments that follow on" if len(found) > 1 else "one experiment"
     return found, f"{stream.origin} was read in one pass, as {follow}"
 

@@ -13,10 +13,10 @@ from freqid.data import FrequencyResponse, Record, as_data_sets, channel_counts
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.progress import Bar
 from freqid.fitting.reading import Reading
 from freqid.lti import Hold, Plane, in_one_blas_thread
 from freqid.models import OutputError
+from freqid.progress import Bar
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,6 +4,7 @@ It may import what stands below it: checks, lti, data, excitation and models.
 """
 
 from freqid.frf.averaged import h1, h2, hv
+from freqid.frf.cross_spectra import CrossSpectra, cross_spectra
 from freqid.frf.distortions import distortion
 from freqid.frf.empirical import etfe
 from freqid.frf.local_models import local_polynomial, local_rational

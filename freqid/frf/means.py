@@ -7,42 +7,37 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from freqid.checks import ComplexArray, FloatArray, InputError, steps, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, an, flag, whole
 from freqid.data import (
     PeriodicResponse,
     Record,
     Reference,
+    Stream,
     as_band,
     as_records,
     chosen,
     references_of,
     that_estimates,
 )
+from freqid.frf.driven_lines import driven_lines, folded_lines
 from freqid.frf.measured import units_of
-from freqid.frf.noise_of_means import FREEDOM, means
+from freqid.frf.noise_of_means import PeriodMeans, means
+from freqid.frf.periods import PERIODS_SHOWN, check_period, samples_of_a_period
+from freqid.progress import Bar
 
-# part of the strongest line's amplitude below which a line is not excited
-_SILENT = 1e-3
-# and below which it is rounding
-_ROUNDED = 1e-12
-# a lag at which a signal repeats itself so well is a period
-_REPEATS = 0.9
-# multiples of a period that is given, of which one may be the true one
-_MULTIPLES = 12
-# a period that repeats less than this part of what a multiple does is wrong, and so little, none
-_WORSE, _NOT_AT_ALL = 0.75, 0.05
-# amplitude of a line in standard errors of its noise from which it is excited for certain
-_CERTAIN = 4.0
+# samples of periods of a stream that are taken at once
+_AT_ONCE = 1 << 18
 
 
 @that_estimates
 def periodic(
-    records: Record | Sequence[Record],
+    records: Record | Sequence[Record] | Stream | Sequence[Stream],
     period: float | None = None,
     reference: Reference | None = None,
     *,
     skip: int = 0,
     band: tuple[float, float] | None = None,
+    progress: bool | None = None,
 ) -> PeriodicResponse:
     """Response of periodic data with noise on inputs and outputs, in open or closed loop.
 
@@ -54,12 +49,13 @@ def periodic(
 
     Args:
         records: experiments of whole periods, each with an excitation of its own; as many as inputs
-            or more.
+            or more. Streams (see ``open``) are taken in one pass, some periods at a time.
         period: in s, a whole number of samples; None finds it in the reference, or in the input.
         reference: the excitation, where a loop or noise hides it, as in ``h1``: it tells the
             period and the excited lines. None takes the records' own where all have one.
         skip: periods left out at the start, while the transient dies.
         band: in Hz, None for all excited lines.
+        progress: as in ``fit_many``, over the samples of streams.
 
     Returns a PeriodicResponse (outputs, inputs, K) at the excited lines with variance, ``inputs``,
     ``outputs`` (channels, experiments, K) and their ``noise``. Raises ValueError for fewer than two
@@ -74,18 +70,25 @@ def periodic(
     >>> periodic(record, period=1.0, skip=1)
     <PeriodicResponse 1x1: 50 lines, 1-50 Hz, dt=0.001 s>
     """
-    sets = as_records(records)
+    if progress is not None:
+        flag("progress", progress)
+    sets = _experiments(records)
     first = sets[0]
     M = first.factor
     if reference is None and all(r.reference is not None for r in sets):
         reference = True
-    signals = references_of(sets, reference)
-    n = _samples(sets, signals, period)
-    for i, record in enumerate(sets):
+    signals = None
+    if reference is not None and reference is not False:
+        if any(isinstance(r, Stream) for r in sets):
+            raise InputError("reference: a stream has none; load() it")
+        signals = references_of([r for r in sets if isinstance(r, Record)], reference)
+    n = samples_of_a_period(sets, signals, period)
+    for i, each in enumerate(sets):
+        record = each.load(PERIODS_SHOWN * n) if isinstance(each, Stream) else each
         driven, size = (record.inputs, n * M) if signals is None else (signals[i], n)
-        _check_period(f"records[{i}]", driven - driven.mean(axis=0), size, n * first.dt)
+        check_period(f"records[{i}]", driven - driven.mean(axis=0), size, n * first.dt)
     skip = whole("skip", skip, least=0)
-    counts = [r.n_samples // n - skip for r in sets]
+    counts = [_count(r) // n - skip for r in sets]
     if min(counts) < 2:
         raise InputError(
             f"records hold {min(counts) + skip} periods of {n * first.dt:g} s, {skip} of them "
@@ -97,14 +100,20 @@ def periodic(
             "an excitation of its own"
         )
     P = min(counts)
-    Z = np.stack([_spectra(r, n, skip, P) for r in sets])  # (E, P, channels, lines)
-    f = np.arange(Z.shape[-1]) / (n * first.dt)
-    inside = chosen(f, as_band(band, first.nyquist), positive=True)
+    found = [_means_of(r, n, skip, P, progress) for r in sets]
+    f = np.arange(found[0].mean.shape[-1]) / (n * first.dt)
+    limits = first.band if band is None and isinstance(first, Stream) else band
+    inside = chosen(f, as_band(limits, first.nyquist), positive=True)
     # the line at Nyquist has no phase
     inside &= 2 * np.arange(len(f)) < n
-    excited = inside & _excited(sets, signals, Z, n, skip, P)
+    fine = found
     if M > 1:
-        folded = _folded(sets, n, skip, P)
+        # no stream has a faster input
+        faster = [r.inputs for r in sets if isinstance(r, Record)]
+        fine = [PeriodMeans.of(_amplitudes(u, n * M, skip, P)) for u in faster]
+    excited = inside & driven_lines(first.n_outputs, signals, found, fine, n, skip)
+    if M > 1:
+        folded = folded_lines(fine, n)
         if excited.any() and not (excited & ~folded).any():
             raise InputError(
                 f"every excited line in band={band} has power of the input from above the output's "
@@ -112,75 +121,55 @@ def periodic(
             )
         excited &= ~folded
     if not excited.any():
-        raise InputError(f"input has no energy in band={band}; widen it")
-    mean, noise, freedom = means(Z[..., excited], first.n_outputs)
+        raise InputError(f"input has no energy in band={limits}; widen it")
+    mean, noise, freedom = means([each.at(excited) for each in found], first.n_outputs)
     return _packed(first, f[excited], mean, noise, freedom)
 
 
-def _samples(
-    sets: Sequence[Record], signals: Sequence[FloatArray] | None, period: float | None
-) -> int:
-    """Samples of a period, given or found; ValueError where there is none."""
-    first = sets[0]
-    if period is not None:
-        return steps("period", period, first.dt, least=2)
-    if signals is not None:
-        return _repeat(signals[0][:, 0])
-    fine, M = _repeat(first.inputs[:, 0]), first.factor
-    if fine % M:
-        raise InputError(
-            f"the excitation repeats after {fine * first.input_dt:g} s, which is no whole number "
-            f"of the output's samples of {first.dt:g} s; make it one"
-        )
-    return fine // M
-
-
-def _repeat(x: FloatArray) -> int:
-    """Samples after which a signal repeats itself; ValueError where it does not."""
-    x = x - x.mean()
-    N = len(x)
-    size = scipy.fft.next_fast_len(2 * N)
-    r = scipy.fft.irfft(np.abs(scipy.fft.rfft(x, size)) ** 2, size)[: N // 2 + 1]
-    # energies of the two parts that a lag compares
-    energy = np.cumsum(x**2)
-    lags = np.arange(1, len(r))
-    early, late = energy[N - 1 - lags], energy[-1] - energy[lags - 1]
-    alike = np.concatenate([[1.0], r[1:] / np.sqrt(np.maximum(early * late, 1e-300))])
-    # beyond the first fall, so that a smooth signal is no period of one sample
-    fallen = np.flatnonzero(alike < 0.5)
-    found = np.flatnonzero(alike > _REPEATS)
-    found = found[found > (fallen[0] if len(fallen) else len(r))]
-    if not len(found):
-        raise InputError("the excitation does not repeat itself; give period= in s")
-    near = found[found <= found[0] * 1.05 + 2]
-    return int(near[np.argmax(alike[near])])
-
-
-def _check_period(name: str, x: FloatArray, n: int, period: float) -> None:
-    """ValueError where n samples, a period in s, do not repeat, or a multiple does much better."""
-    own = _repeats(x, n)
-    for m in range(2, min(len(x) // n // 2, _MULTIPLES) + 1):
-        better = _repeats(x, m * n)
-        if better > _REPEATS and own < _WORSE * better:
+def _experiments(
+    records: Record | Sequence[Record] | Stream | Sequence[Stream],
+) -> Sequence[Record | Stream]:
+    """Records, or streams with the same channels and sample time."""
+    given = [records] if isinstance(records, Stream) else records
+    if not isinstance(given, Sequence) or not any(isinstance(r, Stream) for r in given):
+        return as_records(records)  # type: ignore[arg-type]
+    for i, each in enumerate(given):
+        an(f"records[{i}]", each, Stream)
+    first = given[0]
+    assert isinstance(first, Stream)
+    for i, each in enumerate(given):
+        assert isinstance(each, Stream)
+        same = each.input_names == first.input_names and each.output_names == first.output_names
+        if not same or not np.isclose(each.dt, first.dt, rtol=1e-9):
             raise InputError(
-                f"{name}: the excitation repeats after {m * period:g} s; after period={period:g} s "
-                f"only {100 * max(own, 0):.0f} % of its power does; give period={m * period:g}"
+                f"records[{i}] is {each!r} beside {first!r}; channels and sample times must agree"
             )
-    if len(x) >= 2 * n and own < _NOT_AT_ALL:
-        raise InputError(
-            f"{name}: only {100 * max(own, 0):.0f} % of the excitation's power repeats after "
-            f"period={period:g} s; give that of all records"
-        )
+    return given
 
 
-def _repeats(x: FloatArray, n: int) -> float:
-    """Part of a signal's power (samples, channels) that n samples repeat; about 0 for noise."""
-    rows = x[: len(x) // n * n].reshape(-1, n, x.shape[1])
-    P, power = len(rows), float((rows**2).mean())
-    if P < 2 or not power:
-        return 0.0
-    share = float((rows.mean(axis=0) ** 2).mean()) / power
-    return (P * share - 1) / (P - 1)
+def _count(data: Record | Stream) -> int:
+    """Samples, for which a stream that does not know has to be read."""
+    if isinstance(data, Stream) and data.n_samples is None:
+        return sum(map(len, data.checked()))
+    assert data.n_samples is not None
+    return data.n_samples
+
+
+def _means_of(
+    data: Record | Stream, n: int, skip: int, periods: int, progress: bool | None
+) -> PeriodMeans:
+    """Means over periods of n samples, (outputs + inputs, lines), of amplitudes."""
+    if isinstance(data, Record):
+        return PeriodMeans.of(_spectra(data, n, skip, periods))
+    whole_periods = data.slice(skip * n * data.dt, (skip + periods) * n * data.dt)
+    total: PeriodMeans | None = None
+    with Bar(progress, periods * n, 0, "samples") as advance:
+        for u, y in whole_periods.stretches(max(_AT_ONCE // n, 1) * n):
+            some = PeriodMeans.of(_amplitudes(np.hstack([y, u]), n, 0, len(u) // n))
+            total = some if total is None else total.beside(some)
+            advance(len(u))
+    assert total is not None
+    return total
 
 
 def _spectra(record: Record, n: int, skip: int, periods: int) -> ComplexArray:
@@ -196,56 +185,8 @@ def _amplitudes(x: FloatArray, n: int, skip: int, periods: int) -> ComplexArray:
     return np.moveaxis(scipy.fft.rfft(kept, axis=1), 1, -1) * 2 / n
 
 
-def _folded(sets: Sequence[Record], n: int, skip: int, P: int) -> FloatArray:
-    """Which lines of a slower output have excited lines of the input folded onto them, (lines,)."""
-    fine = n * sets[0].factor
-    U = np.stack([_amplitudes(r.inputs, fine, skip, P) for r in sets])
-    level, noise = _levels(U)
-    lines = np.arange(U.shape[-1])
-    at = lines % n
-    at = np.minimum(at, n - at)
-    # a small line matters where it falls on a small one
-    counts = (level > _SILENT * level[at]) & (level > _CERTAIN * noise)
-    folded = np.zeros(n // 2 + 1, bool)
-    folded[at[counts & (level > _ROUNDED * level.max()) & (2 * lines > n)]] = True
-    return folded
-
-
-def _excited(
-    sets: Sequence[Record],
-    signals: Sequence[FloatArray] | None,
-    Z: ComplexArray,
-    n: int,
-    skip: int,
-    P: int,
-) -> FloatArray:
-    """Which lines the excitation drives, (lines,)."""
-    if signals is not None:
-        kept = [s[skip * n : (skip + P) * n].reshape(P, n, -1).mean(axis=0) for s in signals]
-        power = sum((np.abs(scipy.fft.rfft(k, axis=0)) ** 2).sum(axis=1) for k in kept)
-        level = np.sqrt(np.asarray(power))
-        return level > _SILENT * level.max()
-    level, noise = _levels(Z[:, :, sets[0].n_outputs :])
-    most = level.max()
-    if sets[0].factor > 1:
-        fine = [_amplitudes(r.inputs, n * r.factor, skip, P) for r in sets]
-        most = _levels(np.stack(fine))[0].max()
-    # a line that noise alone could have made is none
-    return (level > _SILENT * most) & (level > _CERTAIN * noise)
-
-
-def _levels(U: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Amplitude and noise of the mean of inputs (E, P, channels, lines), (lines,) each."""
-    P = U.shape[1]
-    level = np.abs(U.mean(axis=1)).max(axis=(0, 1))
-    # few periods tell the noise of one line badly: those beside it have as much
-    around = scipy.ndimage.uniform_filter1d(U.var(axis=1, ddof=1) / P, FREEDOM + 1, axis=-1)
-    noise = np.sqrt(np.maximum(around.max(axis=(0, 1)), 0))
-    return level, noise
-
-
 def _packed(
-    first: Record, f: FloatArray, mean: ComplexArray, C: ComplexArray, freedom: int
+    first: Record | Stream, f: FloatArray, mean: ComplexArray, C: ComplexArray, freedom: int
 ) -> PeriodicResponse:
     p = first.n_outputs
     Y, U = np.moveaxis(mean[:, :p], 0, 1), np.moveaxis(mean[:, p:], 0, 1)  # (channels, E, K)
@@ -264,7 +205,7 @@ def _packed(
     variance = np.einsum("eka,kem->kam", each, np.abs(back) ** 2)
     return PeriodicResponse(
         # the hold's own period, so that a faster input is held as it was
-        f, np.moveaxis(G, 0, -1), dt=first.input_dt, hold=first.hold,
+        f, np.moveaxis(G, 0, -1), dt=first.dt / first.factor, hold=first.hold,
         variance=np.moveaxis(variance, 0, -1),
         input_spectrum=(np.abs(U) ** 2).mean(axis=1),
         input_names=first.input_names, output_names=first.output_names,

@@ -2,43 +2,84 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
 
-from freqid.checks import ComplexArray
+from freqid.checks import BoolArray, ComplexArray, FloatArray
 
 # degrees of freedom that the covariance of one output should have, and one more for each other
 # output; lines around one are taken for it until it does
 FREEDOM = 14
 
 
-def means(Z: ComplexArray, p: int) -> tuple[ComplexArray, ComplexArray, int]:
-    """Means (E, channels, K) of spectra (E, P, channels, K), their covariance (E, K, channels,
+@dataclass(frozen=True)
+class PeriodMeans:
+    """Of the spectra of P periods: their mean (channels, K), and the sum of the products of what
+    each differs from it by, (K, channels, channels).
+    """
+
+    count: int
+    mean: ComplexArray
+    scatter: ComplexArray
+
+    @classmethod
+    def of(cls, Z: ComplexArray) -> PeriodMeans:
+        """Of spectra (P, channels, K)."""
+        mean = Z.mean(axis=0)
+        left = np.moveaxis(Z - mean, -1, 0)
+        return cls(len(Z), mean, left.swapaxes(-1, -2) @ left.conj())
+
+    def beside(self, other: PeriodMeans) -> PeriodMeans:
+        """Those of all periods of both.
+
+        Source: Chan, Golub and LeVeque, The American Statistician 37, 1983.
+        """
+        count = self.count + other.count
+        step = other.mean - self.mean
+        apart = np.einsum("ak,bk->kab", step, step.conj()) * (self.count * other.count / count)
+        mean = self.mean + step * (other.count / count)
+        return PeriodMeans(count, mean, self.scatter + other.scatter + apart)
+
+    def at(self, lines: BoolArray) -> PeriodMeans:
+        """Those at some of the lines."""
+        return PeriodMeans(self.count, self.mean[:, lines], self.scatter[lines])
+
+    @property
+    def covariance(self) -> ComplexArray:
+        """That of the mean, (K, channels, channels)."""
+        return self.scatter / (self.count - 1) / self.count
+
+    def noise(self, channels: slice) -> FloatArray:
+        """Variances of the means of some channels, (channels, K)."""
+        return np.einsum("kaa->ak", self.covariance).real[channels]
+
+
+def means(sets: Sequence[PeriodMeans], p: int) -> tuple[ComplexArray, ComplexArray, int]:
+    """Means (E, channels, K) of experiments of as many periods, their covariance (E, K, channels,
     channels) and its freedom; the first ``p`` channels are outputs.
 
     With few periods lines beside one lend it their noise. What the outputs do beside the plant's
     answer to the inputs, Y − G U, is as smooth as they are; in a loop the noise of Y and of U alone
     is as peaked as the plant, and cancels only where both are of one line.
     """
-    P, K = Z.shape[1], Z.shape[-1]
-    mean = Z.mean(axis=1)
-    left = Z - mean[:, None]
+    P, (channels, K) = sets[0].count, sets[0].mean.shape
+    mean, C = np.stack([s.mean for s in sets]), np.stack([s.covariance for s in sets])
     width = min(-(-(FREEDOM + p - 1) // (P - 1)), K) | 1
     width = min(width, K if K % 2 else K - 1)
-    if width == 1:
-        C = _covariance(left)
-    else:
+    if width > 1:
         G = _ratio(mean, p)
-        answer = np.einsum("kpm,etmk->etpk", G, left[:, :, p:])
-        beside = np.concatenate([left[:, :, :p] - answer, left[:, :, p:]], axis=2)
-        back = np.broadcast_to(
-            np.eye(Z.shape[2], dtype=complex), (K, Z.shape[2], Z.shape[2])
-        ).copy()
+        back = np.broadcast_to(np.eye(channels, dtype=complex), (K, channels, channels)).copy()
         back[:, :p, p:] = G
-        C = back @ _smooth(_covariance(beside), width) @ back.conj().swapaxes(-1, -2)
+        away = back.copy()
+        away[:, :p, p:] = -G
+        beside = away @ C @ away.conj().swapaxes(-1, -2)
+        C = back @ _smooth(beside, width) @ back.conj().swapaxes(-1, -2)
     # what does not scatter at all is still rounded
     rounding = (np.finfo(float).eps * np.abs(mean).max(axis=-1)) ** 2  # (E, channels)
-    C = C + rounding[:, None, :, None] * np.eye(C.shape[-1])
+    C = C + rounding[:, None, :, None] * np.eye(channels)
     return mean, C, (P - 1) * width
 
 
@@ -46,13 +87,6 @@ def _ratio(mean: ComplexArray, p: int) -> ComplexArray:
     """Outputs over inputs, (K, outputs, inputs), of means (E, channels, K)."""
     lines = np.moveaxis(mean, 0, -1).swapaxes(0, 1)  # (K, channels, E)
     return np.asarray(lines[:, :p] @ np.linalg.pinv(lines[:, p:]))
-
-
-def _covariance(left: ComplexArray) -> ComplexArray:
-    """Of the mean over periods, (E, K, channels, channels), from deviations (E, P, channels, K)."""
-    P = left.shape[1]
-    C: ComplexArray = np.einsum("epak,epbk->ekab", left, left.conj()) / (P - 1) / P
-    return C
 
 
 def _smooth(C: ComplexArray, width: int) -> ComplexArray:

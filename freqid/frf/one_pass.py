@@ -14,8 +14,9 @@ import numpy as np
 import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import Band, Record, Stream, as_band
+from freqid.data import Band, Record, Stream, as_band, flat
 from freqid.frf.spectra import KnownLines, Spectra, spectra
+from freqid.progress import Bar
 
 # of a stream of known length, unless they would be shorter than that many samples
 _COUNT, _SHORTEST = 16, 1 << 20
@@ -83,7 +84,9 @@ class Stretch(KnownLines):
         return self.lines.at(band.inside(self.lines.frequency))
 
 
-def stretches(stream: Stream, band: tuple[float, float] | None = None) -> list[Record]:
+def stretches(
+    stream: Stream, band: tuple[float, float] | None = None, progress: bool = False
+) -> list[Record]:
     """The stream in one pass, as experiments that follow one another; in a ``band`` (Hz) as lines.
 
     Without a band all samples are kept, and have to fit into memory. Raises ValueError for a band
@@ -96,22 +99,28 @@ def stretches(stream: Stream, band: tuple[float, float] | None = None) -> list[R
     every = 1 if limits is None else max(int(0.5 / (_ABOVE * limits.high * stream.dt)), 1)
     length = -(-length // every) * every
     found: list[Record] = []
-    for u, y in stream.stretches(length):
-        if len(u) < 2:
-            continue
-        record = Record(
-            _flat(u), _flat(y), stream.dt, stream.hold, input_names=stream.input_names,
-            output_names=stream.output_names, conditions=stream.conditions,
-        )  # fmt: skip
-        whole = len(u) // every * every
-        u, y = u[:whole], y[:whole]
-        wide = np.inf if limits is None else (limits.high - limits.low) * len(u) * stream.dt
-        if found and min(wide, len(u)) < _FEWEST:
-            continue
-        found.append(record if limits is None else _in_band(record, limits, every))
+    with Bar(progress, known, 0, "samples") as advance:
+        for u, y in stream.stretches(length):
+            made = _stretch(stream, u, y, limits, every, bool(found))
+            found += [] if made is None else [made]
+            advance(len(u))
     if not found:
         raise InputError(f"{stream.origin} holds no samples")
     return found
+
+
+def _stretch(
+    stream: Stream, u: FloatArray, y: FloatArray, limits: Band | None, every: int, follows: bool
+) -> Record | None:
+    """One experiment of a stream; None for one that ``follows`` others and tells too little."""
+    wide = np.inf if limits is None else (limits.high - limits.low) * len(u) * stream.dt
+    if len(u) < 2 or (follows and min(wide, len(u)) < _FEWEST):
+        return None
+    record = Record(
+        flat(u), flat(y), stream.dt, stream.hold, input_names=stream.input_names,
+        output_names=stream.output_names, conditions=stream.conditions,
+    )  # fmt: skip
+    return record if limits is None else _in_band(record, limits, every)
 
 
 def _in_band(record: Record, limits: Band, every: int) -> Stretch:
@@ -123,12 +132,8 @@ def _in_band(record: Record, limits: Band, every: int) -> Stretch:
     def thinned(X: ComplexArray) -> FloatArray:
         full = np.zeros((len(X), count // 2 + 1), complex)
         full[:, at] = X * (count / N)
-        return _flat(scipy.fft.irfft(full, count, axis=1).T)
+        return flat(scipy.fft.irfft(full, count, axis=1).T)
 
     dt = every * record.dt
     shown = dataclasses.replace(record, u=thinned(s.U[:, :, 0]), y=thinned(s.Y), dt=dt, input_dt=dt)
     return Stretch.of(shown, s, limits)
-
-
-def _flat(columns: FloatArray) -> FloatArray:
-    return columns[:, 0] if columns.shape[1] == 1 else columns

@@ -55,7 +55,7 @@ class Averaging:
             raise InputError(
                 f"segment={length} is longer than the shortest record, {shortest} samples"
             )
-        if not isinstance(self.detrend, str):
+        if not isinstance(self.detrend, str) and not callable(self.detrend):
             flag("detrend", self.detrend)
         half = 0.0 if isinstance(self.window, str) and self.window in _WHOLE else 0.5
         overlap = half if self.overlap is None else self.overlap
@@ -76,7 +76,7 @@ class Averaging:
     ) -> Iterator[dict[str, ComplexArray]]:
         """DFTs (channels, segments, lines) of tapered segments, as many at a time as stay near.
 
-        ``channels`` are samples (channels, n) by name.
+        ``channels`` are samples (channels, n) by name. The next ones overwrite what is yielded.
         """
         window = taper(self.window, length)
         views = {
@@ -85,16 +85,24 @@ class Averaging:
         }
         count = next(iter(views.values())).shape[1]
         batch = max(_NEAR // length, 1)
-        # new memory for each batch takes as long as what is written into it
-        near = {name: np.empty((len(x), min(batch, count), length)) for name, x in channels.items()}
+        # new memory for each batch takes longer than what is written into it, and only numpy's
+        # FFT, which is the same as scipy's, writes into memory that is there
+        batch = min(batch, count)
+        near = {
+            name: (
+                np.empty((len(x), batch, length)),
+                np.empty((len(x), batch, length // 2 + 1), complex),
+            )
+            for name, x in channels.items()
+        }
         for at in range(0, count, batch):
             found = {}
             for name, view in views.items():
                 some = view[:, at : at + batch]
-                out = near[name][:, : some.shape[1]]
-                self._level(some, out)
-                out *= window
-                found[name] = scipy.fft.rfft(out)
+                tapered, lines = (each[:, : some.shape[1]] for each in near[name])
+                self._level(some, tapered)
+                tapered *= window
+                found[name] = np.fft.rfft(tapered, out=lines)
             yield found
 
     def density(self, length: int, dt: float) -> tuple[FloatArray, FloatArray]:
@@ -117,11 +125,14 @@ class Averaging:
 
 
 def pieces(
-    r: Record | Stream, length: int, step: int, reference: FloatArray | None
+    r: Record | Stream, length: int, step: int, reference: FloatArray | None, begin: int = 0
 ) -> Iterator[tuple[int, dict[str, FloatArray]]]:
-    """Whole segments, as many at a time as fit a block: their number, and channels (c, n)."""
+    """Whole segments, as many at a time as fit a block: their number, and channels (c, n).
+
+    Those of a stream from sample ``begin`` on.
+    """
     if isinstance(r, Stream):
-        for n, u, y in r.pieces(length, step):
+        for n, u, y in r.pieces(length, step, first=begin):
             yield n, {"u": u.T, "y": y.T}
         return
     every = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}

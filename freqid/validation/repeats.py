@@ -10,8 +10,9 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, an, flag, listed, whole
 from freqid.data import Record
-from freqid.fitting import Bar, Estimate, Near, Weights, fit, uninterrupted
+from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
 from freqid.models import GreyBox
+from freqid.progress import Bar
 from freqid.validation.comparison import compare
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from freqid.fitting.many.identity import at_conditions, fingerprint
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
 from freqid.fitting.many.together import Done, minima
-from freqid.fitting.progress import Bar
 from freqid.fitting.search.descent import uninterrupted
 from freqid.models import GreyBox
+from freqid.progress import Bar
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -32,10 +32,10 @@ from freqid.models import GreyBox
 _OPTIONS = {"start", "band", "hold", "seed"}
 # residuals and their derivatives in a batch at a time: more of them leave the processor's cache
 _VALUES = 540_000
-# lines of the first steps; gain and step that end these, and how many there are of each at the most
+# lines of the first steps; gain and step that end these, and how many there are of each at most
 _LINES, _GAIN, _FIRST_STEP, _LIMIT, _STEPS = 300, 1e-4, 1e-3, 40, 5
-# after a step of this size, or this part of a standard error, there is one more: the cost is flat to
-# ten digits then; over one of that size residuals are straight lines and their slopes constant
+# after a step of this size, or this part of a standard error, there is one more: the cost is flat
+# to ten digits then; over one of that size residuals are straight lines and their slopes constant
 _LAST_STEP, _OF_STD, _STRAIGHT = 1e-4, 0.05, 1e-7
 # lines that are enough for error bars and doubts
 _ENOUGH = 4000

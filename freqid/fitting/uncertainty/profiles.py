@@ -10,10 +10,10 @@ import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Structure
-from freqid.fitting.progress import Bar
 from freqid.fitting.search.descent import minimise
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Realisation
+from freqid.progress import Bar
 
 if TYPE_CHECKING:
     import pandas as pd

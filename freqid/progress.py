@@ -10,10 +10,11 @@ from importlib.util import find_spec
 class Bar:
     """Progress for the length of a ``with`` block; entering gives the function to advance.
 
-    A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth.
+    A bar on a terminal or in a notebook; in a log file, where it is asked for, a line a tenth. A
+    ``total`` of None is not known before the end.
     """
 
-    def __init__(self, wanted: bool | None, total: int, done: int, what: str) -> None:
+    def __init__(self, wanted: bool | None, total: int | None, done: int, what: str) -> None:
         from rich.console import Console
         from rich.progress import (
             BarColumn,
@@ -47,7 +48,9 @@ class Bar:
         """``count`` more are done."""
         before, self.done = self.done, self.done + count
         self.progress.advance(self.task, count)
-        if self.lines and 10 * before // self.total != 10 * self.done // self.total:
+        if not self.lines or not self.total:
+            return
+        if 10 * before // self.total != 10 * self.done // self.total:
             print(f"{self.what}: {self.done} of {self.total}", file=sys.stderr, flush=True)
 
     def __exit__(self, *reason: object) -> None:

@@ -1,0 +1,80 @@
+"""What a source of a stream shows before it is read: names, length, sample time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import Array, InputError, channel_names
+from freqid.data.readers.table import named
+from freqid.data.time_column import in_seconds
+from freqid.lti import Hold
+
+# an array of some library, a path, or blocks: what it can do is asked of it
+Source = Any
+
+# part of a step that the ends of a time may be off
+_EVEN = 1e-2
+
+
+@dataclass(frozen=True)
+class Found:
+    """Blocks of all channels, their names, and what is known of time and length."""
+
+    # starts a pass at a sample, over some of the channels in that order
+    blocks: Callable[[int, Sequence[int]], Iterator[Array]]
+    names: list[str]
+    n_samples: int | None
+    dt: float | None
+    origin: str
+    # what the file says of the hold, of all inputs or by name, and of the conditions
+    hold: Hold | Mapping[str, Hold] | None = None
+    conditions: Mapping[str, float] = field(default_factory=dict)
+
+
+def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: str) -> Found:
+    if array.ndim != 2 or array.shape[1] < 2:
+        raise InputError(f"{origin} has shape {array.shape}; expected (N, channels), two or more")
+    if not np.isfinite(array.shape[0]):
+        raise InputError(
+            f"{origin} has an unknown number of samples; compute_chunk_sizes() tells dask"
+        )
+    count, width = (int(size) for size in array.shape)
+    names = _array_names(columns, width)
+
+    def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
+        for at in range(first, count, block):
+            rows = np.asanyarray(array[at : at + block])
+            yield rows if list(which) == list(range(width)) else rows[:, which]
+
+    return Found(blocks, names, count, None, origin)
+
+
+def _array_names(columns: Sequence[str] | None, count: int) -> list[str]:
+    if columns is None and count == 2:
+        return ["u", "y"]
+    return list(channel_names("columns", columns, count, "channel"))
+
+
+def even(origin: str, name: str, stamps: Array, count: int) -> float:
+    """The sample time in s of a time by its first and last two stamps; ValueError where they do not
+    agree.
+    """
+    import pandas as pd
+
+    plain, unit = named(name)
+    try:
+        t, _ = in_seconds(plain, pd.Series(stamps), unit)
+    except InputError as error:
+        raise InputError(f"{origin}: {error}") from None
+    step, steps = float(t[-1] - t[0]) / (count - 1), (float(t[1] - t[0]), float(t[-1] - t[-2]))
+    if not np.isfinite(step) or step <= 0 or any(abs(s - step) > _EVEN * step for s in steps):
+        raise InputError(
+            f"{origin}: the time {name!r} is not even: its first step is {steps[0]:g} s and the "
+            f"mean one {step:g} s; where it is, but for rounding, give dt in s"
+        )
+    # a time printed with few digits carries their rounding
+    return float(f"{step:.9g}")
