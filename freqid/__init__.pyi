@@ -54,7 +54,6 @@ from .fitting import (
     select_order as select_order,
 )
 from .frf import (
-    CrossSpectra as CrossSpectra,
     cross_spectra as cross_spectra,
     distortion as distortion,
     etfe as etfe,

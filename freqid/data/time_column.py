@@ -70,7 +70,9 @@ def with_time(
     plain = name == "time" and said == "s"
     notes = [] if plain else [f"column {name!r} was taken for the time, in {said}"]
     told = units.get(name) or re.search(_SUFFIX, name.casefold())
-    step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
+    # times that are no numbers are refused by whoever makes a record of them
+    with np.errstate(all="ignore"):
+        step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
     if said == "s" and not told and step >= _SLOW:
         _, unit, called = next(row for row in _LIKELY if step > row[0])
         notes.append(

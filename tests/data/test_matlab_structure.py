@@ -1,5 +1,6 @@
 """A MATLAB file that lies: every place at which one can is named, and nothing is read."""
 
+import resource
 import struct
 import zlib
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from freqid.checks import InputError
+from freqid.data.readers.columns import columns_of
 from freqid.data.readers.mat_structure import check_structure
 
 INT32, UINT32, DOUBLE, CHAR, MATRIX, COMPRESSED = 5, 6, 9, 16, 14, 15
@@ -120,3 +122,11 @@ def test_what_is_no_matlab_file_is_left_to_its_reader(tmp_path):
     path = tmp_path / "a.mat"
     path.write_bytes(b"something else altogether" * 9)
     check_structure(path)
+
+
+def test_an_empty_array_of_long_texts_takes_no_memory():
+    """Texts of five million characters, none of them, once took two gigabytes to be read."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    frame = columns_of({"u": np.zeros(60), "dt": 0.1, "b": np.zeros(0, "<U4981760")})
+    assert frame.columns.tolist() == ["u", "time"]
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # KiB

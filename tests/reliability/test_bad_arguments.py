@@ -12,6 +12,7 @@ from freqid.checks import InputError
 NAN, INF = math.nan, math.inf
 # what an argument of each kind cannot be
 KINDS = {
+    "scale": ["a", NAN, INF, 10**400, [1.0, 2.0, 3.0], {"w": 1.0}, 1j, object()],
     "number": ["a", NAN, INF, 10**400, [1.0, 2.0], 1j, object()],
     "positive": ["a", NAN, INF, 10**400, 0, -1, [1.0, 2.0]],
     "not negative": ["a", NAN, INF, -1, [1.0, 2.0]],
@@ -51,6 +52,7 @@ KINDS = {
 PLANT = fq.first_order()
 RECORD = fq.simulate(PLANT, fq.chirp(2, 40, 1.0, 5e-3), 5e-3).with_noise(0.01)
 WAVE = fq.simulate(PLANT, fq.multisine((1, 40), 0.5, 5e-3, 4, crest="schroeder"), 5e-3)
+STREAM = fq.open(np.column_stack([RECORD.u, RECORD.y]), dt=RECORD.dt)
 FRF = fq.h1([RECORD, RECORD.with_noise(0.01, seed=2)])
 EST = fq.fit(PLANT, RECORD)
 SPECTRUM = fq.ChirpSpectrum(2, 40)
@@ -144,6 +146,11 @@ CASES = {
         dict(records=RECORD, segment=50),
         "records: record; segment: count; band: band; window: window"
     ),
+    "cross_spectra": (
+        dict(records=RECORD, segment=50),
+        "records: record; segment: count; band: band; window: window; overlap: not negative; "
+        "detrend: choice"
+    ),
     "local_polynomial": (dict(records=RECORD), "records: record; order width: count; band: band"),
     "local_rational": (dict(records=RECORD), "records: record; order width: count; band: band"),
     "periodic": (
@@ -177,7 +184,7 @@ CASES = {
     "open": (
         dict(source=np.zeros((9, 2)), dt=0.1),
         "source: not a source; dt: positive; hold: hold; inputs outputs: names; block: count; "
-        "scale: number"
+        "scale: scale"
     ),
     "channels": (dict(path="a.csv"), "path: path"),
     "check_record": (dict(record=RECORD), "record: record"),
@@ -251,6 +258,12 @@ CASES = {
     "Record.with_noise": (RECORD, "std: samples; snr: number"),
     "Record.with_hold": (RECORD, "hold: hold"),
     "Record.select": (RECORD, "inputs outputs: names"),
+    "Stream.decimate": (STREAM, "factor: count"),
+    "Stream.slice": (STREAM, "start stop: number"),
+    "Stream.select": (STREAM, "inputs outputs: names"),
+    "Stream.with_hold": (STREAM, "hold: hold"),
+    "Stream.with_band": (STREAM, "band: band"),
+    "Stream.load": (STREAM, "stop: count"),
     "FrequencyResponse.select": (FRF, "limits: band"),
     "GreyBox.frequency_response": (PLANT, "omega: samples"),
     "Estimate.save": (EST, "path: path"),

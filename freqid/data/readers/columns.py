@@ -18,6 +18,8 @@ _STEPS, _RATES = ("dt", "Ts", "ts", "Dt", "h"), ("Fs", "fs", "FS", "sampling_rat
 CLOCKS = (*_STEPS, *_RATES)
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
+# bytes of a text that may be a number
+_LONGEST = 400
 
 
 def in_numbers(values: object) -> object:
@@ -42,6 +44,9 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     for name, value in arrays.items():
         try:
             x = np.squeeze(np.asarray(in_numbers(value)))
+            if x.dtype.kind in "SU" and x.itemsize > _LONGEST:
+                # texts are turned into numbers many at a time, which takes many times their size
+                continue
             # complex samples stay so: who uses that column is told
             # a long double beyond a double is no number, as whoever uses that column is told
             with np.errstate(over="ignore", invalid="ignore"):

@@ -6,6 +6,7 @@ elements in turn. A tag that lies can end the interpreter in a reader that belie
 
 from __future__ import annotations
 
+import math
 import zlib
 from pathlib import Path
 from typing import Literal
@@ -166,10 +167,9 @@ class _Walk:
         lengths = [int.from_bytes(sizes[i : i + _WORD], self.order, signed=True) for i in steps]
         if len(lengths) < 2 or min(lengths) < 0:
             raise _wrong(f"dimensions {lengths}", self.begin)
-        count = 1
-        for length in lengths:
-            count *= length
-        return count
+        # an empty array of long texts takes memory, too
+        check_size(self.path, 8 * math.prod(length for length in lengths if length))
+        return math.prod(lengths)
 
     def _numbers(self, count: int, text: bool) -> None:
         kind, data = self.element()
