@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,7 +76,6 @@ def bias_map(
     >>> table.query("parameter == 'd'")["estimate"].round(2).tolist()
     [-231.44, 10.0]
     """
-    import pandas as pd
 
     plants = {"": plant} if isinstance(plant, GreyBox) else named_values("plant", plant)
     sampling, rows = _asked(plants, spectra, factors, holds, base_dt, true_hold)
@@ -93,29 +93,42 @@ def bias_map(
     )
     finished = None if store is None else store.whole()
     if finished is not None:
-        return finished
+        return finished[0]
     tables: dict[int, pd.DataFrame] = {}
-    if store is not None:
-        kept = {n: store.chunk(n) for n in range(len(chunks))}
-        tables = {n: t for n, t in kept.items() if t is not None}
-    todo = [n for n in range(len(chunks)) if n not in tables]
-    jobs = [(n, plants[rows[chunks[n][0]].plant_label], [rows[i] for i in chunks[n]]) for n in todo]
-    with Bar(progress, len(rows), sum(len(chunks[n]) for n in tables), "bias map") as advance:
-        for _, (n, answers) in unordered(partial(_work, shared=shared), jobs, n_jobs):
-            model = plants[rows[chunks[n][0]].plant_label]
-            tables[n] = _table(model, chunks[n], [rows[i] for i in chunks[n]], answers)
-            if store is not None:
-                store.keep(n, tables[n])
-            advance(len(answers))
-    table = pd.concat([tables[n] for n in range(len(chunks))], ignore_index=True)
+    with store or nullcontext():
+        if store is not None:
+            tables = {n: table for n, table, _ in store.chunks()}
+        todo = [n for n in range(len(chunks)) if n not in tables]
+        jobs = [
+            (n, plants[rows[chunks[n][0]].plant_label], [rows[i] for i in chunks[n]]) for n in todo
+        ]
+        done = sum(len(chunks[n]) for n in tables)
+        with Bar(progress, len(rows), done, "bias map") as advance:
+            for _, (n, answers) in unordered(partial(_work, shared=shared), jobs, n_jobs):
+                model = plants[rows[chunks[n][0]].plant_label]
+                tables[n] = _table(model, chunks[n], [rows[i] for i in chunks[n]], answers)
+                if store is not None:
+                    store.keep(n, tables[n])
+                advance(len(answers))
+        table = _whole(tables, isinstance(plant, GreyBox), spectra)
+        if store is not None:
+            store.finish(table)
+    return table
+
+
+def _whole(
+    tables: Mapping[int, pd.DataFrame], single: bool, spectra: Mapping[str, InputSpectrum]
+) -> pd.DataFrame:
+    """The chunks as one table, of a ``single`` plant or of several."""
+    import pandas as pd
+
+    table = pd.concat([tables[n] for n in sorted(tables)], ignore_index=True)
     table = table.sort_values("row", kind="stable", ignore_index=True).drop(columns="row")
-    if isinstance(plant, GreyBox):
+    if single:
         table = table.drop(columns="plant")
     table.attrs["upper_frequency"] = {
         name: float(s.high) for name, s in spectra.items() if isinstance(s, ChirpSpectrum)
     }
-    if store is not None:
-        store.finish(table)
     return table
 
 

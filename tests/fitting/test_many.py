@@ -98,11 +98,11 @@ def test_a_killed_worker_loses_no_row(tmp_path):
 
 
 def test_an_interrupted_job_goes_on(tmp_path, monkeypatch):
-    from freqid.fitting.many import fleet
+    from freqid.fitting.many import rows
 
     records, path = runs(12, samples=100), tmp_path / "t.parquet"
     whole = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
-    real, calls = fleet._fitted, []
+    real, calls = rows._fitted, []
 
     def interrupted(task, name, *data):
         calls.append(name)
@@ -110,12 +110,12 @@ def test_an_interrupted_job_goes_on(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return real(task, name, *data)
 
-    monkeypatch.setattr(fleet, "_fitted", interrupted)
+    monkeypatch.setattr(rows, "_fitted", interrupted)
     with pytest.raises(KeyboardInterrupt):
         fq.fit_many(LAG, records, path, n_jobs=1, verdicts=False, chunk=2)
     assert not path.exists()
     again = []
-    monkeypatch.setattr(fleet, "_fitted", lambda *a: again.append(a[1]) or real(*a))
+    monkeypatch.setattr(rows, "_fitted", lambda *a: again.append(a[1]) or real(*a))
     same(whole, fq.fit_many(LAG, records, path, n_jobs=1, verdicts=False, chunk=2))
     # three chunks of two had been finished
     assert len(again) == 6
@@ -199,7 +199,7 @@ def test_on_a_cluster(tmp_path):
     alone = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None
+            n_workers=2, threads_per_worker=1, dashboard_address=":0"
         ) as cluster,
         distributed.Client(cluster),
         joblib.parallel_config(backend="dask"),

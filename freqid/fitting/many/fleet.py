@@ -2,50 +2,37 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
-import logging
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
-from freqid.data import DataSet, FrequencyResponse, Record, read
+from freqid.data import FrequencyResponse, Record, read
 from freqid.fitting.entry import fit
-from freqid.fitting.fitters import Near, fitter_of
-from freqid.fitting.many.identity import at_conditions, fingerprint
+from freqid.fitting.fitters import fitter_of
+from freqid.fitting.many.identity import fingerprint
+from freqid.fitting.many.known import Known, print_of
+from freqid.fitting.many.rows import (
+    Row,
+    Source,
+    Task,
+    columns_of_rows,
+    free_of_columns,
+    lost_rows,
+    rows_of,
+)
 from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
-from freqid.fitting.many.together import Done, minima
-from freqid.fitting.search.descent import uninterrupted
-from freqid.models import GreyBox
 from freqid.progress import Bar
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_LOG = logging.getLogger(__name__)
-
 # records of a chunk, which is kept or lost as one, with verdicts and without, and from how many on
 # processes are worth it
 _CHUNK, _QUICK, _FEW = 8, 128, 16
-
-Source = DataSet | str | Path
-Row = dict[str, Any]
-
-
-@dataclasses.dataclass(frozen=True)
-class _Task:
-    """What every row takes: model, options of ``fit`` and of ``read``, and what is computed."""
-
-    model: object
-    options: Mapping[str, object]
-    reading: Mapping[str, object]
-    verdicts: bool
 
 
 def fit_many(
@@ -89,7 +76,6 @@ def fit_many(
     >>> fq.fit_many(fq.first_order(), runs)["a"].round(6).tolist()
     [100.0, 100.0, 100.0]
     """
-    import pandas as pd
 
     fitter_of(model)
     processes(n_jobs)
@@ -101,44 +87,68 @@ def fit_many(
     named = _named(records)
     if not named:
         raise InputError("records=[] holds nothing to be fitted")
-    task = _Task(
+    free_of_columns(model)
+    task = Task(
         model,
         _checked("option", fit, fit_options),
         _checked("reading", read, named_values("reading", reading)),
         verdicts,
     )
-    names = list(named)
-    # a text is a path, whose file may change
-    known = {n: Path(s) if isinstance(s, str) else s for n, s in named.items()}
-    met = [s.conditions for s in named.values() if not isinstance(s, (str, Path))]
-    seen = at_conditions(model, met) if isinstance(model, GreyBox) else ()
-    groups = [names[i : i + size] for i in range(0, len(names), size)]
-    store = (
-        None
-        if path is None
-        else TableStore(path, fingerprint(task, known, size, seen), "other fits")
-    )
-    if store is not None and (whole_table := store.whole()) is not None:
-        return whole_table
-    tables: dict[int, pd.DataFrame] = {}
-    for i in range(len(groups)):
-        kept = None if store is None else store.chunk(i)
-        if kept is not None:
-            tables[i] = kept
-    missing = [i for i in range(len(groups)) if i not in tables]
-    jobs = [[(name, named[name]) for name in groups[i]] for i in missing]
-    few = n_jobs is None and len(names) < _FEW
-    with Bar(progress, len(groups), len(tables), "fits") as advance:
-        for at, rows in unordered(partial(_rows, task), jobs, 1 if few else n_jobs or _cores()):
-            tables[missing[at]] = pd.DataFrame(rows)
-            if store is not None:
-                store.keep(missing[at], tables[missing[at]])
-            advance(1)
-    table = pd.concat([tables[i] for i in range(len(groups))], ignore_index=True)
-    table = table[_columns(table)]
-    if store is not None:
-        store.finish(table)
-    return table
+    if path is None:
+        tables = list(_fitted_in_chunks(task, list(named.items()), size, n_jobs, progress, 0))
+        return _joined(tables, named)
+    prints = {name: print_of(model, source) for name, source in named.items()}
+    store = TableStore(path, fingerprint(task), "other fits")
+    known = Known(named, prints, store)
+    if (finished := known.finished()) is not None:
+        return finished
+    with store:
+        # which another job may have finished by now
+        if (finished := known.finished()) is not None:
+            return finished
+        number = known.begun()
+        missing = [(name, named[name]) for name in named if name not in known.names]
+        kept = list(known.tables)
+        for table in _fitted_in_chunks(task, missing, size, n_jobs, progress, len(known.names)):
+            store.keep(number, table, {name: prints[name] for name in table["name"]})
+            kept.append(table)
+            number += 1
+        whole_table = _joined(kept, named)
+        store.finish(whole_table, prints)
+    return whole_table
+
+
+def _fitted_in_chunks(
+    task: Task,
+    missing: Sequence[tuple[str, Source]],
+    size: int,
+    n_jobs: int | None,
+    progress: bool | None,
+    done: int,
+) -> Iterator[pd.DataFrame]:
+    """Tables of the rows that are missing, ``size`` of them at a time, as they are finished."""
+    import pandas as pd
+
+    jobs = [missing[i : i + size] for i in range(0, len(missing), size)]
+    cores = _cores()
+    # a few are not worth processes of their own, but a cluster that is asked for is
+    few = n_jobs is None and cores is not None and len(missing) < _FEW
+    with Bar(progress, done + len(missing), done, "fits") as advance:
+        for at, rows in unordered(
+            partial(rows_of, task), jobs, 1 if few else n_jobs or cores, partial(lost_rows, task)
+        ):
+            yield pd.DataFrame(rows)
+            advance(len(jobs[at]))
+
+
+def _joined(tables: Sequence[pd.DataFrame], named: Mapping[str, Source]) -> pd.DataFrame:
+    """The rows of all chunks, in the order of the records."""
+    import pandas as pd
+
+    table = pd.concat(tables, ignore_index=True)
+    order = {name: i for i, name in enumerate(named)}
+    table = table.sort_values("name", key=lambda names: names.map(order), ignore_index=True)
+    return table[columns_of_rows(table)]
 
 
 def _cores() -> int | None:
@@ -158,7 +168,10 @@ def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source
     if isinstance(records, Mapping):
         for name, r in records.items():
             _source(f"records[{name!r}]", r)
-        return {str(name): r for name, r in records.items()}
+        each = [(str(name), r) for name, r in records.items()]
+        if len(dict(each)) < len(each):
+            raise InputError("records: two of its names are the same text; names must differ")
+        return dict(each)
     named: dict[str, Source] = {}
     for i, r in enumerate(listed("records", records)):
         _source(f"records[{i}]", r)
@@ -184,90 +197,3 @@ def _checked(what: str, function: Callable[..., object], options: Mapping[str, A
         if name not in known:
             raise InputError(unknown(what, name, known))
     return dict(options)
-
-
-def _rows(task: _Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
-    """A row each: those of one shape together as far as nothing is in doubt, the others alone."""
-    rows: list[Row] = []
-    taken: list[float] = []
-    records: list[DataSet | None] = []
-    for name, source in job:
-        begin = time.perf_counter()
-        row: Row = {"name": name}
-        try:
-            from_file = isinstance(source, (str, Path))
-            records.append(read(source, **task.reading) if from_file else source)  # type: ignore[arg-type]
-        except Exception as error:
-            row["error"] = _told(name, error)
-            records.append(None)
-        rows.append(row)
-        taken.append(time.perf_counter() - begin)
-    begin = time.perf_counter()
-    found = minima(task.model, records, task.options)
-    together = sum(f is not None for f in found)
-    each = (time.perf_counter() - begin) / max(together, 1)
-    for row, data, done, reading in zip(rows, records, found, taken, strict=True):
-        begin = time.perf_counter()
-        if data is not None:
-            row |= _fitted(task, str(row["name"]), data, done)
-        row["seconds"] = reading + time.perf_counter() - begin + (each if done else 0.0)
-    return rows
-
-
-def _fitted(task: _Task, name: str, data: object, done: Done | None) -> Row:
-    """What is said of one record; an error is a row, too."""
-    if done is not None and not task.verdicts:
-        return _values(done.values, done.std, done.cost, done.fit_percent, True) | {"error": ""}
-    try:
-        options = dict(task.options)
-        if done is not None:
-            options["start"] = Near(done.values)
-        est = fit(task.model, data, **options)  # type: ignore[arg-type]
-        uninterrupted(est.message)
-        std = np.sqrt(np.diag(est.covariance_matrix)).tolist()
-        values, errors = est.values.tolist(), dict(zip(est.names, std, strict=True))
-        row = _values(
-            dict(zip(est.names, values, strict=True)), errors, est.cost, est.fit_percent,
-            est.converged,
-        )  # fmt: skip
-        if task.verdicts:
-            row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
-            row |= {"warnings": "; ".join(est.warnings)}
-        return row | {"error": ""}
-    except Exception as error:
-        # one bad record, or a plant that fails there, must not take the other rows along
-        return {"error": _told(name, error)}
-
-
-def _values(
-    values: Mapping[str, float],
-    std: Mapping[str, float],
-    cost: float,
-    fit_percent: float,
-    converged: bool,
-) -> Row:
-    row: Row = {**values, **{f"{n}_std": s for n, s in std.items()}}
-    return row | {
-        "cost": float(cost), "fit_percent": float(fit_percent), "converged": bool(converged)
-    }  # fmt: skip
-
-
-def _told(name: str, error: Exception) -> str:
-    _LOG.info("%s: %s", name, error)
-    return f"{type(error).__name__}: {error}"
-
-
-def _columns(table: pd.DataFrame) -> list[str]:
-    """Name first, parameters, then what is said of the fit."""
-    last = [
-        "cost",
-        "fit_percent",
-        "converged",
-        "verdict",
-        "witness",
-        "warnings",
-        "seconds",
-        "error",
-    ]
-    parameters = [c for c in table.columns if c not in ("name", *last)]
-    return ["name", *parameters, *(c for c in last if c in table.columns)]

@@ -82,7 +82,7 @@ def _returned(
     try:
         met = plant.with_conditions(**conditions)
         lin = met.linearise({**met.values, **values}, [p.name for p in met.free_parameters])
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         # a plant may not exist there, and a user's function may raise anything
         return [type(error).__name__]
     return [*lin.at, *lin.derivative]

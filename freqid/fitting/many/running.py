@@ -10,16 +10,20 @@ from freqid.checks import InputError
 Job = TypeVar("Job")
 Answer = TypeVar("Answer")
 
-# how often lost workers are replaced
-_LIVES = 5
+# how often lost workers are replaced before jobs are done one by one
+_LIVES = 2
 
 
 def unordered(
-    work: Callable[[Job], Answer], jobs: Sequence[Job], n_jobs: int | None
+    work: Callable[[Job], Answer],
+    jobs: Sequence[Job],
+    n_jobs: int | None,
+    lost: Callable[[Job], Answer] | None = None,
 ) -> Iterator[tuple[int, Answer]]:
     """Number and answer of each job, in the order in which they are finished.
 
-    A worker that is killed takes nothing but its own job with it, which is done again.
+    A worker that is killed takes nothing but its own job with it, which is done again; one that
+    ends every worker is answered by ``lost``.
     """
     if n_jobs == 1:
         yield from ((i, work(job)) for i, job in enumerate(jobs))
@@ -35,7 +39,7 @@ def unordered(
         yield from ((i, work(job)) for i, job in enumerate(jobs))
         return
     left = dict(enumerate(jobs))
-    for life in range(_LIVES):
+    for _ in range(_LIVES):
         parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")
         try:
             asked = [joblib.delayed(_numbered)(work, i, job) for i, job in left.items()]
@@ -44,8 +48,31 @@ def unordered(
                 yield i, answer
             return
         except TerminatedWorkerError:
-            if life == _LIVES - 1:
-                raise
+            continue
+    for i, job in left.items():
+        answer_alone = alone(work, job)
+        if answer_alone is not None:
+            yield i, answer_alone
+        elif lost is not None:
+            yield i, lost(job)
+        else:
+            raise InputError(
+                f"job {i} of {len(jobs)} ends every process that computes it: out of memory, or "
+                "by the plant; n_jobs=1 shows where"
+            )
+
+
+def alone(work: Callable[[Job], Answer], job: Job) -> Answer | None:
+    """The answer of one job in a process of its own, None where that is ended."""
+    from joblib.externals.loky import ProcessPoolExecutor
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    with ProcessPoolExecutor(max_workers=1) as pool:
+        try:
+            answer: Answer = pool.submit(work, job).result()
+        except TerminatedWorkerError:
+            return None
+    return answer
 
 
 def _numbered(work: Callable[[Job], Answer], number: int, job: Job) -> tuple[int, Answer]:

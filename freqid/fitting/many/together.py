@@ -71,7 +71,10 @@ def minima(
     for group in shapes.values():
         try:
             done = _of_one_shape(model, [records[i] for i in group], options)  # type: ignore[misc]
-        except Exception:  # whatever it is, the fit of the record alone says it in words
+        except (
+            Exception,
+            SystemExit,
+        ):  # whatever it is, the fit of the record alone says it in words
             continue
         for i, each in zip(group, done, strict=True):
             found[i] = each

@@ -1,0 +1,142 @@
+"""A row of what is said of a fit; failures are rows, too."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import InputError
+from freqid.data import DataSet, read
+from freqid.fitting.entry import fit
+from freqid.fitting.fitters import Near
+from freqid.fitting.many.running import alone
+from freqid.fitting.many.together import Done, minima
+from freqid.fitting.search.descent import uninterrupted
+from freqid.models import GreyBox
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_LOG = logging.getLogger(__name__)
+
+# columns that say something of a fit
+_SAID = (
+    "cost", "fit_percent", "converged", "verdict", "witness", "warnings", "seconds", "error"
+)  # fmt: skip
+
+Source = DataSet | str | Path
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What every row takes: model, options of ``fit`` and of ``read``, and what is computed."""
+
+    model: object
+    options: Mapping[str, object]
+    reading: Mapping[str, object]
+    verdicts: bool
+
+
+def rows_of(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
+    """A row each: those of one shape together as far as nothing is in doubt, the others alone."""
+    rows: list[Row] = []
+    taken: list[float] = []
+    records: list[DataSet | None] = []
+    for name, source in job:
+        begin = time.perf_counter()
+        row: Row = {"name": name}
+        try:
+            from_file = isinstance(source, (str, Path))
+            records.append(read(source, **task.reading) if from_file else source)  # type: ignore[arg-type]
+        except Exception as error:
+            row["error"] = _told(name, error)
+            records.append(None)
+        rows.append(row)
+        taken.append(time.perf_counter() - begin)
+    begin = time.perf_counter()
+    found = minima(task.model, records, task.options)
+    together = sum(f is not None for f in found)
+    each = (time.perf_counter() - begin) / max(together, 1)
+    for row, data, done, reading in zip(rows, records, found, taken, strict=True):
+        begin = time.perf_counter()
+        if data is not None:
+            row |= _fitted(task, str(row["name"]), data, done)
+        row["seconds"] = reading + time.perf_counter() - begin + (each if done else 0.0)
+    return rows
+
+
+def lost_rows(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
+    """Rows of a chunk that ends whatever process computes it: each record in one of its own."""
+    rows: list[Row] = []
+    for each in job:
+        done = alone(partial(rows_of, task), [each])
+        error = "the process that computed it was ended: out of memory, or by the plant"
+        rows += [{"name": each[0], "seconds": np.nan, "error": error}] if done is None else done
+    return rows
+
+
+def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
+    """What is said of one record; an error is a row, too."""
+    if done is not None and not task.verdicts:
+        return _values(done.values, done.std, done.cost, done.fit_percent, True) | {"error": ""}
+    try:
+        options = dict(task.options)
+        if done is not None:
+            options["start"] = Near(done.values)
+        est = fit(task.model, data, **options)  # type: ignore[arg-type]
+        uninterrupted(est.message)
+        std = np.sqrt(np.diag(est.covariance_matrix)).tolist()
+        values, errors = est.values.tolist(), dict(zip(est.names, std, strict=True))
+        row = _values(
+            dict(zip(est.names, values, strict=True)), errors, est.cost, est.fit_percent,
+            est.converged,
+        )  # fmt: skip
+        if task.verdicts:
+            row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
+            row |= {"warnings": "; ".join(est.warnings)}
+        return row | {"error": ""}
+    except (Exception, SystemExit) as error:
+        # one bad record, or a plant that fails there, must not take the other rows along
+        return {"error": _told(name, error)}
+
+
+def _values(
+    values: Mapping[str, float],
+    std: Mapping[str, float],
+    cost: float,
+    fit_percent: float,
+    converged: bool,
+) -> Row:
+    row: Row = {**values, **{f"{n}_std": s for n, s in std.items()}}
+    return row | {
+        "cost": float(cost), "fit_percent": float(fit_percent), "converged": bool(converged)
+    }  # fmt: skip
+
+
+def _told(name: str, error: BaseException) -> str:
+    _LOG.info("%s: %s", name, error)
+    return f"{type(error).__name__}: {error}"
+
+
+def columns_of_rows(table: pd.DataFrame) -> list[str]:
+    """Name first, parameters, then what is said of the fit."""
+    parameters = [c for c in table.columns if c not in ("name", *_SAID)]
+    return ["name", *parameters, *(c for c in _SAID if c in table.columns)]
+
+
+def free_of_columns(model: object) -> None:
+    """ValueError for parameters that are called as a column of the table is."""
+    names = [p.name for p in model.free_parameters] if isinstance(model, GreyBox) else []
+    for name in (*names, *(f"{n}_std" for n in names)):
+        if name in ("name", *_SAID):
+            raise InputError(
+                f"model: its parameter {name!r} is called as a column of the table; rename it"
+            )
