@@ -102,6 +102,7 @@ from .validation import (
     compare as compare,
     cost_test as cost_test,
     cross_validate as cross_validate,
+    fleet_alarms as fleet_alarms,
     hold_bias as hold_bias,
     residual_test as residual_test,
 )

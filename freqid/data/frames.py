@@ -179,8 +179,10 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
                 f"columns are {', '.join(str(c) for c in frame.columns)})"
             )
         return positive("dt", dt, "s")
-    gaps = np.diff(times)
-    step = float(times[-1] - times[0]) / (len(times) - 1)
+    # times that are no numbers are refused below
+    with np.errstate(all="ignore"):
+        gaps = np.diff(times)
+        step = float(times[-1] - times[0]) / (len(times) - 1)
     printed = printed_period(times)
     if printed is not None:
         period, digit = printed

@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError, unknown
 from freqid.data.readers.kinds import damaged, existing, missing
+from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_conditions, kept_hold
 from freqid.data.stream_arrays import of_hdf5, of_zarr
@@ -97,6 +98,9 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
         raise InputError(f"{path}: {missing('Parquet', 'pyarrow', 'parquet')}") from None
     try:
         file = pq.ParquetFile(path)
+        check_pages(path, file.metadata, whole=False)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     except Exception as error:
         # pyarrow has errors of many kinds for a file that is not what it says
         raise InputError(f"{path}: {damaged('Parquet', error)}") from None

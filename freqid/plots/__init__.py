@@ -8,7 +8,7 @@ from freqid.plots.bode_plots import bode, hold_in_words
 from freqid.plots.curves import Shown, amplitude_label, bode_curve, resonances, unit_of
 from freqid.plots.design_plots import plot_design
 from freqid.plots.estimate_plots import plot_parameters, plot_poles, plot_response, plot_spectrogram
-from freqid.plots.fleet_plots import alarms, plot_fleet
+from freqid.plots.fleet_plots import plot_fleet
 from freqid.plots.nyquist_plots import nyquist
 from freqid.plots.plotly_backend import Part, bode_axes, bode_traces, trace
 from freqid.plots.signal_plots import plot_coherence, plot_record

@@ -4,6 +4,7 @@ import inspect
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import freqid as fq
@@ -14,6 +15,7 @@ NAN, INF = math.nan, math.inf
 KINDS = {
     "scale": ["a", NAN, INF, 10**400, [1.0, 2.0, 3.0], {"w": 1.0}, 1j, object()],
     "number": ["a", NAN, INF, 10**400, [1.0, 2.0], 1j, object()],
+    "probability": ["a", NAN, 0, 1, 2, -1, [0.1], 1j],
     "positive": ["a", NAN, INF, 10**400, 0, -1, [1.0, 2.0]],
     "not negative": ["a", NAN, INF, -1, [1.0, 2.0]],
     "window": ["nonsense", "", ["a"]],
@@ -52,6 +54,7 @@ KINDS = {
 PLANT = fq.first_order()
 RECORD = fq.simulate(PLANT, fq.chirp(2, 40, 1.0, 5e-3), 5e-3).with_noise(0.01)
 WAVE = fq.simulate(PLANT, fq.multisine((1, 40), 0.5, 5e-3, 4, crest="schroeder"), 5e-3)
+FLEET = pd.DataFrame({"k": np.arange(5.0), "k_std": 1.0})
 STREAM = fq.open(np.column_stack([RECORD.u, RECORD.y]), dt=RECORD.dt)
 FRF = fq.h1([RECORD, RECORD.with_noise(0.01, seed=2)])
 EST = fq.fit(PLANT, RECORD)
@@ -245,6 +248,10 @@ CASES = {
     "plot_residuals": (dict(table=None), "table: table"),
     "plot_orders": (dict(table=None), "table: table"),
     "plot_design": (dict(table=None), "table: table"),
+    "fleet_alarms": (
+        dict(table=FLEET, parameter="k"),
+        "table: table; parameter by machine: choice; level: probability"
+    ),
     "plot_fleet": (dict(table=None, parameter="a"), "table: table"),
     "plot_bias_map": (dict(table=MAP, parameter="a"), "table: table; parameter: choice"),
     "plot_bias_curves": (dict(table=MAP), "table: table; factor: count"),

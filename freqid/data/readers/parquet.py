@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from freqid.checks import InputError
 from freqid.data.readers.kinds import damaged, missing, reads, writes
 from freqid.data.readers.limits import check_size
+from freqid.data.readers.parquet_structure import check_pages
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,8 +24,13 @@ def read_parquet(path: Path) -> pd.DataFrame:
 
         layout = pyarrow.parquet.read_metadata(path)
         check_size(path, 8.0 * layout.num_rows * layout.num_columns)
+        check_pages(path, layout)
         frame = pd.read_parquet(path)
-        return frame if frame.index.name in (None, "time") else frame.reset_index()
+        frame = frame if frame.index.name in (None, "time") else frame.reset_index()
+        if not frame.columns.is_unique:
+            twice = frame.columns[frame.columns.duplicated()][0]
+            raise InputError(f"holds column {twice!r} twice; names must differ")
+        return frame
     except InputError:
         raise
     except ImportError:

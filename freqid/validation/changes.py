@@ -1,0 +1,292 @@
+"""Which rows of a fleet's table have changed: single ones, and all from some time on."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+
+from freqid.checks import BoolArray, FloatArray, InputError, IntArray, finite, unknown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# the level at which all rows of good machines together raise an alarm
+LEVEL = 0.01
+# rows of a machine from which on its order may tell of a change
+_FEWEST = 6
+# scatters beyond which a row counts as no more than that when the order is looked at
+_CUT = 4.0
+# orders that are tried for each unit of one over the level, and numbers in them at the most
+_ORDERS, _NUMBERS = 20, 20_000_000
+# runs of rows grow by this factor, and borders of one are looked for so many rows off at most
+_LONGER, _REACH = 1.4, 200
+# fleets without a change that are drawn to learn how far the farthest of their rows lies, the part
+# of them beyond it, and rows from which on theory tells it
+_DRAWN, _BEYOND, _MANY = 1000, 0.02, 400
+# part of fleets in which the scatter that is taken is too small
+_UNSURE = 0.05
+# median distance of a normal distribution, and halvings of a variance
+_NORMAL, _HALVINGS = float(scipy.stats.norm.ppf(0.75)), 30
+
+
+def fleet_alarms(
+    table: pd.DataFrame,
+    parameter: str,
+    *,
+    by: str | None = None,
+    machine: str | None = None,
+    level: float = LEVEL,
+) -> BoolArray:
+    """Rows of ``fit_many`` whose parameter has changed, (rows,).
+
+    Two kinds of change are looked for, each at half of the level: a row that lies farther from its
+    neighbours' common value than its standard error and the scatter between rows allow, and a
+    lasting one, a step or a drift, after which rows differ from those before it. The latter is
+    judged against other orders of the same rows, and needs them in the order of time.
+
+    Args:
+        table: of ``fit_many``.
+        parameter: one of its parameters.
+        by: a column to order the rows by, a date or a number; they are in order else.
+        machine: a column that tells machines apart, each of which is compared with itself alone.
+        level: probability that any row of a table without a change is marked, rows being
+            independent but for what their machine has in common.
+
+    Raises ValueError for unknown columns, fewer than three fitted rows, or a level that is none.
+
+    Source: Olshen, Venkatraman, Lucito and Wigler, Biostatistics 5, 2004, for lasting changes.
+
+    >>> import freqid as fq, pandas as pd
+    >>> k = 100 + np.sin(7.0 * np.arange(30)) + 6 * (np.arange(30) >= 20)
+    >>> np.flatnonzero(fleet_alarms(pd.DataFrame({"k": k, "k_std": 0.5}), "k")).tolist()
+    [20, 21, 22, 23, 24, 25, 26, 27, 28, 29]
+    """
+    if not 0 < finite("level", level) < 1:
+        raise InputError(f"level={level!r} must be a probability, above 0 and below 1")
+    values, std, kept = fitted_rows(table, parameter)
+    columns = [str(c) for c in table.columns]
+    for name, column in (("by", by), ("machine", machine)):
+        if column is not None and (not isinstance(column, str) or column not in columns):
+            raise InputError(unknown(name, column, columns))
+    rows = np.flatnonzero(kept)
+    if by is not None:
+        at = table[by].iloc[rows]
+        if at.isna().any():
+            raise InputError(f"by={by!r}: row {rows[int(at.isna().argmax())]} has none")
+        rows = rows[np.argsort(at.to_numpy(), kind="stable")]
+    groups = [rows]
+    if machine is not None:
+        names = table[machine].to_numpy()[rows]
+        groups = [rows[names == name] for name in dict.fromkeys(names.tolist())]
+    found = np.zeros(len(table), bool)
+    for group in groups:
+        if len(group) >= 3:
+            found[group] = _changed(values[group], std[group], level / len(groups))
+    return found
+
+
+def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Values and standard errors of a parameter, and which rows have both."""
+    if not hasattr(table, "columns"):
+        raise InputError(f"table is a {type(table).__name__}; expected what fit_many returns")
+    known = [c[: -len("_std")] for c in table.columns if str(c).endswith("_std")]
+    if not isinstance(parameter, str) or parameter not in known:
+        raise InputError(unknown("parameter", parameter, known))
+    values = table[parameter].to_numpy(dtype=float)
+    std = table[f"{parameter}_std"].to_numpy(dtype=float)
+    kept = np.isfinite(values) & np.isfinite(std)
+    if kept.sum() < 3:
+        raise InputError(f"parameter={parameter!r}: fewer than three rows were fitted")
+    return values, std, kept
+
+
+def _changed(x: FloatArray, s: FloatArray, level: float) -> BoolArray:
+    """Rows of one machine, in the order of time, that have changed."""
+    borders = _borders(x, s, level / 2)
+    far = float(scipy.stats.norm.isf(level / 4 / max(len(borders) - 2, 1)))
+    while True:
+        parts = _Parts(x, s, borders)
+        if len(borders) == 2:
+            break
+        # a run cuts off what lies before it, which need not differ from what comes after
+        between = np.abs(np.diff(parts.mean)) / np.hypot(parts.std[1:], parts.std[:-1])
+        if between.min() > far:
+            break
+        borders = np.delete(borders, int(np.argmin(between)) + 1)
+    between_rows = float(_cautious(parts.left, s))
+    found = np.abs(parts.left) > _limit(s, between_rows, level / 2) * np.sqrt(s**2 + between_rows)
+    away = np.abs(parts.mean - parts.mean[0]) > far * np.hypot(parts.std, parts.std[0])
+    away[0] = False
+    return np.asarray(found | away[parts.number])
+
+
+class _Parts:
+    """Rows between lasting changes: the ``number`` of each row's part, how far rows lie from the
+    middle of theirs, and means of the parts with their standard errors.
+    """
+
+    def __init__(self, x: FloatArray, s: FloatArray, borders: IntArray) -> None:
+        count = len(borders) - 1
+        self.number = np.repeat(np.arange(count), np.diff(borders))
+        each = [self.number == i for i in range(count)]
+        rough = np.array([np.median(x[own]) for own in each])
+        size = np.sqrt(s**2 + _between(x - rough[self.number], s))
+        size = np.where(size > 0, size, 1e-150)
+        middle = np.array([_middle(x[own], size[own]) for own in each])
+        self.left = x - middle[self.number]
+        # single rows far off are no part of the mean
+        clear = middle[self.number] + np.clip(self.left, -_CUT * size, _CUT * size)
+        weight = np.bincount(self.number, size**-2.0)
+        self.mean = np.bincount(self.number, clear / size**2) / weight
+        self.std = 1 / np.sqrt(weight)
+
+
+def _borders(x: FloatArray, s: FloatArray, level: float) -> IntArray:
+    """First rows of the parts between lasting changes, and the number of rows."""
+    borders, open_parts = {0, len(x)}, [(0, len(x))]
+    while open_parts:
+        begin, end = open_parts.pop()
+        run = _lasting(x[begin:end], s[begin:end], level)
+        if run is not None:
+            ends = sorted({begin, begin + run[0], begin + run[1], end})
+            borders.update(ends)
+            open_parts += list(pairwise(ends))
+    return np.array(sorted(borders))
+
+
+def _lasting(x: FloatArray, s: FloatArray, level: float) -> tuple[int, int] | None:
+    """The run of rows, from one up to another, that lies elsewhere than the others; None where
+    other orders show as clear a one.
+    """
+    n = len(x)
+    if n < _FEWEST:
+        return None
+    left = x - np.median(x)
+    size = np.sqrt(s**2 + _between(left, s))
+    if not (size > 0).all():
+        return None
+    y, w = np.clip(left, -_CUT * size, _CUT * size), 1 / size**2
+    first, last = _runs(n)
+    seen = _apart(y[None], w[None], first, last)[0]
+    most, rng, beyond = seen.max(), np.random.default_rng(n), 0
+    orders = int(min(_ORDERS / level, max(_NUMBERS // len(first), 2 / level)))
+    batch = max(min(orders, 1_000_000 // len(first)), 1)
+    for begin in range(0, orders, batch):
+        order = rng.permuted(np.tile(np.arange(n), (min(batch, orders - begin), 1)), axis=1)
+        beyond += int((_apart(y[order], w[order], first, last).max(axis=1) >= most).sum())
+        if beyond + 1 > level * (orders + 1):
+            return None
+    at = int(np.argmax(seen))
+    return _sharp(y, w, int(first[at]), int(last[at]))
+
+
+def _runs(n: int) -> tuple[IntArray, IntArray]:
+    """First rows of runs and those after their last ones: every beginning of the rows, and runs
+    within of lengths that grow by a part.
+    """
+    lengths = np.unique(
+        (_FEWEST / 2 * _LONGER ** np.arange(np.log(n) / np.log(_LONGER))).astype(int)
+    )
+    inside = [(np.arange(1, n - k), np.arange(1, n - k) + k) for k in lengths if 2 * k <= n]
+    begun = np.arange(1, n)
+    return (
+        np.concatenate([np.zeros(n - 1, int), *(first for first, _ in inside)]),
+        np.concatenate([begun, *(last for _, last in inside)]),
+    )
+
+
+def _apart(y: FloatArray, w: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
+    """How many standard errors runs of rows lie from all others, (orders, runs)."""
+    nothing = np.zeros((len(y), 1))
+    W = np.concatenate([nothing, np.cumsum(w, axis=1)], axis=1)
+    mean = (w * y).sum(axis=1, keepdims=True) / W[:, -1:]
+    S = np.concatenate([nothing, np.cumsum(w * (y - mean), axis=1)], axis=1)
+    inside = W[:, last] - W[:, first]
+    spread = inside * (W[:, -1:] - inside) / W[:, -1:]
+    return np.asarray(np.abs(S[:, last] - S[:, first]) / np.sqrt(spread))
+
+
+def _sharp(y: FloatArray, w: FloatArray, first: int, last: int) -> tuple[int, int]:
+    """The run, of those that begin and end within its own length of one, that lies farthest off."""
+    n, reach = len(y), min(max(last - first, 2), _REACH)
+    begins = np.arange(max(first - reach, 0), min(first + reach, n - 1) + 1) if first else [0]
+    ends = np.arange(max(last - reach, 1), min(last + reach, n) + 1)
+    each = [a.ravel() for a in np.meshgrid(begins, ends, indexing="ij")]
+    kept = (each[1] > each[0]) & (each[1] - each[0] < n)
+    begin, end = (a[kept] for a in each)
+    at = int(np.argmax(_apart(y[None], w[None], begin, end)[0]))
+    return int(begin[at]), int(end[at])
+
+
+def _limit(s: FloatArray, between: float, level: float) -> float:
+    """How many scatters, as ``_cautious`` takes them, the farthest row lies from the middle in so
+    many fleets without a change.
+
+    Few rows tell their own scatter badly, and unequal ones worse: fleets with more and with less of
+    it are drawn, and Student's t with the freedom that the worst of them shows tells the rest.
+    """
+    n = len(s)
+    if n >= _MANY:
+        return float(scipy.stats.norm.isf(level / 2 / n))
+    rng, freedom = np.random.default_rng(n), np.inf
+    for variance in {0.0, between}:
+        scatter = np.sqrt(s**2 + variance)
+        if not scatter.any():
+            continue
+        drawn = rng.standard_normal((_DRAWN, n)) * scatter
+        left = drawn - _middle(drawn, scatter)[:, None]
+        size = np.sqrt(s**2 + _cautious(left, s)[..., None])
+        farthest = (np.abs(left) / np.where(size > 0, size, np.inf)).max(axis=1)
+        shown = float(np.quantile(farthest, 1 - _BEYOND))
+        freedom = min(freedom, _freedom(shown, _BEYOND / 2 / n))
+    return float(scipy.stats.t.isf(level / 2 / n, freedom))
+
+
+def _cautious(left: FloatArray, std: FloatArray) -> FloatArray:
+    """A variance between rows that is too small in one fleet of twenty alone."""
+    half = (std.shape[-1] + 1) / 2
+    low = scipy.stats.beta.ppf(_UNSURE, half, half)
+    return _between(left, std, float(scipy.stats.norm.ppf((1 + low) / 2)))
+
+
+def _middle(x: FloatArray, size: FloatArray) -> FloatArray:
+    """Median of rows (…, n), each counting as much as its scatter (n,) lets it."""
+    order = np.argsort(x, axis=-1)
+    weight = np.cumsum((1 / np.where(size > 0, size, 1e-300))[order], axis=-1)
+    at = (weight < weight[..., -1:] / 2).sum(axis=-1)
+    which = np.take_along_axis(order, at[..., None], axis=-1)
+    return np.asarray(np.take_along_axis(x, which, axis=-1)[..., 0])
+
+
+def _freedom(limit: float, beyond: float) -> float:
+    """Of the t distribution whose part ``beyond`` a limit is this."""
+
+    def more(log_freedom: float) -> float:
+        return float(scipy.stats.t.isf(beyond, np.exp(log_freedom))) - limit
+
+    low, high = np.log(0.5), np.log(1e6)
+    if more(low) <= 0:
+        return 0.5
+    if more(high) >= 0:
+        return 1e6
+    return float(np.exp(scipy.optimize.brentq(more, low, high)))
+
+
+def _between(left: FloatArray, std: FloatArray, normal: float = _NORMAL) -> FloatArray:
+    """Variance between rows (…, n) beside their standard errors (n,), which makes the median
+    distance that of a normal distribution: a few changed rows do not move it.
+    """
+    size = np.abs(left)
+    # the variance lies between nothing and what the median distance alone would take
+    high = (np.median(size, axis=-1) / normal) ** 2
+    low = np.zeros_like(high)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        own = np.sqrt(std**2 + np.asarray(middle)[..., None])
+        distance = np.median(size / np.where(own > 0, own, 1e-300), axis=-1)
+        far = distance > normal
+        low, high = np.where(far, middle, low), np.where(far, high, middle)
+    return np.asarray((low + high) / 2)

@@ -1,0 +1,119 @@
+"""Changes in a fleet's table: found where there is one, and at the stated level where none is."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+
+
+def fleet(seed, rows=60, spread=2.0, scatter=0.5):
+    """Rows without a change: standard errors within a factor, and a scatter beside them."""
+    rng = np.random.default_rng(seed)
+    std = spread ** rng.uniform(-1, 1, rows)
+    own = std * rng.standard_normal(rows) + scatter * rng.standard_normal(rows)
+    return pd.DataFrame({"k": 100 + own, "k_std": std})
+
+
+def marked(table, **options):
+    return np.flatnonzero(fq.fleet_alarms(table, "k", **options)).tolist()
+
+
+@pytest.mark.parametrize(("rows", "spread", "scatter"), [
+    (6, 2.0, 0.5), (10, 10.0, 1.0), (30, 10.0, 0.0), (60, 2.0, 0.5),
+])  # fmt: skip
+def test_the_level_is_kept(rows, spread, scatter):
+    """At 10 %, so that fifty fleets tell: more than eleven of them in one of 100 such tests."""
+    false = [bool(marked(fleet([s, rows], rows, spread, scatter), level=0.1)) for s in range(50)]
+    assert np.sum(false) <= 11
+
+
+def test_a_single_row():
+    found = []
+    for seed in range(20):
+        table = fleet(seed)
+        table.loc[7, "k"] += 12 * table["k_std"][7]
+        found.append(7 in marked(table))
+    assert np.mean(found) > 0.9
+
+
+@pytest.mark.parametrize("size", [3, 8, 50])
+@pytest.mark.parametrize("begin", [18, 30, 50])
+def test_a_lasting_change(size, begin):
+    """However many rows it takes, and however large it is."""
+    before, after = [], []
+    for seed in range(8):
+        table = fleet([seed, begin], spread=1.5)
+        table.loc[begin:, "k"] += size
+        found = marked(table)
+        before.append(sum(i < begin - 1 for i in found) / begin)
+        after.append(sum(i >= begin for i in found) / (60 - begin))
+    assert np.mean(after) > 0.9
+    assert np.mean(before) < 0.05
+
+
+def test_a_drift_and_a_change_that_goes_again():
+    table = fleet(3)
+    table["k"] += np.linspace(0, 30, 60)
+    found = marked(table)
+    assert set(range(30, 60)) <= set(found)
+    assert not set(range(5)) & set(found)
+    table = fleet(4)
+    table.loc[20:39, "k"] += 6
+    assert set(marked(table)) == set(range(20, 40))
+
+
+def test_machines_are_compared_with_themselves():
+    tables = [fleet([1, s], 30).assign(machine=f"m{s}", day=np.arange(30)) for s in range(4)]
+    for i, table in enumerate(tables):
+        table["k"] += 50 * i
+    tables[2].loc[20:, "k"] += 10
+    # by day, as a fleet is logged
+    mixed = pd.concat(tables).sort_values("day", kind="stable", ignore_index=True)
+    found = mixed.loc[marked(mixed, machine="machine")]
+    assert set(found["machine"]) == {"m2"}
+    assert set(found["day"]) == set(range(20, 30))
+    # whatever the order of the rows
+    turned = mixed.sample(frac=1, random_state=0, ignore_index=True)
+    again = turned.loc[marked(turned, machine="machine", by="day")]
+    assert set(again["day"]) == set(range(20, 30))
+
+
+def test_rows_that_failed_and_rows_without_errors():
+    table = fleet(5).assign(day=pd.Timestamp("2026-01-01") + pd.to_timedelta(np.arange(60), "D"))
+    table.loc[[3, 9], "k"] = np.nan
+    table.loc[40:, "k"] += 8
+    assert marked(table, by="day") == list(range(40, 60))
+    exact = table.assign(k_std=0.0)
+    assert set(range(40, 60)) <= set(marked(exact))
+    exact.loc[12, "k"] = 1e6
+    assert 12 in marked(exact)
+    assert marked(pd.DataFrame({"k": [1.0] * 20, "k_std": 0.0})) == []
+
+
+def test_what_is_refused():
+    table = fleet(1)
+    for level in (0, 1, 2, -1, np.nan):
+        with pytest.raises(ValueError, match="level"):
+            fq.fleet_alarms(table, "k", level=level)
+    with pytest.raises(ValueError, match="parameter='q'"):
+        fq.fleet_alarms(table, "q")
+    with pytest.raises(ValueError, match="by='day'"):
+        fq.fleet_alarms(table, "k", by="day")
+    with pytest.raises(ValueError, match="machine='robot'"):
+        fq.fleet_alarms(table, "k", machine="robot")
+    with pytest.raises(ValueError, match="fewer than three"):
+        fq.fleet_alarms(table[:2], "k")
+    with pytest.raises(ValueError, match="row 4 has none"):
+        fq.fleet_alarms(
+            table.assign(day=[np.nan if i == 4 else i for i in range(60)]), "k", by="day"
+        )
+
+
+def test_the_picture_of_machines():
+    tables = [fleet([2, s], 20).assign(machine=f"m{s}", day=np.arange(20)) for s in range(3)]
+    tables[1].loc[12:, "k"] += 9
+    ax = fq.plot_fleet(pd.concat(tables, ignore_index=True), "k", by="day", machine="machine")
+    assert [t.get_text() for t in ax.texts] == ["m0", "m1", "m2"]
+    labels = [t.get_text() for t in ax.get_legend().get_texts()]
+    assert labels == ["changed (8 of 60; level 0.01 for all)"]
