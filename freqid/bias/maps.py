@@ -18,10 +18,11 @@ from freqid.bias.map_rows import Answer, Row, answer_chunk
 from freqid.checks import Array, InputError, flag, listed, named_values, path_of, processes, whole
 from freqid.data import as_band
 from freqid.excitation import ChirpSpectrum, InputSpectrum
-from freqid.fitting import TableStore, unordered
+from freqid.fitting import TableStore
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
 from freqid.models import GreyBox
 from freqid.progress import Bar
+from freqid.running import unordered
 
 if TYPE_CHECKING:
     import pandas as pd

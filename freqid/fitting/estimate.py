@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, choice, finite, flag, unknown
+from freqid.checks import (
+    ComplexArray,
+    FloatArray,
+    InputError,
+    choice,
+    finite,
+    flag,
+    processes,
+    unknown,
+)
 from freqid.data import DataSet, FrequencyResponse
 from freqid.fitting.cost.objective import EstimatedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -259,11 +268,12 @@ class Estimate(Questioned, Shown):
         method: Literal["linear", "profile"] = "linear",
         level: float = 0.95,
         progress: bool = False,
+        n_jobs: int | None = None,
     ) -> pd.DataFrame:
         """Confidence intervals, lower and upper, by standard errors or by ``"profile"`` likelihood.
 
-        ``progress`` shows how many ends of profiles are found. Raises ValueError for an unknown
-        method or a level outside (0, 1).
+        ``progress`` shows how many ends of profiles are found, by ``n_jobs`` processes, None being
+        this one. Raises ValueError for an unknown method or a level outside (0, 1).
         """
         import pandas as pd
         from scipy.stats import norm
@@ -281,7 +291,8 @@ class Estimate(Questioned, Shown):
                     "fit them again"
                 )
             std = np.sqrt(np.diag(self.covariance_matrix))
-            return profile_intervals(self.minimum, self.scatter.change, std, level, progress)
+            jobs = processes(n_jobs)
+            return profile_intervals(self.minimum, self.scatter.change, std, level, progress, jobs)
         half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
         return pd.DataFrame(
             {"lower": self.values - half, "upper": self.values + half},

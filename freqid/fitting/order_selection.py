@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from freqid.checks import InputError, an, choice, flag, listed, whole
+from freqid.checks import InputError, an, choice, flag, listed, processes, whole
 from freqid.data import FrequencyResponse, Record, as_data_sets, channel_counts
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
@@ -17,6 +18,7 @@ from freqid.fitting.reading import Reading
 from freqid.lti import Hold, Plane, in_one_blas_thread
 from freqid.models import OutputError
 from freqid.progress import Bar
+from freqid.running import in_turn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +39,7 @@ def select_order(
     criterion: Literal["aic", "mdl", "cross_validation"] = "mdl",
     delays: Iterable[int] = (0,),
     stable: bool = False,
+    n_jobs: int | None = None,
     progress: bool = False,
 ) -> pd.DataFrame:
     """Fit OutputError of each order and compare.
@@ -48,8 +51,9 @@ def select_order(
     initial state fitted to the other three. ``feedthrough=None`` tries both; ``delays`` are whole
     samples by which the inputs may come late. An order that cannot be fitted has its reason in
     ``error``. ``attrs["best"]`` is the order with the least ``criterion``: ``"aic"``, ``"mdl"`` or
-    ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]`` go with it. With
-    ``progress`` the screen shows how many orders are done. Other arguments as in ``fit``. Raises
+    ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]`` go with it. ``n_jobs``
+    is a number of processes, None this one, as in ``bootstrap``; with ``progress`` the screen shows
+    how many orders are done. Other arguments as in ``fit``. Raises
     ValueError for no orders, or one that is not a whole number, or where none can be fitted.
 
     >>> import freqid as fq
@@ -78,13 +82,11 @@ def select_order(
     reading = Reading.of(data, hold, band, initial_state=initial_state)
     n_inputs = channel_counts(data)[1]
     through = [False, True] if feedthrough is None else [feedthrough]
-    rows = []
-    with Bar(progress, len(late) * len(through) * len(wanted), 0, "orders") as advance:
-        for q, direct, order in product(late, through, wanted):
-            seen = in_step(reading, (q,) * n_inputs, max(late))
-            rows.append(_row(OutputError(order, direct, stable), q, seen))
-            advance(1)
-    table = pd.DataFrame(rows)
+    processes(n_jobs)
+    each = list(product(late, through, wanted))
+    with Bar(progress, len(each), 0, "orders") as advance:
+        work = partial(_row_of, reading, (n_inputs, max(late)), stable)
+        table = pd.DataFrame(in_turn(work, each, n_jobs, lambda _: advance(1)))
     scores = table[criterion].to_numpy()
     if np.isnan(scores).all():
         raise InputError(f"no order can be fitted: {table['error'].iloc[0]}")
@@ -93,6 +95,18 @@ def select_order(
     table.attrs["feedthrough"], table.attrs["delay"] = bool(best["feedthrough"]), int(best["delay"])
     table.attrs["criterion"] = criterion
     return table
+
+
+@in_one_blas_thread
+def _row_of(
+    reading: Reading, late: tuple[int, int], stable: bool, asked: tuple[int, bool, int]
+) -> dict[str, object]:
+    """The row of a delay, a feedthrough and an order; ``late`` holds the number of inputs and the
+    longest delay of all rows.
+    """
+    delay, direct, order = asked
+    seen = in_step(reading, (delay,) * late[0], late[1])
+    return _row(OutputError(order, direct, stable), delay, seen)
 
 
 def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, an, flag, listed, whole
+from freqid.checks import FloatArray, InputError, an, flag, listed, processes, whole
 from freqid.data import Record
 from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
 from freqid.models import GreyBox
 from freqid.progress import Bar
+from freqid.running import in_turn
 from freqid.validation.comparison import compare
 
 if TYPE_CHECKING:
@@ -91,11 +94,18 @@ def _mode_values(est: Estimate) -> pd.DataFrame:
 
 
 def cross_validate(
-    model: object, records: Sequence[Record], *, progress: bool = False, **options: Any
+    model: object,
+    records: Sequence[Record],
+    *,
+    n_jobs: int | None = None,
+    progress: bool = False,
+    **options: Any,
 ) -> pd.DataFrame:
     """Fit a model to all repeats but one, and compare with that one, each in turn.
 
-    ``options`` go to ``fit``; with ``progress`` the screen shows how many are done. Returns a
+    ``options`` go to ``fit``. ``n_jobs`` is a number of processes (extra ``parallel``), None this
+    one, or what ``joblib.parallel_config`` says (``backend="dask"`` for a cluster); with
+    ``progress`` the screen shows how many are done. Returns a
     DataFrame with one row a repeat: ``held_out``, the fit in per cent of each output, and the
     parameters. Raises ValueError for fewer than two records.
     """
@@ -105,16 +115,22 @@ def cross_validate(
     sets = listed("records", records)
     if len(sets) < 2:
         raise InputError(f"records holds {len(sets)}; cross-validation needs two or more repeats")
-    rows = []
+    processes(n_jobs)
+    work = partial(_held_out, model, sets, options)
     with Bar(flag("progress", progress), len(sets), 0, "repeats held out") as advance:
-        for i, held_out in enumerate(sets):
-            est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
-            uninterrupted(est.message)
-            fits = compare(est, held_out).fit_percent
-            named = {f"fit {n}": float(v) for n, v in zip(held_out.output_names, fits, strict=True)}
-            rows.append({"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))})
-            advance(1)
+        rows = in_turn(work, range(len(sets)), n_jobs, lambda _: advance(1))
     return pd.DataFrame(rows)
+
+
+def _held_out(
+    model: object, sets: Sequence[Record], options: Mapping[str, Any], i: int
+) -> dict[str, Any]:
+    """A row: what the fit to all repeats but one explains of that one."""
+    est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
+    uninterrupted(est.message)
+    fits = compare(est, sets[i]).fit_percent
+    named = {f"fit {n}": float(v) for n, v in zip(sets[i].output_names, fits, strict=True)}
+    return {"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))}
 
 
 def bootstrap(
@@ -123,13 +139,16 @@ def bootstrap(
     n: int = 200,
     seed: int = 0,
     *,
+    n_jobs: int | None = None,
     progress: bool = False,
     **options: Any,
 ) -> pd.DataFrame:
     """Estimates from repeats drawn again with replacement: their scatter without a noise model.
 
     ``options`` go to ``fit``; ``seed`` is that of the ``n`` resamples, each of which starts from
-    the estimate of all repeats; with ``progress`` the screen shows how many are done. Returns a
+    the estimate of all repeats. ``n_jobs`` is a number of processes (extra ``parallel``), None this
+    one, or what ``joblib.parallel_config`` says (``backend="dask"`` for a cluster), with the same
+    numbers; with ``progress`` the screen shows how many are done. Returns a
     DataFrame (n, parameters) whose ``describe`` and ``quantile`` give error bars. Raises ValueError
     for fewer than three records.
 
@@ -148,16 +167,21 @@ def bootstrap(
     if "start" not in options and hasattr(whole_fit.model, "values"):
         free = [p.name for p in whole_fit.model.free_parameters]
         options = {**options, "start": Near({k: whole_fit[k] for k in free}), "n_starts": 1}
+    processes(n_jobs)
+    drawn = [tuple(sorted(rng.integers(0, len(sets), len(sets)).tolist())) for _ in range(count)]
     # few repeats have few resamples: of four there are 35, in whatever order they were drawn
-    known: dict[tuple[int, ...], FloatArray] = {}
-    rows = []
+    each = list(dict.fromkeys(drawn))
+    work, times = partial(_drawn_again, model, sets, options), Counter(drawn)
     with Bar(progress, count, 0, "resamples") as advance:
-        for _ in range(count):
-            drawn = tuple(sorted(rng.integers(0, len(sets), len(sets)).tolist()))
-            if drawn not in known:
-                est = fit(model, [sets[i] for i in drawn], **options)
-                uninterrupted(est.message)
-                known[drawn] = est.values
-            rows.append(known[drawn])
-            advance(1)
-    return pd.DataFrame(rows, columns=list(whole_fit.names))
+        values = in_turn(work, each, n_jobs, lambda i: advance(times[each[i]]))
+    known = dict(zip(each, values, strict=True))
+    return pd.DataFrame([known[d] for d in drawn], columns=list(whole_fit.names))
+
+
+def _drawn_again(
+    model: object, sets: Sequence[Record], options: Mapping[str, Any], which: Sequence[int]
+) -> FloatArray:
+    """The estimate from some of the repeats, some of them more than once."""
+    est = fit(model, [sets[i] for i in which], **options)
+    uninterrupted(est.message)
+    return est.values

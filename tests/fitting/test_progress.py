@@ -6,7 +6,7 @@ import warnings
 import pytest
 
 import freqid as fq
-from freqid.fitting import progress
+from freqid import progress
 
 
 @pytest.mark.parametrize("wanted", [None, True])

@@ -1,5 +1,4 @@
 """Many fits: one row a record, safe on disk, by processes or on a cluster."""
 
 from freqid.fitting.many.fleet import fit_many
-from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore

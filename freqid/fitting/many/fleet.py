@@ -23,9 +23,9 @@ from freqid.fitting.many.rows import (
     lost_rows,
     rows_of,
 )
-from freqid.fitting.many.running import unordered
 from freqid.fitting.many.store import TableStore
 from freqid.progress import Bar
+from freqid.running import configured, unordered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -130,13 +130,11 @@ def _fitted_in_chunks(
     import pandas as pd
 
     jobs = [missing[i : i + size] for i in range(0, len(missing), size)]
-    cores = _cores()
     # a few are not worth processes of their own, but a cluster that is asked for is
-    few = n_jobs is None and cores is not None and len(missing) < _FEW
+    if n_jobs is None and not configured():
+        n_jobs = 1 if len(missing) < _FEW else -1
     with Bar(progress, done + len(missing), done, "fits") as advance:
-        for at, rows in unordered(
-            partial(rows_of, task), jobs, 1 if few else n_jobs or cores, partial(lost_rows, task)
-        ):
+        for at, rows in unordered(partial(rows_of, task), jobs, n_jobs, partial(lost_rows, task)):
             yield pd.DataFrame(rows)
             advance(len(jobs[at]))
 
@@ -149,17 +147,6 @@ def _joined(tables: Sequence[pd.DataFrame], named: Mapping[str, Source]) -> pd.D
     order = {name: i for i, name in enumerate(named)}
     table = table.sort_values("name", key=lambda names: names.map(order), ignore_index=True)
     return table[columns_of_rows(table)]
-
-
-def _cores() -> int | None:
-    """All cores, unless joblib has been told otherwise."""
-    try:
-        from joblib.parallel import get_active_backend
-    except ImportError:
-        return None
-    backend, given = get_active_backend()
-    own = type(backend).__name__ == "LokyBackend" and given in (None, 1)
-    return -1 if own else None
 
 
 def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source]:

@@ -16,10 +16,10 @@ from freqid.checks import InputError
 from freqid.data import DataSet, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import Near
-from freqid.fitting.many.running import alone
 from freqid.fitting.many.together import Done, minima
 from freqid.fitting.search.descent import uninterrupted
 from freqid.models import GreyBox
+from freqid.running import alone
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,12 +14,15 @@ from freqid.fitting.search.descent import minimise
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Realisation
 from freqid.progress import Bar
+from freqid.running import in_turn
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # standard errors within which an end is looked for, and evaluations of each fit on the way
 _REACH, _LIMIT = 10.0, 60
+# relative standard error that is down to rounding
+_ROUNDED = 1e-12
 
 
 def profile_intervals(
@@ -28,6 +31,7 @@ def profile_intervals(
     std: FloatArray,
     level: float = 0.95,
     progress: bool = False,
+    n_jobs: int | None = None,
 ) -> pd.DataFrame:
     """Lower and upper end of each parameter's interval by profile likelihood.
 
@@ -35,7 +39,8 @@ def profile_intervals(
     exceeds the least by no more than σ² χ²(level); where weights leave the noise coloured the
     threshold is widened as its standard error is. ``scale`` and ``std`` (P,) are the size of each
     unknown and the standard error of each parameter. Infinite where nothing holds the parameter
-    within ten standard errors. ``progress`` shows how many ends are found.
+    within ten standard errors. ``n_jobs`` is a number of processes, None this
+    one; ``progress`` shows how many ends are found.
 
     Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
     """
@@ -44,23 +49,16 @@ def profile_intervals(
     noise, own = minimum.noise_variance, std / scale
     white = noise * np.diag(minimum.determined.inverse)
     quantile = float(scipy.stats.chi2.ppf(level, 1))
-    rows: list[list[float]] = []
-
-    def ends_of(i: int, x: float) -> Iterator[float]:
-        if not np.isfinite(own[i]) or own[i] == 0:
-            yield from (-np.inf, np.inf) if own[i] else (x, x)
-            return
-        rise = noise * max(own[i] ** 2 / white[i], 1e-12) * quantile
-        for step in (-own[i], own[i]):
-            yield _end(minimum, i, step, rise)
-
-    with Bar(progress, 2 * len(minimum.x), 0, "ends of profiles") as advance:
-        for i, x in enumerate(minimum.x):
-            rows.append([])
-            for end in ends_of(i, x):
-                rows[-1].append(end)
-                advance(1)
-    ends = np.array(rows) * scale[:, None]
+    ends = minimum.x[:, None] + np.sqrt(quantile) * own[:, None] * np.array([-1, 1])
+    ends[~np.isfinite(own)] = -np.inf, np.inf
+    # an error that is down to rounding has no profile
+    told = np.flatnonzero(np.isfinite(own) & (own > _ROUNDED * np.abs(minimum.x)))
+    rise = {i: noise * max(own[i] ** 2 / white[i], 1e-12) * quantile for i in told}
+    each = [(int(i), side * float(own[i]), float(rise[i])) for i in told for side in (-1, 1)]
+    with Bar(progress, len(each), 0, "ends of profiles") as advance:
+        found = in_turn(partial(_end_of, minimum), each, n_jobs, lambda _: advance(1))
+    ends[told] = np.reshape(found, (-1, 2))
+    ends = ends * scale[:, None]
     index = pd.Index(minimum.structure.names, name="parameter")
     return pd.DataFrame(ends, columns=["lower", "upper"], index=index)
 
@@ -81,6 +79,10 @@ class _Held:
 
     def describe(self, x: FloatArray) -> str:
         return self.inner.describe(self.whole(x))
+
+
+def _end_of(minimum: Minimum, asked: tuple[int, float, float]) -> float:
+    return _end(minimum, *asked)
 
 
 def _end(minimum: Minimum, index: int, step: float, rise: float) -> float:

@@ -62,6 +62,33 @@ def unordered(
             )
 
 
+def configured() -> bool:
+    """Whether joblib has been told where jobs are to run (``joblib.parallel_config``)."""
+    try:
+        from joblib.parallel import get_active_backend
+    except ImportError:
+        return False
+    backend, given = get_active_backend()
+    return type(backend).__name__ != "LokyBackend" or given not in (None, 1)
+
+
+def in_turn(
+    work: Callable[[Job], Answer],
+    jobs: Sequence[Job],
+    n_jobs: int | None,
+    done: Callable[[int], object],
+) -> list[Answer]:
+    """The answer of each job, in their order; in this process where ``n_jobs`` is None, unless
+    joblib has been told otherwise. ``done`` is called with the number of each that is finished.
+    """
+    here = n_jobs is None and not configured()
+    found: dict[int, Answer] = {}
+    for i, answer in unordered(work, jobs, 1 if here else n_jobs):
+        found[i] = answer
+        done(i)
+    return [found[i] for i in range(len(jobs))]
+
+
 def alone(work: Callable[[Job], Answer], job: Job) -> Answer | None:
     """The answer of one job in a process of its own, None where that is ended."""
     from joblib.externals.loky import ProcessPoolExecutor
