@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
+from freqid.data.readers.hdf5_structure import check_superblock
 from freqid.data.readers.kinds import damaged, missing
 from freqid.data.stream_found import Found, Source, even, of_array
 from freqid.data.time_column import time_named
@@ -139,6 +140,10 @@ def of_hdf5(
             )
         arrays.add(name, item)
 
+    try:
+        check_superblock(path)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     try:
         with h5py.File(path, "r") as file:
             file.visititems(look)

@@ -97,8 +97,8 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     except ImportError:
         raise InputError(f"{path}: {missing('Parquet', 'pyarrow', 'parquet')}") from None
     try:
+        check_pages(path, whole=False)
         file = pq.ParquetFile(path)
-        check_pages(path, file.metadata, whole=False)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except Exception as error:

@@ -193,7 +193,7 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
             )
         scale = UNITS[wanted.casefold()]
         return _scaled(values, scale), wanted
-    size = float(np.nanmax(np.abs(column.to_numpy(dtype=float)), initial=0))
+    size = float(np.nan_to_num(np.abs(column.to_numpy(dtype=float)), nan=0.0).max(initial=0))
     for least, most, scale, text in EPOCHS:
         if least < size < most:
             return _scaled(values - values[0], scale), f"{text} since 1970"

@@ -295,3 +295,26 @@ def test_long_doubles_that_no_double_holds(tmp_path):
         file["time"], file["u"], file["y"] = T, np.sin(T), y
     with pytest.raises(InputError, match=r"long\.h5.*y.*7"):
         fq.read(tmp_path / "long.h5", inputs="u", outputs="y")
+
+
+def test_an_hdf5_file_that_names_a_driver(tmp_path):
+    """One of a few kilobytes once took four gigabytes and six seconds to be refused."""
+    h5py = pytest.importorskip("h5py")
+    for users in (0, 512, 4096):
+        path = tmp_path / f"{users}.h5"
+        with h5py.File(path, "w", userblock_size=users, libver="earliest") as file:
+            file["u"], file["y"], file["dt"] = np.arange(9.0), np.arange(9.0), 0.1
+        assert fq.read(path).dt == 0.1
+        content = bytearray(path.read_bytes())
+        # the fourth address of a superblock of version 0
+        assert content[users + 48 : users + 56] == b"\xff" * 8
+        content[users + 48 : users + 56] = bytes([255]) + bytes(7)
+        path.write_bytes(bytes(content))
+        begin = time.perf_counter()
+        for reading in (fq.read, fq.open):
+            with pytest.raises(ValueError, match=rf"{users}\.h5.*names a driver"):
+                reading(path)
+        assert time.perf_counter() - begin < 2
+    with h5py.File(tmp_path / "new.h5", "w", libver="latest") as file:
+        file["u"], file["y"], file["dt"] = np.arange(9.0), np.arange(9.0), 0.1
+    assert fq.read(tmp_path / "new.h5").dt == 0.1

@@ -22,9 +22,9 @@ def read_parquet(path: Path) -> pd.DataFrame:
     try:
         import pyarrow.parquet
 
+        check_pages(path)
         layout = pyarrow.parquet.read_metadata(path)
         check_size(path, 8.0 * layout.num_rows * layout.num_columns)
-        check_pages(path, layout)
         frame = pd.read_parquet(path)
         frame = frame if frame.index.name in (None, "time") else frame.reset_index()
         if not frame.columns.is_unique:

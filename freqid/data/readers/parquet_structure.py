@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from freqid.checks import InputError
 from freqid.data.readers.limits import check_size
@@ -22,33 +22,63 @@ _DEEPEST = 8
 # fields of a page's header: its sizes, and the structures that hold its number of values
 _UNPACKED, _PACKED, _VALUES = 2, 3, 1
 _HEADERS = (5, 7, 8)
+# what a file ends with, after the footer's length in so many bytes
+_MAGIC, _LENGTH = b"PAR1", 4
 # bytes of a header that is read at once, statistics of long texts included
 _HEADER = 1 << 16
 
 Fields = dict[int, Any]
 
 
-def check_pages(path: Path, layout: Any, whole: bool = True) -> None:
-    """ValueError for pages that ask for more than their file may take; ``layout`` is the footer.
+def check_pages(path: Path, whole: bool = True) -> None:
+    """ValueError for groups or pages that ask for more memory than their file may take.
 
-    Of a file that is not read as a ``whole`` each page may take as much.
+    Of a file that is not read as a ``whole`` each page may take as much. The footer is read here,
+    for asking pyarrow's of a column that lies can end the interpreter; what has none is left to it.
     """
-    rows = [layout.row_group(i).num_rows for i in range(layout.num_row_groups)]
-    if sum(rows) != layout.num_rows or min(rows, default=0) < 0:
-        raise _wrong(f"groups of {sum(rows)} rows in a file of {layout.num_rows}", 0)
     with path.open("rb") as file:
-        for group in range(layout.num_row_groups):
-            for column in range(layout.num_columns):
-                chunk = layout.row_group(group).column(column)
-                begin = chunk.data_page_offset
-                if chunk.has_dictionary_page and chunk.dictionary_page_offset:
-                    begin = min(begin, chunk.dictionary_page_offset)
-                _check_chunk(path, file, begin, chunk, whole)
+        footer = _footer(path, file)
+        if footer is None:
+            return
+        groups = footer.get(4, [])
+        rows = [group.get(3, -1) for group in groups]
+        if sum(rows) != footer.get(3) or min(rows, default=0) < 0:
+            raise _wrong(f"groups of {sum(rows)} rows in a file of {footer.get(3)}", 0)
+        for group in groups:
+            for column in group.get(1, []):
+                _check_chunk(path, file, _numbers_of(column.get(3, {})), whole)
 
 
-def _check_chunk(path: Path, file: Any, begin: int, chunk: Any, whole: bool) -> None:
-    at, end, unpacked, seen = begin, begin + chunk.total_compressed_size, 0, 0
-    while at < end and seen < chunk.num_values:
+def _footer(path: Path, file: BinaryIO) -> Fields | None:
+    """The footer's fields; None for a file that ends otherwise."""
+    size = path.stat().st_size
+    if size < 2 * len(_MAGIC) + _LENGTH:
+        return None
+    file.seek(size - len(_MAGIC) - _LENGTH)
+    length = int.from_bytes(file.read(_LENGTH), "little")
+    if file.read() != _MAGIC or length > size - 2 * len(_MAGIC) - _LENGTH:
+        return None
+    file.seek(size - len(_MAGIC) - _LENGTH - length)
+    return _Header(file.read(length)).structure()
+
+
+def _numbers_of(column: Fields) -> dict[str, int]:
+    """What a column says of itself, by the format's names."""
+    names = {5: "num_values", 7: "total_compressed_size", 9: "data_page_offset"}
+    told = {name: column.get(number) for number, name in names.items()}
+    told["dictionary_page_offset"] = column.get(11, 0)
+    for name, value in told.items():
+        if not isinstance(value, int) or value < 0:
+            raise _wrong(f"a column whose {name} is {value!r:.40}", 0)
+    return told  # type: ignore[return-value]
+
+
+def _check_chunk(path: Path, file: BinaryIO, chunk: dict[str, int], whole: bool) -> None:
+    at = chunk["data_page_offset"]
+    if chunk["dictionary_page_offset"]:
+        at = min(at, chunk["dictionary_page_offset"])
+    end, unpacked, seen = at + chunk["total_compressed_size"], 0, 0
+    while at < end and seen < chunk["num_values"]:
         file.seek(at)
         header = _Header(file.read(min(_HEADER, end - at)))
         fields = header.structure()
@@ -68,8 +98,8 @@ def _check_chunk(path: Path, file: Any, begin: int, chunk: Any, whole: bool) -> 
                 raise _wrong(f"{told[0]} entries in a dictionary of {sizes[0]} bytes", at)
             continue
         seen += told[0]
-        if seen > chunk.num_values:
-            raise _wrong(f"{seen} values in a column of {chunk.num_values}", at)
+        if seen > chunk["num_values"]:
+            raise _wrong(f"{seen} values in a column of {chunk['num_values']}", at)
 
 
 def _wrong(what: str, place: int) -> InputError:
