@@ -1,7 +1,9 @@
 """Every number of docs/scale.md, printed as a table.
 
-    python benchmarks/scale.py            sizes up to 1e7 samples, about three minutes
-    python benchmarks/scale.py --large    1e8 samples too, on disk and in memory (4 GiB free)
+    python benchmarks/scale.py            sizes up to 1e7 samples, about five minutes
+    python benchmarks/scale.py --large    1e8 samples, on disk and in memory, and 10,000 records of
+                                          20,000 (12 GiB of memory free)
+    python benchmarks/scale.py --huge     1e9 samples on disk (8 GB) instead
 
 Each ratio compares two things timed in turn in this one run, at one BLAS thread.
 """
@@ -9,6 +11,7 @@ Each ratio compares two things timed in turn in this one run, at one BLAS thread
 import argparse
 import os
 import resource
+import subprocess
 import sys
 import tempfile
 import time
@@ -17,6 +20,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+import pandas as pd
 import scipy.fft
 import scipy.optimize
 import scipy.signal
@@ -34,10 +38,10 @@ START = {"k": 1.8e5, "Jm": 7.5e-4, "Ja": 13.0}
 ROUNDS = 5
 
 
-def best(*functions):
+def best(*functions, rounds=ROUNDS):
     """The least time of each of several functions, called in turn."""
     times = [[] for _ in functions]
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         for function, own in zip(functions, times, strict=True):
             begin = time.perf_counter()
             function()
@@ -113,7 +117,7 @@ def everything(count):
     show(f"fit to {count:.0e} samples, all of it / two bare rffts", told, "at most 2, 1 GiB")
 
 
-def streamed(count):
+def streamed(count, rounds=ROUNDS):
     """A file of float32, read block by block; both need not fit into memory."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.npy"
@@ -129,14 +133,36 @@ def streamed(count):
             for at in range(0, count - 20_000, 10_000):
                 scipy.fft.rfft(np.asarray(blocks[at : at + 20_000], float), axis=0)
 
-        begin = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        ours, bare = best(lambda: fq.h1(fq.open(path, dt=T1), 20_000), by_hand)
+        ours, bare = best(lambda: fq.h1(fq.open(path, dt=T1), 20_000), by_hand, rounds=rounds)
         show(f"h1 of {count:.0e} samples on disk / reading and bare FFTs of the segments",
              f"{ours:.1f} s / {bare:.1f} s = {ours / bare:.2f}", "at most 1.5")  # fmt: skip
-        fit = best(lambda: fq.fit(fq.first_order(), fq.open(path, dt=T1), band=BAND))[0]
-        more = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - begin) / 2**10
-        show(f"fit to {count:.0e} samples on disk, one pass", f"{fit:.1f} s, {more:.0f} MiB more",
-             "400 MiB for h1")  # fmt: skip
+        show("its most memory, the interpreter and all libraries included",
+             f"{peak_of(PASS.format(what='fq.h1(stream, 20_000)'), path):.0f} MiB",
+             "400 MiB")  # fmt: skip
+        whole = f"fq.fit(fq.first_order(), stream, band={BAND})"
+        fit = best(
+            lambda: fq.fit(fq.first_order(), fq.open(path, dt=T1), band=BAND), rounds=rounds
+        )[0]
+        show(f"fit to {count:.0e} samples on disk, one pass",
+             f"{fit:.1f} s, {peak_of(PASS.format(what=whole), path):.0f} MiB in all")  # fmt: skip
+
+
+PASS = """
+import resource, sys
+import freqid as fq
+stream = fq.open(sys.argv[1], dt=0.5e-3)
+{what}
+# pages of the file that the system keeps for whoever needs them next are no memory of this process
+with open("/proc/self/status") as status:
+    kept = [line.split()[1] for line in status if line.startswith(("VmHWM", "RssFile"))]
+print(int(kept[0]) - int(kept[1]))
+"""
+
+
+def peak_of(script, path):
+    """The most memory, in MiB, of a process of its own, without pages of files."""
+    call = [sys.executable, "-c", script, str(path)]
+    return int(subprocess.run(call, capture_output=True, check=True).stdout) / 2**10
 
 
 def by_leastsq(record):
@@ -150,26 +176,94 @@ def by_leastsq(record):
     return scipy.optimize.leastsq(error, [120.0, 80.0])[0]
 
 
-def fleet(count, samples, jobs):
-    plant = fq.first_order()
-    records = []
-    for seed in range(count):
-        one = fq.simulate(plant, fq.chirp(2, 60, samples * 1e-3, 1e-3), 1e-3)
-        records.append(one.with_noise(0.01 * float(one.y.std()), seed=seed))
-    start = {"b": 120.0, "a": 80.0}
+def lags(count, samples):
+    """Records of a first-order lag, each with noise of its own."""
+    one = fq.simulate(fq.first_order(), fq.chirp(2, 60, samples * 1e-3, 1e-3), 1e-3)
+    size = 0.01 * float(one.y.std())
+    return [one.with_noise(size, seed=seed) for seed in range(count)]
+
+
+def fleet(count, samples, wanted, jobs=2):
+    records, compared = lags(count, samples), min(count, 500)
+    asked = {"start": {"b": 120.0, "a": 80.0}, "verdicts": False, "progress": False}
+
+    def table_of(n_jobs):
+        # a record keeps its spectra, which would be there the second time
+        given = [fresh(r) for r in records]
+        begin = time.perf_counter()
+        table = fq.fit_many(fq.first_order(), given, n_jobs=n_jobs, **asked)
+        return table, time.perf_counter() - begin
+
+    table_of(1) if count <= 2000 else None
+    table, ours = table_of(1)
     begin = time.perf_counter()
-    table = fq.fit_many(plant, records, start=start, verdicts=False, n_jobs=1, progress=False)
-    ours = time.perf_counter() - begin
+    theirs = np.array([by_leastsq(r) for r in records[:compared]])
+    bare = (time.perf_counter() - begin) / compared
+    assert np.allclose(table[["b", "a"]][:compared], theirs, rtol=1e-2)
+    told = f"{1e3 * ours / count:.2f} ms / {1e3 * bare:.2f} ms"
+    show(f"{count} records of {samples} samples, a row / leastsq on lfilter", told, wanted)
+    other, took = table_of(jobs)
+    assert np.allclose(table[["b", "a"]], other[["b", "a"]], rtol=1e-6)
+    show(f"the same on {jobs} processes, which have to start", f"{ours / took:.2f} times faster",
+         "1.8 times")  # fmt: skip
+    took = table_of(jobs)[1]
+    show("the same once they run", f"{ours / took:.2f} times faster", "1.8 times")
+
+
+def at_once(count=200, samples=20_000):
+    """How much two processes that share nothing but the machine do at once."""
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        list(pool.map(timed, [4, 4], [samples] * 2))
+        alone = min(pool.submit(timed, count, samples).result() for _ in range(2))
+        both = min(max(pool.map(timed, [count] * 2, [samples] * 2)) for _ in range(2))
+    show("leastsq in two processes that share nothing but the machine",
+         f"{2 * alone / both:.2f} times as much")  # fmt: skip
+
+
+def timed(count, samples):
+    records = lags(count, samples)
     begin = time.perf_counter()
-    theirs = np.array([by_leastsq(r) for r in records])
-    bare = time.perf_counter() - begin
-    assert np.allclose(table[["b", "a"]], theirs, rtol=1e-2)
-    told = f"{1e3 * ours / count:.1f} ms / {1e3 * bare / count:.1f} ms"
-    show(f"{count} records of {samples} samples, a row / leastsq on lfilter", told, "1 ms")
-    begin = time.perf_counter()
-    fq.fit_many(plant, records, start=start, verdicts=False, n_jobs=jobs, progress=False)
-    faster = ours / (time.perf_counter() - begin)
-    show(f"the same on {jobs} processes", f"{faster:.2f} times faster", "1.8 times")
+    for record in records:
+        by_leastsq(record)
+    return time.perf_counter() - begin
+
+
+def cluster(counts=(100, 200), samples=20_000):
+    """Rows with their verdicts on a local cluster: what the plan of docs/scale.md counts on."""
+    import joblib
+    from distributed import Client, LocalCluster
+
+    for workers in (1, 2):
+        with (
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address=":0"
+            ) as machines,
+            Client(machines),
+            joblib.parallel_config(backend="dask"),
+        ):
+            fq.fit_many(fq.first_order(), lags(4 * workers, samples), chunk=1, progress=False)
+            for count in counts:
+                records = lags(count, samples)
+                begin = time.perf_counter()
+                fq.fit_many(fq.first_order(), records, progress=False)
+                took = time.perf_counter() - begin
+                show(f"{count} records of {samples} samples, verdicts, on a cluster of {workers}",
+                     f"{1e3 * took / count:.0f} ms a row")  # fmt: skip
+
+
+def reading(count=200, samples=20_000):
+    """What a record takes before it is fitted."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / f"{i}.parquet" for i in range(count)]
+        for path, record in zip(paths, lags(count, samples), strict=True):
+            rows = {"time": record.time, "u": record.u, "y": record.y}
+            pd.DataFrame(rows).astype({"u": "f4", "y": "f4"}).to_parquet(path)
+        size = sum(path.stat().st_size for path in paths) / count
+        took = best(lambda: [fq.read(path) for path in paths], rounds=2)[0]
+        show(f"reading a Parquet file of {samples} samples, {size / 1e3:.0f} kB",
+             f"{1e3 * took / count:.1f} ms")  # fmt: skip
 
 
 def sweep(count, samples=20_000):
@@ -209,11 +303,19 @@ def resampled():
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--large", action="store_true")
-    large = parser.parse_args().large
+    parser.add_argument("--huge", action="store_true")
+    given = parser.parse_args()
+    if given.huge:
+        streamed(1_000_000_000, rounds=1)
+        return
+    large = given.large
     resampled()
     sweep(200 if large else 50)
-    fleet(1000, 2000, 2)
-    fleet(200, 20_000, 2)
+    fleet(1000, 2000, "1 ms")
+    fleet(10_000 if large else 1000, 20_000, "3 ms")
+    at_once()
+    reading()
+    cluster()
     fits([20_000, 200_000, 2_000_000])
     fft_stage(10_000_000)
     averages(10_000_000)

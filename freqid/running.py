@@ -38,18 +38,20 @@ def unordered(
             ) from None
         yield from ((i, work(job)) for i, job in enumerate(jobs))
         return
-    left = dict(enumerate(jobs))
+    left = set(range(len(jobs)))
     for _ in range(_LIVES):
         parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")
         try:
-            asked = [joblib.delayed(_numbered)(work, i, job) for i, job in left.items()]
+            # each job is made when its turn comes
+            asked = (joblib.delayed(_numbered)(work, i, jobs[i]) for i in sorted(left))
             for i, answer in parallel(asked):
-                del left[i]
+                left.discard(i)
                 yield i, answer
             return
         except TerminatedWorkerError:
             continue
-    for i, job in left.items():
+    for i in sorted(left):
+        job = jobs[i]
         answer_alone = alone(work, job)
         if answer_alone is not None:
             yield i, answer_alone

@@ -134,7 +134,8 @@ def _fitted_in_chunks(
     if n_jobs is None and not configured():
         n_jobs = 1 if len(missing) < _FEW else -1
     with Bar(progress, done + len(missing), done, "fits") as advance:
-        for at, rows in unordered(partial(rows_of, task), jobs, n_jobs, partial(lost_rows, task)):
+        work, lost = partial(rows_of, task), partial(lost_rows, task)
+        for at, rows in unordered(work, jobs, n_jobs, lost):
             yield pd.DataFrame(rows)
             advance(len(jobs[at]))
 
