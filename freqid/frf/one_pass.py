@@ -18,8 +18,8 @@ from freqid.data import Band, Record, Stream, as_band, flat
 from freqid.frf.spectra import KnownLines, Spectra, spectra
 from freqid.progress import Bar
 
-# of a stream of known length, unless they would be shorter than that many samples
-_COUNT, _SHORTEST = 16, 1 << 20
+# of a stream of known length, unless they would be shorter, or longer, than that many samples
+_COUNT, _SHORTEST, _LONGEST = 16, 1 << 20, 1 << 22
 # the rate of the samples that are kept beside the lines, over twice the band's upper end
 _ABOVE = 1.25
 # a last stretch with fewer lines than this, for each channel, is left out
@@ -94,7 +94,7 @@ def stretches(
     """
     limits = as_band(band, stream.nyquist)
     known = stream.n_samples
-    length = _SHORTEST if known is None else max(_SHORTEST, -(-known // _COUNT))
+    length = _SHORTEST if known is None else min(max(_SHORTEST, -(-known // _COUNT)), _LONGEST)
     # samples that show the lines come every so many
     every = 1 if limits is None else max(int(0.5 / (_ABOVE * limits.high * stream.dt)), 1)
     length = -(-length // every) * every
