@@ -16,13 +16,11 @@ from freqid.bias.apparent import Sampling, weight_of
 from freqid.bias.conditions import Conditions
 from freqid.bias.map_rows import Answer, Row, answer_chunk
 from freqid.checks import Array, InputError, flag, listed, named_values, path_of, processes, whole
-from freqid.data import as_band
+from freqid.data import Bar, as_band, unordered
 from freqid.excitation import ChirpSpectrum, InputSpectrum
 from freqid.fitting import TableStore
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
 from freqid.models import GreyBox
-from freqid.progress import Bar
-from freqid.running import unordered
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,12 +21,14 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import LineNoise, LocalResponse
 from freqid.data.logged import channels
 from freqid.data.periodic_response import PeriodicResponse
+from freqid.data.progress import Bar
 from freqid.data.quality import check_record
 from freqid.data.readers.kinds import ResponseFile
 from freqid.data.readers.table import named_with
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of
 from freqid.data.response_files import read_response
+from freqid.data.running import alone, configured, every_core, in_turn, unordered
 from freqid.data.selection import as_holds, flat
 from freqid.data.sources import in_python, source, that_estimates
 from freqid.data.stamped_record import StampedRecord

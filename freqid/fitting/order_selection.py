@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from freqid.checks import InputError, an, choice, flag, listed, processes, whole
-from freqid.data import FrequencyResponse, Record, as_data_sets, channel_counts
+from freqid.data import Bar, FrequencyResponse, Record, as_data_sets, channel_counts, in_turn
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 from freqid.lti import Hold, Plane, in_one_blas_thread
 from freqid.models import OutputError
-from freqid.progress import Bar
-from freqid.running import in_turn
 
 if TYPE_CHECKING:
     import pandas as pd

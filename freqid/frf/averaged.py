@@ -16,9 +16,9 @@ from freqid.data import (
     Stream,
     that_estimates,
 )
-from freqid.frf.cross_spectra import Spectral, powers, spectral
 from freqid.frf.measured import measured
 from freqid.frf.segments import Averaging, Detrend, Window
+from freqid.frf.welch import Spectral, powers, spectral
 
 
 @that_estimates

@@ -9,6 +9,7 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError, an, flag, whole
 from freqid.data import (
+    Bar,
     PeriodicResponse,
     Record,
     Reference,
@@ -23,7 +24,6 @@ from freqid.frf.driven_lines import driven_lines, folded_lines
 from freqid.frf.measured import units_of
 from freqid.frf.noise_of_means import PeriodMeans, means
 from freqid.frf.periods import PERIODS_SHOWN, check_period, samples_of_a_period
-from freqid.progress import Bar
 
 # samples of periods of a stream that are taken at once
 _AT_ONCE = 1 << 18

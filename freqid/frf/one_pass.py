@@ -14,9 +14,8 @@ import numpy as np
 import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import Band, Record, Stream, as_band, flat
+from freqid.data import Band, Bar, Record, Stream, as_band, flat
 from freqid.frf.spectra import KnownLines, Spectra, spectra
-from freqid.progress import Bar
 
 # of a stream of known length, unless they would be shorter, or longer, than that many samples
 _COUNT, _SHORTEST, _LONGEST = 16, 1 << 20, 1 << 22

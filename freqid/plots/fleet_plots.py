@@ -70,5 +70,6 @@ def plot_fleet(
         axis.set_title(
             f"{parameter} of {int(kept.sum())} fits" + (f", {lost} failed" if lost else "")
         )
-        axis.legend(frameon=False)
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend(frameon=False)
     return axis

@@ -29,7 +29,7 @@ _DRAWN, _BEYOND, _MANY = 1000, 0.02, 400
 # part of fleets in which the scatter that is taken is too small
 _UNSURE = 0.05
 # median distance of a normal distribution, and halvings of a variance
-_NORMAL, _HALVINGS = float(scipy.stats.norm.ppf(0.75)), 30
+_NORMAL, _HALVINGS = 0.6744897501960817, 30
 
 
 def fleet_alarms(

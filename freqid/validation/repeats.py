@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, an, flag, listed, processes, whole
-from freqid.data import Record
+from freqid.data import Bar, Record, in_turn
 from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
 from freqid.models import GreyBox
-from freqid.progress import Bar
-from freqid.running import in_turn
 from freqid.validation.comparison import compare
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+# what goes to ``fit``
+Options = Mapping[str, Any]
 
 
 def hold_bias(
@@ -70,7 +72,7 @@ def hold_bias(
     )
 
 
-def _shared(options: Mapping[str, Any]) -> None:
+def _shared(options: Options) -> None:
     """ValueError for parameters that each experiment has for itself: another one has others."""
     if options.get("separate"):
         raise InputError(
@@ -122,9 +124,7 @@ def cross_validate(
     return pd.DataFrame(rows)
 
 
-def _held_out(
-    model: object, sets: Sequence[Record], options: Mapping[str, Any], i: int
-) -> dict[str, Any]:
+def _held_out(model: object, sets: Sequence[Record], options: Options, i: int) -> dict[str, object]:
     """A row: what the fit to all repeats but one explains of that one."""
     est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
     uninterrupted(est.message)
@@ -179,7 +179,7 @@ def bootstrap(
 
 
 def _drawn_again(
-    model: object, sets: Sequence[Record], options: Mapping[str, Any], which: Sequence[int]
+    model: object, sets: Sequence[Record], options: Options, which: Sequence[int]
 ) -> FloatArray:
     """The estimate from some of the repeats, some of them more than once."""
     est = fit(model, [sets[i] for i in which], **options)

@@ -6,7 +6,7 @@ import warnings
 import pytest
 
 import freqid as fq
-from freqid import progress
+from freqid.data import progress
 
 
 @pytest.mark.parametrize("wanted", [None, True])

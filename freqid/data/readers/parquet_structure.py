@@ -124,7 +124,7 @@ class _Header:
             fields[number] = self._value(kind, depth)
         return fields
 
-    def _value(self, kind: int, depth: int) -> Any:
+    def _value(self, kind: int, depth: int) -> object:
         if kind in (_TRUE, _FALSE):
             return kind == _TRUE
         if kind == _BYTE:
@@ -150,7 +150,7 @@ class _Header:
             return self.structure(depth + 1)
         raise _wrong(f"type {kind} in a page's header", self.at)
 
-    def _several(self, kind: int, count: int, depth: int) -> list[Any]:
+    def _several(self, kind: int, count: int, depth: int) -> list[object]:
         # each takes a byte, truths too where they are in a list
         own = _BYTE if kind in (_TRUE, _FALSE) else kind
         return [self._value(own, depth + 1) for _ in range(self._bounded(count))]

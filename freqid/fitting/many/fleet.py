@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
-from freqid.data import FrequencyResponse, Record, read
+from freqid.data import Bar, FrequencyResponse, Record, configured, every_core, read, unordered
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
 from freqid.fitting.many.identity import fingerprint
@@ -24,8 +24,6 @@ from freqid.fitting.many.rows import (
     rows_of,
 )
 from freqid.fitting.many.store import TableStore
-from freqid.progress import Bar
-from freqid.running import configured, unordered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -132,7 +130,7 @@ def _fitted_in_chunks(
     jobs = [missing[i : i + size] for i in range(0, len(missing), size)]
     # a few are not worth processes of their own, but a cluster that is asked for is
     if n_jobs is None and not configured():
-        n_jobs = 1 if len(missing) < _FEW else -1
+        n_jobs = 1 if len(missing) < _FEW else every_core()
     with Bar(progress, done + len(missing), done, "fits") as advance:
         work, lost = partial(rows_of, task), partial(lost_rows, task)
         for at, rows in unordered(work, jobs, n_jobs, lost):

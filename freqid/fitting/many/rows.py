@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import DataSet, read
+from freqid.data import DataSet, alone, read
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import Near
 from freqid.fitting.many.together import Done, minima
 from freqid.fitting.search.descent import uninterrupted
 from freqid.models import GreyBox
-from freqid.running import alone
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,12 +9,11 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray, InputError
+from freqid.data import Bar, in_turn
 from freqid.fitting.cost.objective import Structure
 from freqid.fitting.search.descent import minimise
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import Realisation
-from freqid.progress import Bar
-from freqid.running import in_turn
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from typing import TypeVar
 
 from freqid.checks import InputError
@@ -72,6 +73,11 @@ def configured() -> bool:
         return False
     backend, given = get_active_backend()
     return type(backend).__name__ != "LokyBackend" or given not in (None, 1)
+
+
+def every_core() -> int | None:
+    """What joblib takes for all cores; None where it is not there."""
+    return -1 if find_spec("joblib") else None
 
 
 def in_turn(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError, flag, path_of
-from freqid.data import Record, Reference, Stream, as_band, as_records, chosen, references_of
+from freqid.data import Bar, Record, Reference, Stream, as_band, as_records, chosen, references_of
 from freqid.frf.running_sums import RunningSums
 from freqid.frf.segments import (
     Averaging,
@@ -20,7 +20,6 @@ from freqid.frf.segments import (
     pieces,
     shared_lines,
 )
-from freqid.progress import Bar
 
 
 @dataclass(frozen=True, eq=False)
