@@ -187,8 +187,8 @@ def test_zarr(tmp_path):
     group = zarr.open_group(tmp_path / "g.zarr", mode="w")
     run = group.create_group("run")
     for name, values in (("u", X[:, 0]), ("y", X[:, 1])):
-        run.create_array(name, data=values, chunks=(1000,))
-    group.create_array("dt", data=np.array([DT]))
+        run.create_array(name, shape=(N,), chunks=(1000,), dtype="f8")[:] = values
+    group.create_array("dt", shape=(1,), dtype="f8")[:] = DT
     seen = fq.open(tmp_path / "g.zarr")
     assert (seen.dt, seen.input_names, seen.output_names) == (DT, ("u",), ("y",))
     assert np.array_equal(seen.slice(4, 9).load().y, X[4000:9000, 1])
