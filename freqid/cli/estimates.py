@@ -144,7 +144,10 @@ def fit_many(
     verdicts
         --no-verdicts leaves out witness, warnings and verdict, which take longer than the fit.
     """
-    files = matching(data)
+    # a pattern may take in the table of an earlier call
+    files = [file for file in matching(data) if Path(file).resolve() != out.resolve()]
+    if not files:
+        raise InputError(f"{' '.join(data)} matches no file but {out}, which is the table's")
     options = search.given()
     if asked.start:
         options["start"] = asked.values()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,49 +12,95 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
+from freqid.data.readers.columns import CLOCKS, step_of
 from freqid.data.readers.hdf5_structure import check_superblock
 from freqid.data.readers.kinds import damaged, missing
-from freqid.data.stream_found import Found, Source, even, of_array
+from freqid.data.readers.limits import limit_of
+from freqid.data.stream_found import Asked, Found, Source, even, of_array
 from freqid.data.time_column import time_named
-
-# what a file says of its sample time
-_STEPS = ("dt", "Ts")
 
 
 @dataclass
 class _Arrays:
-    """Arrays of samples by their full name with their shapes, numbers, and what opens them."""
+    """Arrays of samples by their full name with their shapes, numbers by their folders, and what
+    opens them.
+    """
 
     path: Path
     opened: Callable[[], AbstractContextManager[Source]]
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    numbers: dict[str, float] = field(default_factory=dict)
+    numbers: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def add(self, name: str, array: Source) -> None:
         """Note an array: one of samples, or a number."""
         if array.dtype.kind not in "fiu":
             return
+        # a chunk is unpacked as a whole, however little of it is asked for
+        size, limit = math.prod(array.chunks or (1,)) * array.dtype.itemsize, limit_of(self.path)
+        if size > limit:
+            raise InputError(
+                f"{self.path}: a chunk of {name!r} takes {size / 2**20:.4g} MiB, and may take "
+                f"{limit / 2**20:.4g}; if it is to be trusted, set the environment variable "
+                "FREQID_READ_LIMIT to more bytes"
+            )
         if array.ndim in (1, 2) and array.shape[0] > 1 and array.size:
             self.shapes[name] = tuple(int(size) for size in array.shape)
         elif array.size == 1:
-            self.numbers[_leaf(name)] = float(np.ravel(array[()])[0])
+            folder = self.numbers.setdefault(_folder(name), {})
+            folder[_leaf(name)] = float(np.ravel(array[()])[0])
 
-    def found(
-        self,
-        block: int,
-        given: float | None,
-        columns: Sequence[str] | None,
-        group: str | None,
-        asked: Sequence[str] | None,
-    ) -> Found:
+    def add_clocks(self, folder: str, attributes: Mapping[str, Source]) -> None:
+        """Note what the attributes of a folder, or of an array in it, say of the sample time."""
+        told = {n: v for n, v in attributes.items() if n in CLOCKS and np.size(v) == 1}
+        if told:
+            here = self.numbers.setdefault(folder, {})
+            here |= {n: float(np.ravel(np.asarray(v))[0]) for n, v in told.items()}
+
+    def _step(self, wanted: Sequence[str], times: Sequence[str], count: int) -> float | None:
+        """The sample time in s by a time of as many samples, one beside the arrays if there is, or
+        by what the file says.
+        """
+        if not times:
+            return self.step(wanted)
+        beside = [n for n in times if _folder(n) == _folder(wanted[0])]
+        time = (beside or times)[0]
+        with self.opened() as file:
+            stamps = np.concatenate([file[time][:2], file[time][-2:]])
+        return even(str(self.path), _leaf(time), stamps, count)
+
+    def step(self, names: Iterable[str]) -> float | None:
+        """The sample time of arrays in s: what their folders say, those around these, or any.
+
+        Raises ValueError where two differ.
+        """
+        found = {told for name in names if (told := self._nearest(name))}
+        if not found:
+            found = {told for folder in self.numbers.values() if (told := step_of(folder))}
+        if len(found) > 1:
+            steps = ", ".join(f"{step:g}" for step in sorted(found))
+            raise InputError(
+                f"{self.path}: its arrays have sample times of {steps} s; take a group or give dt"
+            )
+        return found.pop() if found else None
+
+    def _nearest(self, name: str) -> float | None:
+        """What is said of the sample time nearest to an array, in its folder or one around it."""
+        folder = name
+        while folder:
+            folder = _folder(folder)
+            if told := step_of(self.numbers.get(folder, {})):
+                return told
+        return None
+
+    def found(self, asked: Asked) -> Found:
         """What a stream takes of them."""
-        shapes = self._of_group(group)
+        shapes = self._of_group(asked.group)
         times = [n for n, s in shapes.items() if len(s) == 1 and time_named([_leaf(n)])]
         shapes = {n: s for n, s in shapes.items() if n not in times}
         leaves = [_leaf(n) for n in shapes]
         shown = leaves if len(set(leaves)) == len(leaves) else list(shapes)
         named = dict(zip(shown, shapes, strict=True))
-        named = self._alike(named, shapes, asked)
+        named = self._alike(named, shapes, asked.channels)
         count = shapes[next(iter(named.values()))][0]
         channels = [
             (shown_name if width == 1 else f"{shown_name}{i + 1}", name, i)
@@ -61,24 +109,20 @@ class _Arrays:
             for i in range(width)
         ]
         names = [shown_name for shown_name, _, _ in channels]
-        if columns is not None:
-            names = list(channel_names("columns", columns, len(names), "channel"))
-        dt = next((self.numbers[n] for n in _STEPS if n in self.numbers), None)
+        if asked.columns is not None:
+            names = list(channel_names("columns", asked.columns, len(names), "channel"))
+        wanted = [named[n] for n in asked.channels or () if n in named] or list(named.values())
         times = [n for n in times if self.shapes[n][0] == count]
-        if times and given is None:
-            with self.opened() as file:
-                t = file[times[0]]
-                stamps = np.concatenate([t[:2], t[-2:]])
-            dt = even(str(self.path), _leaf(times[0]), stamps, count)
+        dt = None if asked.dt is not None else self._step(wanted, times, count)
 
         def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
             wanted = [channels[i][1:] for i in which]
             full = dict.fromkeys(name for name, _ in wanted)
             with self.opened() as file:
-                for at in range(first, count, block):
-                    read = {name: file[name][at : at + block] for name in full}
-                    columns = {n: rows.reshape(len(rows), -1) for n, rows in read.items()}
-                    yield np.column_stack([columns[name][:, i] for name, i in wanted])
+                for at in range(first, count, asked.block):
+                    read = {name: file[name][at : at + asked.block] for name in full}
+                    flat = {name: rows.reshape(len(rows), -1) for name, rows in read.items()}
+                    yield np.column_stack([flat[name][:, i] for name, i in wanted])
 
         return Found(blocks, names, count, dt, str(self.path))
 
@@ -89,7 +133,7 @@ class _Arrays:
             inside = group.strip("/") + "/"
             shapes = {n: s for n, s in self.shapes.items() if n.startswith(inside)}
             if not shapes:
-                groups = sorted({n.rpartition("/")[0] for n in self.shapes} - {""})
+                groups = sorted({_folder(n) for n in self.shapes} - {""})
                 raise InputError(f"{self.path}: {unknown('group', group, groups)}")
         if not shapes:
             raise InputError(f"{self.path}: holds no arrays of samples")
@@ -116,14 +160,7 @@ class _Arrays:
         return {name: full for name, full in named.items() if shapes[full][0] == count}
 
 
-def of_hdf5(
-    path: Path,
-    block: int,
-    given: float | None,
-    columns: Sequence[str] | None,
-    group: str | None,
-    asked: Sequence[str] | None,
-) -> Found:
+def of_hdf5(path: Path, asked: Asked) -> Found:
     """The data sets of an HDF5 file."""
     try:
         import h5py
@@ -139,6 +176,7 @@ def of_hdf5(
                 f"{path}: {name!r} refers to another file, which is not read; copy it in"
             )
         arrays.add(name, item)
+        arrays.add_clocks(_folder(name), item.parent.attrs)
 
     try:
         check_superblock(path)
@@ -147,7 +185,7 @@ def of_hdf5(
     try:
         with h5py.File(path, "r") as file:
             file.visititems(look)
-        return arrays.found(block, given, columns, group, asked)
+        return arrays.found(asked)
     except InputError:
         raise
     except Exception as error:
@@ -155,14 +193,7 @@ def of_hdf5(
         raise InputError(f"{path}: {damaged('HDF5', error)}") from None
 
 
-def of_zarr(
-    path: Path,
-    block: int,
-    given: float | None,
-    columns: Sequence[str] | None,
-    group: str | None,
-    asked: Sequence[str] | None,
-) -> Found:
+def of_zarr(path: Path, asked: Asked) -> Found:
     """A zarr array (N, channels), or the arrays of a group."""
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist")
@@ -172,19 +203,28 @@ def of_zarr(
         raise InputError(f"{path}: {missing('zarr', 'zarr', 'zarr')}") from None
     try:
         root = zarr.open(path, mode="r")
-        if isinstance(root, zarr.Array) and root.ndim == 2 and root.dtype.kind in "fiu":
-            return of_array(root, columns, block, str(path))
         arrays = _Arrays(path, lambda: nullcontext(root))
-        if isinstance(root, zarr.Group):
-            for name, item in root.members(max_depth=None):
-                if isinstance(item, zarr.Array):
-                    arrays.add(name, item)
-        return arrays.found(block, given, columns, group, asked)
+        if isinstance(root, zarr.Array):
+            arrays.add(path.name, root)
+            arrays.add_clocks("", root.attrs)
+            found = of_array(root, asked.columns, asked.block, str(path))
+            return dataclasses.replace(found, dt=arrays.step([path.name]))
+        arrays.add_clocks("", root.attrs)
+        for name, item in root.members(max_depth=None):
+            is_array = isinstance(item, zarr.Array)
+            arrays.add_clocks(_folder(name) if is_array else name, item.attrs)
+            if isinstance(item, zarr.Array):
+                arrays.add(name, item)
+        return arrays.found(asked)
     except InputError:
         raise
     except Exception as error:
         # zarr has errors of many kinds for a folder that is not what it says
         raise InputError(f"{path}: {damaged('zarr', error)}") from None
+
+
+def _folder(name: str) -> str:
+    return name.rpartition("/")[0]
 
 
 def _leaf(name: str) -> str:

@@ -14,36 +14,27 @@ from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_conditions, kept_hold
 from freqid.data.stream_arrays import of_hdf5, of_zarr
-from freqid.data.stream_found import Found, Source, even, of_array
+from freqid.data.stream_found import Asked, Found, Source, even, of_array
 from freqid.data.stream_views import from_the_first
 from freqid.data.time_column import time_named
 
 
-def of_file(
-    path: Path,
-    block: int,
-    dt: float | None,
-    columns: Sequence[str] | None,
-    group: str | None,
-    asked: Sequence[str] | None,
-) -> Found:
-    """The blocks of a file; its time is not looked at where ``dt`` is given. Of channels of several
-    lengths those that are ``asked`` for have to be alike.
-    """
+def of_file(path: Path, asked: Asked) -> Found:
+    """The blocks of a file."""
     kind = path.suffix.lower()
     if kind == ".zarr" or (path / "zarr.json").exists():
-        return of_zarr(path, block, dt, columns, group, asked)
+        return of_zarr(path, asked)
     existing(path)
     if kind in (".h5", ".hdf5"):
-        return of_hdf5(path, block, dt, columns, group, asked)
-    if group is not None:
-        raise InputError(f"group={group!r} is one of an HDF5 or zarr file; {path} is none")
+        return of_hdf5(path, asked)
+    if asked.group is not None:
+        raise InputError(f"group={asked.group!r} is one of an HDF5 or zarr file; {path} is none")
     if kind == ".npy":
-        return _of_npy(path, block, columns)
+        return _of_npy(path, asked.block, asked.columns)
     if kind == ".parquet":
-        if columns is not None:
-            raise InputError(f"columns={columns!r}: {path} names its own; leave them out")
-        return _of_parquet(path, block, dt)
+        if asked.columns is not None:
+            raise InputError(f"columns={asked.columns!r}: {path} names its own; leave them out")
+        return _of_parquet(path, asked.block, asked.dt)
     known = [".npy", ".h5", ".hdf5", ".parquet", ".zarr"]
     raise InputError(f"{path}: {unknown('suffix', kind, known)}")
 

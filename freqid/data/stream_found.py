@@ -21,6 +21,19 @@ _EVEN = 1e-2
 
 
 @dataclass(frozen=True)
+class Asked:
+    """What ``open`` is asked of a file: samples of a block, a sample time in s that is known, names
+    for its columns, a group of it, and the channels that have to be alike.
+    """
+
+    block: int
+    dt: float | None
+    columns: Sequence[str] | None
+    group: str | None
+    channels: Sequence[str] | None
+
+
+@dataclass(frozen=True)
 class Found:
     """Blocks of all channels, their names, and what is known of time and length."""
 

@@ -11,7 +11,7 @@ from freqid.checks import Array, FloatArray, InputError, finite, listed, positiv
 from freqid.data.conditions import as_conditions
 from freqid.data.selection import as_holds
 from freqid.data.stream_files import of_file
-from freqid.data.stream_found import Found, Source, of_array
+from freqid.data.stream_found import Asked, Found, Source, of_array
 from freqid.data.stream_views import from_the_first
 from freqid.data.streams import BLOCK, Stream, as_rows
 from freqid.lti import Hold, ZeroOrderHold
@@ -36,8 +36,8 @@ def open(
             extra ``zarr``), an array or a dask array (N, channels), an iterable of blocks
             (n, channels), or a function that starts such an iterable anew for each pass.
         inputs, outputs: channels by name; of two, the first is the input.
-        dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set
-            ``time`` or ``dt``), or instead of it.
+        dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set or
+            an attribute ``time``, ``dt`` or ``fs``), or instead of it.
         hold: what the input did, where the file does not remember it; a zero-order hold else.
         columns: names of the channels of arrays and blocks, u and y where not given.
         scale: what samples, integers for the most part, are multiplied by: one for all, one for
@@ -56,8 +56,8 @@ def open(
     """
     size = whole("block", block)
     if isinstance(source, (str, Path)):
-        asked = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
-        found = of_file(Path(source), size, dt, columns, group, asked)
+        both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
+        found = of_file(Path(source), Asked(size, dt, columns, group, both))
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):

@@ -11,7 +11,7 @@ from types import TracebackType
 import numpy as np
 
 from freqid.checks import ComplexArray, InputError
-from freqid.data import Stream, whole_file
+from freqid.data import Stream, check_arrays, whole_file
 from freqid.frf.segments import Averaging, products, taper
 
 # seconds between two writings of a state
@@ -48,6 +48,12 @@ class RunningSums:
         made = cls(pairs, path, _identity(stream, averaging, length, step))
         if path.exists():
             made._read()
+        taken = made.at + length - step if made.count else 0
+        if stream.n_samples is not None and taken > stream.n_samples:
+            raise InputError(
+                f"state: {path} is of {taken} samples and more, and "
+                f"{stream.origin} has {stream.n_samples}; it has lost some: give another name"
+            )
         return made
 
     def add(self, spectra: Iterable[Mapping[str, ComplexArray]], count: int, samples: int) -> None:
@@ -97,10 +103,13 @@ class RunningSums:
     def _read(self) -> None:
         assert self.path is not None
         try:
+            check_arrays(self.path)
             with self.path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
                 identity = str(file["identity"][()])
                 count, at = int(file["count"][()]), int(file["at"][()])
                 total = {pair: file[f"total_{pair}"] for pair in self.pairs}
+        except InputError as error:
+            raise InputError(f"state: {self.path}: {error}") from None
         except Exception as error:
             # numpy has errors of many kinds for a file that is not what it says
             raise InputError(

@@ -1,5 +1,7 @@
 """Views of streams, and what a source may do to the numbers: beside the record in memory."""
 
+import os
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -228,6 +230,85 @@ def test_hdf5_matrices_groups_and_lengths(tmp_path):
     assert fq.open(path, "u", "v").n_samples == N
     path = hdf5(tmp_path / "count.h5", u=X[:, 0], y=X[:, 1], counter=np.arange(N + 1), dt=DT)
     assert np.array_equal(fq.open(path, "u", "y").load().y, X[:, 1])
+
+
+def test_the_sample_time_is_the_nearest_that_is_told(tmp_path):
+    """Rates and attributes as ``read`` takes them, each group's its own."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, rate in (("a", 500.0), ("b", 100.0)):
+            group = file.create_group(name)
+            group["u"], group["y"] = X[:, 0], X[:, 1]
+            group.attrs["fs"] = rate
+        file["info/dt"] = 7.0
+    path = tmp_path / "a.h5"
+    assert fq.open(path, group="a").dt == pytest.approx(1 / 500)
+    assert fq.open(path, group="b").dt == pytest.approx(1 / 100)
+    assert fq.read(path, group="b").dt == pytest.approx(1 / 100)
+    assert fq.open(path, "b/u", "b/y").dt == pytest.approx(1 / 100)
+    with pytest.raises(ValueError, match=r"sample times of 0\.002, 0\.01 s"):
+        fq.open(path, "a/u", "b/y")
+    assert fq.open(path, "a/u", "b/y", dt=0.5).dt == 0.5
+    with h5py.File(tmp_path / "t.h5", "w") as file:
+        for name, step in (("a", 0.1), ("b", 0.2)):
+            for channel, values in (("u", X[:, 0]), ("y", X[:, 1]), ("time", step * np.arange(N))):
+                file[f"{name}/{channel}"] = values
+    assert fq.open(tmp_path / "t.h5", "b/u", "b/y").dt == pytest.approx(0.2)
+    zarr = pytest.importorskip("zarr")
+    array = zarr.create_array(tmp_path / "a.zarr", shape=(9, 2), dtype="f8")
+    array[:] = X[:9, :2]
+    array.attrs["fs"] = 50.0
+    assert fq.open(tmp_path / "a.zarr").dt == pytest.approx(0.02)
+    root = zarr.open_group(tmp_path / "g.zarr", mode="w")
+    for name in ("u", "y"):
+        root.create_array(f"run/{name}", shape=(9,), dtype="f8")[:] = 1.0
+    root["run"].attrs["dt"] = 0.25
+    assert fq.open(tmp_path / "g.zarr").dt == 0.25
+
+
+def test_chunks_that_take_more_memory_than_they_may(tmp_path):
+    zarr = pytest.importorskip("zarr")
+    h5py = pytest.importorskip("h5py")
+    size = 10**9
+    zarr.create_array(tmp_path / "b.zarr", shape=(size, 2), chunks=(size, 2), dtype="f8")
+    group = zarr.open_group(tmp_path / "g.zarr", mode="w")
+    for name in ("u", "y"):
+        group.create_array(name, shape=(size,), chunks=(size,), dtype="f8")
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        for name in ("u", "y"):
+            file.create_dataset(
+                name, shape=(size,), chunks=(10**8,), dtype="f8", compression="gzip"
+            )
+    for name in ("b.zarr", "g.zarr", "b.h5"):
+        with pytest.raises(ValueError, match=rf"{name[0]}\.\w+: a chunk of .* FREQID_READ_LIMIT"):
+            fq.open(tmp_path / name, dt=DT)
+
+
+def test_pickles_in_a_zarr_array_are_not_run(tmp_path):
+    """numcodecs knows pickles, which could run anything, as filters of arrays of version 2."""
+    import json
+    import pickle
+
+    zarr = pytest.importorskip("zarr")
+    ran = tmp_path / "ran"
+
+    class Runs:
+        def __reduce__(self):
+            return os.mkdir, (str(ran),)
+
+    codec = {"id": "pickle", "protocol": 5}
+    delta = {"id": "delta", "dtype": "<f8"}
+    for change in ({"filters": [codec]}, {"compressor": codec}, {"filters": [delta, codec]}):
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.zarr"
+        zarr.create_array(
+            path, shape=(9, 2), chunks=(9, 2), dtype="f8", zarr_format=2, compressors=None
+        )[:] = 1.0
+        told = json.loads((path / ".zarray").read_text()) | change
+        (path / ".zarray").write_text(json.dumps(told))
+        (path / "0.0").write_bytes(pickle.dumps(Runs()))
+        with pytest.raises(ValueError, match=path.name):
+            fq.open(path, dt=DT).load()
+    assert not ran.exists()
 
 
 def test_names_for_a_file_are_taken(tmp_path):

@@ -257,3 +257,13 @@ def test_on_the_command_line(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit) as end:
         commands.main(["fit-many", "nothing*.csv", *arguments[2:]])
     assert end.value.code == 2
+    # the table may lie among the logs
+    for i, record in enumerate(runs(2)):
+        fq.write(record, f"log{i}.parquet")
+    again = ["fit-many", "*.parquet", "--model", "first-order", "--out", "est.parquet"]
+    Path("t.parquet").unlink()
+    for _ in range(2):
+        with pytest.raises(SystemExit) as end:
+            commands.main([*again, "--jobs", "1", "--no-verdicts"])
+        assert end.value.code == 0
+    assert len(pd.read_parquet("est.parquet")) == 2

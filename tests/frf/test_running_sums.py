@@ -118,6 +118,22 @@ def test_states_of_something_else_are_refused(tmp_path):
         fq.h1(RECORD, 500, state=kept)
 
 
+def test_a_log_that_has_lost_samples_is_told(tmp_path):
+    """Its sums would be of what is no longer there."""
+    kept = tmp_path / "sums.npz"
+    fq.h1(fq.open(ROWS, dt=DT), 500, state=kept)
+    fq.h1(fq.open(ROWS, dt=DT), 500, state=kept)
+    with pytest.raises(ValueError, match=r"is of 30000 samples and more.*has 20000"):
+        fq.h1(fq.open(ROWS[:20_000], dt=DT), 500, state=kept)
+
+
+def test_a_state_takes_no_memory_without_bound(tmp_path):
+    kept = tmp_path / "sums.npz"
+    np.savez_compressed(kept, total_uu=np.zeros(60_000_000))
+    with pytest.raises(ValueError, match=r"sums\.npz.*would take"):
+        fq.h1(fq.open(ROWS, dt=DT), 500, state=kept)
+
+
 def test_progress_is_shown(capsys):
     stream = fq.open(ROWS, dt=DT)
     fq.h1(stream, 500, progress=True)

@@ -30,6 +30,13 @@ def in_numbers(values: object) -> object:
     return array / np.timedelta64(1, "s") if array.dtype.kind == "m" else values
 
 
+def step_of(numbers: Mapping[str, float]) -> float | None:
+    """The sample time in s that a file's numbers tell by their names, as one or as a rate."""
+    step = next((numbers[n] for n in _STEPS if n in numbers), None)
+    rate = next((numbers[n] for n in _RATES if n in numbers), None)
+    return 1 / rate if step is None and rate is not None and rate > 0 else step
+
+
 def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     """Named arrays as columns: matrices become name1, name2, …, scalars are left out.
 
@@ -77,10 +84,7 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
             full[name][:: N // len(x)] = x
         else:
             raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
-    step = next((scalars[n] for n in _STEPS if n in scalars), None)
-    rate = next((scalars[n] for n in _RATES if n in scalars), None)
-    if step is None and rate is not None and rate > 0:
-        step = 1 / rate
+    step = step_of(scalars)
     if "time" not in full and step is not None:
         full["time"] = step * np.arange(N)
     frame = pd.DataFrame(full)

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 def read_npz(path: Path) -> pd.DataFrame:
     """The arrays of an NPZ as columns; ValueError for pickles and for a damaged file."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            check_size(path, sum(_size(archive, part) for part in archive.infolist()))
+        check_arrays(path)
         # a pickle inside could run anything
         with np.load(path, allow_pickle=False) as arrays:
             return columns_of({name: arrays[name] for name in arrays.files})
@@ -31,6 +30,12 @@ def read_npz(path: Path) -> pd.DataFrame:
     except Exception as error:
         # zipfile, zlib and numpy have errors of many kinds for a file that is not what it says
         raise InputError(f"is not an NPZ of plain arrays ({first_line(error)})") from None
+
+
+def check_arrays(path: Path) -> None:
+    """ValueError where the arrays of an NPZ would take more memory than they may."""
+    with zipfile.ZipFile(path) as archive:
+        check_size(path, sum(_size(archive, part) for part in archive.infolist()))
 
 
 def _size(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> float:

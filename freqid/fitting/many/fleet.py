@@ -13,7 +13,7 @@ from freqid.data import Bar, FrequencyResponse, Record, configured, every_core, 
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import fitter_of
 from freqid.fitting.many.identity import fingerprint
-from freqid.fitting.many.known import Known, print_of
+from freqid.fitting.many.known import Known, prints_of
 from freqid.fitting.many.rows import (
     Row,
     Source,
@@ -95,7 +95,7 @@ def fit_many(
     if path is None:
         tables = list(_fitted_in_chunks(task, list(named.items()), size, n_jobs, progress, 0))
         return _joined(tables, named)
-    prints = {name: print_of(model, source) for name, source in named.items()}
+    prints = prints_of(model, named)
     store = TableStore(path, fingerprint(task), "other fits")
     known = Known(named, prints, store)
     if (finished := known.finished()) is not None:

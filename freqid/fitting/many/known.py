@@ -15,13 +15,21 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def print_of(model: object, source: Source) -> str:
-    """A fingerprint of a record, or of a file as it is, and of the plant at its conditions."""
-    # a text is a path, whose file may change
-    known = Path(source) if isinstance(source, str) else source
-    met = {} if isinstance(known, Path) else known.conditions
-    seen = at_conditions(model, [met]) if isinstance(model, GreyBox) else ()
-    return fingerprint(known, seen)
+def prints_of(model: object, named: Mapping[str, Source]) -> dict[str, str]:
+    """Fingerprints of records, or of files as they are, and of the plant at their conditions."""
+    seen: dict[tuple[tuple[str, float], ...], str] = {}
+
+    def print_of(source: Source) -> str:
+        # a text is a path, whose file may change
+        known = Path(source) if isinstance(source, str) else source
+        met = {} if isinstance(known, Path) else known.conditions
+        key = tuple(sorted(met.items()))
+        if key not in seen:
+            at = at_conditions(model, [met]) if isinstance(model, GreyBox) else ()
+            seen[key] = fingerprint(at)
+        return fingerprint(known, seen[key])
+
+    return {name: print_of(source) for name, source in named.items()}
 
 
 class Known:

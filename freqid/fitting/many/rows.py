@@ -73,12 +73,16 @@ def rows_of(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
 
 
 def lost_rows(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
-    """Rows of a chunk that ends whatever process computes it: each record in one of its own."""
-    rows: list[Row] = []
-    for each in job:
-        done = alone(partial(rows_of, task), [each])
+    """Rows of a chunk that ends whatever process computes it: its halves in processes of their own,
+    down to the record that does it.
+    """
+    if len(job) == 1:
         error = "the process that computed it was ended: out of memory, or by the plant"
-        rows += [{"name": each[0], "seconds": np.nan, "error": error}] if done is None else done
+        return [{"name": job[0][0], "seconds": np.nan, "error": error}]
+    rows: list[Row] = []
+    for half in (job[: len(job) // 2], job[len(job) // 2 :]):
+        done = alone(partial(rows_of, task), half)
+        rows += lost_rows(task, half) if done is None else done
     return rows
 
 
