@@ -144,6 +144,9 @@ def _factors(
             )
     else:
         each = [finite("scale", scale)] * len(names)
+    for name, value in zip(names, each, strict=True):
+        if value == 0:
+            raise InputError(f"scale=0 leaves nothing of {name!r}; give another, or leave it out")
     return None if all(value == 1 for value in each) else np.array(each)
 
 

@@ -13,7 +13,14 @@ from freqid.data.conditions import as_conditions
 from freqid.data.record import Record
 from freqid.data.sampling import samples_between
 from freqid.data.selection import as_holds, channels_of, flat, hold_of
-from freqid.data.stream_views import Blocks, every_so_many, filtered, of_columns, part_of
+from freqid.data.stream_views import (
+    Blocks,
+    every_so_many,
+    filtered,
+    low_pass_taps,
+    of_columns,
+    part_of,
+)
 from freqid.lti import Hold
 
 # samples of a block that is read at once
@@ -28,7 +35,7 @@ class Stream:
     read nothing. ``blocks(first)`` starts a pass at a sample: arrays (n, channels), inputs first.
     ``n_samples`` is None where only a pass tells it. ``band`` (Hz) is the one in which lines are
     taken where none is asked for. Of the source, it begins at sample ``begin`` and holds each
-    ``step``-th.
+    ``step``-th; ``ahead`` are its last samples, which what follows in the source would change.
     """
 
     blocks: Blocks
@@ -42,6 +49,7 @@ class Stream:
     band: Band | None = None
     begin: int = 0
     step: int = 1
+    ahead: int = 0
 
     # what a record has, and a stream does not
     factor = 1
@@ -101,12 +109,12 @@ class Stream:
             raise InputError(
                 f"factor={factor} leaves {left} of {self.n_samples} samples; take less"
             )
-        blocks = self.blocks
+        blocks, ahead = self.blocks, self.ahead
         if flag("antialias", antialias) and factor > 1:
-            blocks = filtered(self.checked, factor)
+            blocks, ahead = filtered(self.checked, factor), ahead + len(low_pass_taps(factor)) // 2
         return replace(
             self, blocks=every_so_many(blocks, factor), dt=self.dt * factor, n_samples=left,
-            step=self.step * factor,
+            step=self.step * factor, ahead=-(-ahead // factor),
         )  # fmt: skip
 
     def select(
@@ -214,7 +222,11 @@ class Stream:
             if not np.isfinite(total):
                 bad = ~np.isfinite(rows).all(axis=1)
                 if bad.any():
-                    place = self._place(at + int(np.argmax(bad)))
+                    good = int(np.argmax(bad))
+                    if good:
+                        # what is before it is worth having
+                        yield rows[:good]
+                    place = self._place(at + good)
                     raise InputError(
                         f"{self.origin}: sample {place} is NaN or infinite; slice() takes what is "
                         "beside it"

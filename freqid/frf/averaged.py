@@ -38,7 +38,7 @@ def h1(
 
     Args:
         records: one, or repeats and experiments of one plant with one sample time; or a stream
-            (see ``open``), which takes one pass and a ``segment``.
+            (see ``open``), which takes one pass, and a ``segment`` where its length is not known.
         segment: samples of each segment; by default an eighth of a single record, and the whole of
             each of several.
         band: in Hz, None for all above zero.

@@ -125,14 +125,14 @@ def spectral(
     for i, record in enumerate(sets):
         signal = None if signals is None else signals[i]
         if isinstance(record, Stream):
-            with Bar(progress, record.n_samples, sums.at, "samples") as advance, sums:
-                for n, channels in pieces(record, length, step, signal, sums.at):
+            with Bar(progress, record.n_samples, sums.sums.at, "samples") as advance, sums:
+                for n, channels in pieces(record, length, step, signal, sums.sums.at):
                     sums.add(averaging.transforms(channels, length, step), n, n * step)
                     advance(n * step)
             continue
         for n, channels in pieces(record, length, step, signal):
             sums.add(averaging.transforms(channels, length, step), n, n * step)
-    total, count = sums.total, sums.count
+    total, count = dict(sums.sums.total), sums.sums.count
     f, density = averaging.density(length, first.dt)
     total = {pair: S * density[:, None, None] for pair, S in total.items()}
     limits = averaging.band

@@ -118,6 +118,39 @@ def test_states_of_something_else_are_refused(tmp_path):
         fq.h1(RECORD, 500, state=kept)
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_filter_that_has_seen_the_end_does_not_go_on(tmp_path, known):
+    """What follows changes the last samples that it made, which the sums have taken."""
+    kept = tmp_path / "sums.npz"
+
+    def seen(count):
+        rows = ROWS[:count]
+        source = rows if known else lambda: iter(np.array_split(rows, 7))
+        return fq.open(source, dt=DT).decimate(5, antialias=True)
+
+    first = fq.h1(seen(21_000), 500, state=kept)
+    assert np.array_equal(fq.h1(seen(21_000), 500, state=kept).response, first.response)
+    with pytest.raises(ValueError, match=r"sums\.npz is of a stream that had ended"):
+        fq.h1(seen(N), 500, state=kept)
+    # one that was interrupted goes on: its filter had seen what follows
+    other = tmp_path / "other.npz"
+    bad = ROWS.copy()
+    bad[19_000] = np.nan
+    with pytest.raises(ValueError, match=r"other\.npz"):
+        fq.h1(fq.open(bad, dt=DT, block=3000).decimate(5, antialias=True), 500, state=other)
+    again = fq.h1(fq.open(ROWS, dt=DT).decimate(5, antialias=True), 500, state=other)
+    whole = fq.h1(fq.open(ROWS, dt=DT).decimate(5, antialias=True), 500)
+    assert np.allclose(again.response, whole.response, rtol=1e-9)
+
+
+def test_the_samples_before_a_mistake_are_kept(tmp_path):
+    bad = ROWS.copy()
+    bad[19_000] = np.nan
+    with pytest.raises(ValueError, match="sample 19000 is NaN"):
+        fq.h1(fq.open(bad, dt=DT), 500, state=tmp_path / "s.npz")
+    assert int(np.load(tmp_path / "s.npz")["at"]) == 18_750
+
+
 def test_a_log_that_has_lost_samples_is_told(tmp_path):
     """Its sums would be of what is no longer there."""
     kept = tmp_path / "sums.npz"
