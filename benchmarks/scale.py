@@ -210,7 +210,7 @@ def fleet(count, samples, wanted, jobs=2):
     show("the same once they run", f"{ours / took:.2f} times faster", "1.8 times")
 
 
-def at_once(count=200, samples=20_000):
+def at_once(what, timed, count=200, samples=20_000):
     """How much two processes that share nothing but the machine do at once."""
     from joblib.externals.loky import ProcessPoolExecutor
 
@@ -218,16 +218,36 @@ def at_once(count=200, samples=20_000):
         list(pool.map(timed, [4, 4], [samples] * 2))
         alone = min(pool.submit(timed, count, samples).result() for _ in range(2))
         both = min(max(pool.map(timed, [count] * 2, [samples] * 2)) for _ in range(2))
-    show("leastsq in two processes that share nothing but the machine",
+    show(f"{what} in two processes that share nothing but the machine",
          f"{2 * alone / both:.2f} times as much")  # fmt: skip
 
 
-def timed(count, samples):
+def with_leastsq(count, samples):
     records = lags(count, samples)
     begin = time.perf_counter()
     for record in records:
         by_leastsq(record)
     return time.perf_counter() - begin
+
+
+def in_a_batch(count, samples):
+    records = lags(count, samples)
+    asked = {"start": {"b": 120.0, "a": 80.0}, "verdicts": False, "progress": False}
+    begin = time.perf_counter()
+    fq.fit_many(fq.first_order(), records, n_jobs=1, **asked)
+    return time.perf_counter() - begin
+
+
+def verdicts(count=64, samples=20_000):
+    """Rows with verdicts on one process and on two that have started."""
+    records, took = lags(count, samples), {}
+    for n_jobs in (2, 1, 2):
+        given = [fresh(r) for r in records]
+        begin = time.perf_counter()
+        fq.fit_many(fq.first_order(), given, n_jobs=n_jobs, progress=False)
+        took[n_jobs] = time.perf_counter() - begin
+    told = f"{1e3 * took[1] / count:.0f} ms, {took[1] / took[2]:.2f} times as fast on two"
+    show(f"{count} records of {samples} samples, a row with its verdict", told, "1.8 times")
 
 
 def cluster(counts=(100, 200), samples=20_000):
@@ -313,7 +333,9 @@ def main():
     sweep(200 if large else 50)
     fleet(1000, 2000, "1 ms")
     fleet(10_000 if large else 1000, 20_000, "3 ms")
-    at_once()
+    at_once("leastsq", with_leastsq)
+    at_once("the batch", in_a_batch)
+    verdicts()
     reading()
     cluster()
     fits([20_000, 200_000, 2_000_000])

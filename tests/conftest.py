@@ -1,5 +1,6 @@
 """Shared plants, records and switches of the suite."""
 
+import contextlib
 import os
 import sys
 from pathlib import Path
@@ -33,6 +34,26 @@ def benchmarks():
     sys.path.insert(0, folder)
     yield folder
     sys.path.remove(folder)
+
+
+@pytest.fixture
+def two_workers():
+    """Begins a block in which joblib's jobs go to a Dask cluster of two processes; its client."""
+    distributed = pytest.importorskip("dask.distributed")
+    joblib = pytest.importorskip("joblib")
+
+    @contextlib.contextmanager
+    def begin():
+        with (
+            distributed.LocalCluster(
+                n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+            ) as cluster,
+            distributed.Client(cluster) as client,
+            joblib.parallel_config(backend="dask"),
+        ):
+            yield client
+
+    return begin
 
 
 @pytest.fixture(scope="session")

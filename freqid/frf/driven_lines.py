@@ -20,7 +20,7 @@ _CERTAIN = 4.0
 
 def folded_lines(fine: Sequence[PeriodMeans], n: int) -> BoolArray:
     """Which lines of a slower output have excited lines of the input folded onto them, (lines,)."""
-    level, noise = _levels(fine)
+    level, noise = _without_offset(_levels(fine))
     lines = np.arange(len(level))
     at = lines % n
     at = np.minimum(at, n - at)
@@ -44,14 +44,21 @@ def driven_lines(
     if signals is not None:
         kept = [s[skip * n : (skip + P) * n].reshape(P, n, -1).mean(axis=0) for s in signals]
         power = sum((np.abs(scipy.fft.rfft(k, axis=0)) ** 2).sum(axis=1) for k in kept)
-        level = np.sqrt(np.asarray(power))
+        level, _ = _without_offset((np.sqrt(np.asarray(power)), np.empty(0)))
         strong: BoolArray = level > _SILENT * level.max()
         return strong
-    level, noise = _levels(found, n_outputs)
-    most = level.max() if fine is found else _levels(fine)[0].max()
+    level, noise = _without_offset(_levels(found, n_outputs))
+    most = level.max() if fine is found else _without_offset(_levels(fine))[0].max()
     # a line that noise alone could have made is none
     strong = level > _SILENT * most
     return strong & (level > _CERTAIN * noise)
+
+
+def _without_offset(levels: tuple[FloatArray, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Levels and their noise, of which an offset of the signal says nothing of the other lines."""
+    level, noise = levels
+    level[0] = 0.0
+    return level, noise
 
 
 def _levels(found: Sequence[PeriodMeans], begin: int = 0) -> tuple[FloatArray, FloatArray]:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
-from freqid.checks import BoolArray, FloatArray, InputError, IntArray, finite, unknown
+from freqid.checks import Array, BoolArray, FloatArray, InputError, IntArray, finite, unknown
 
 if TYPE_CHECKING:
     import pandas as pd
 
 # the level at which all rows of good machines together raise an alarm
 LEVEL = 0.01
-# rows of a machine from which on its order may tell of a change
-_FEWEST = 6
+# rows of a machine from which on single ones, and its order, may tell of a change
+_LEAST, _FEWEST = 4, 6
 # scatters beyond which a row counts as no more than that when the order is looked at
 _CUT = 4.0
 # orders that are tried for each unit of one over the level, and numbers in them at the most
@@ -27,7 +27,7 @@ _LONGER, _REACH = 1.4, 200
 # of them beyond it, and rows from which on theory tells it
 _DRAWN, _BEYOND, _MANY = 1000, 0.02, 400
 # part of fleets in which the scatter that is taken is too small
-_UNSURE = 0.05
+_UNSURE = 0.02
 # median distance of a normal distribution, and halvings of a variance
 _NORMAL, _HALVINGS = 0.6744897501960817, 30
 
@@ -53,7 +53,10 @@ def fleet_alarms(
         by: a column to order the rows by, a date or a number; they are in order else.
         machine: a column that tells machines apart, each of which is compared with itself alone.
         level: probability that any row of a table without a change is marked, rows being
-            independent but for what their machine has in common.
+            independent but for what their machine has in common, and normal.
+
+    A machine has to have four rows for a single one to tell, and some more for a lasting change:
+    half of eight rows may be by chance what they are.
 
     Raises ValueError for unknown columns, fewer than three fitted rows, or a level that is none.
 
@@ -73,19 +76,28 @@ def fleet_alarms(
             raise InputError(unknown(name, column, columns))
     rows = np.flatnonzero(kept)
     if by is not None:
-        at = table[by].iloc[rows]
-        if at.isna().any():
-            raise InputError(f"by={by!r}: row {rows[int(at.isna().argmax())]} has none")
-        rows = rows[np.argsort(at.to_numpy(), kind="stable")]
+        at = _there(table, "by", by, rows)
+        try:
+            rows = rows[np.argsort(at, kind="stable")]
+        except TypeError:
+            raise InputError(f"by={by!r} holds values that have no order") from None
     groups = [rows]
     if machine is not None:
-        names = table[machine].to_numpy()[rows]
+        names = _there(table, "machine", machine, rows)
         groups = [rows[names == name] for name in dict.fromkeys(names.tolist())]
     found = np.zeros(len(table), bool)
     for group in groups:
-        if len(group) >= 3:
+        if len(group) >= _LEAST:
             found[group] = _changed(values[group], std[group], level / len(groups))
     return found
+
+
+def _there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> Array:
+    """Values of a column in some rows; ValueError where one is missing."""
+    seen = table[column].iloc[rows]
+    if seen.isna().any():
+        raise InputError(f"{argument}={column!r}: row {rows[int(seen.isna().argmax())]} has none")
+    return seen.to_numpy()
 
 
 def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:
@@ -98,6 +110,9 @@ def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatA
     values = table[parameter].to_numpy(dtype=float)
     std = table[f"{parameter}_std"].to_numpy(dtype=float)
     kept = np.isfinite(values) & np.isfinite(std)
+    if (std[kept] < 0).any():
+        row = int(np.argmax(kept & (std < 0)))
+        raise InputError(f"table: {parameter}_std={std[row]:g} in row {row} is no standard error")
     if kept.sum() < 3:
         raise InputError(f"parameter={parameter!r}: fewer than three rows were fitted")
     return values, std, kept
@@ -246,7 +261,7 @@ def _limit(s: FloatArray, between: float, level: float) -> float:
 
 
 def _cautious(left: FloatArray, std: FloatArray) -> FloatArray:
-    """A variance between rows that is too small in one fleet of twenty alone."""
+    """A variance between rows that is too small in one fleet of fifty alone."""
     half = (std.shape[-1] + 1) / 2
     low = scipy.stats.beta.ppf(_UNSURE, half, half)
     return _between(left, std, float(scipy.stats.norm.ppf((1 + low) / 2)))
@@ -278,8 +293,11 @@ def _freedom(limit: float, beyond: float) -> float:
 def _between(left: FloatArray, std: FloatArray, normal: float = _NORMAL) -> FloatArray:
     """Variance between rows (…, n) beside their standard errors (n,), which makes the median
     distance that of a normal distribution: a few changed rows do not move it.
+
+    Where most rows are the very same, rounded or at a bound, it is that of all of them.
     """
     size = np.abs(left)
+    tied = np.median(size, axis=-1) == 0
     # the variance lies between nothing and what the median distance alone would take
     high = (np.median(size, axis=-1) / normal) ** 2
     low = np.zeros_like(high)
@@ -289,4 +307,4 @@ def _between(left: FloatArray, std: FloatArray, normal: float = _NORMAL) -> Floa
         distance = np.median(size / np.where(own > 0, own, 1e-300), axis=-1)
         far = distance > normal
         low, high = np.where(far, middle, low), np.where(far, high, middle)
-    return np.asarray((low + high) / 2)
+    return np.where(tied, (left**2).mean(axis=-1), (low + high) / 2)

@@ -118,24 +118,16 @@ def test_an_interrupted_map_goes_on_where_it_was(plant, tmp_path, monkeypatch, t
         fq.bias_map(plant.fix("fm"), chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_same_table(plant):
-    joblib = pytest.importorskip("joblib")
-    distributed = pytest.importorskip("distributed")
+def test_a_cluster_that_loses_a_worker_gives_the_same_table(plant, two_workers):
     spectra = chirps(60)
     ask = {"base_dt": T1, "chunk": 4}
     alone = fq.bias_map(plant, spectra, [5, 10], ["zoh", "foh"], **ask)
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with two_workers() as client:
         before = set(client.run(os.getpid).values())
         assert len(before) == 2
         victim = min(before)
         threading.Timer(0.7, os.kill, (victim, signal.SIGKILL)).start()
-        with joblib.parallel_config(backend="dask"):
-            together = fq.bias_map(plant, spectra, [5, 10], ["zoh", "foh"], **ask)
+        together = fq.bias_map(plant, spectra, [5, 10], ["zoh", "foh"], **ask)
         client.wait_for_workers(2, timeout=30)
         assert victim not in set(client.run(os.getpid).values())
     pd.testing.assert_frame_equal(together, alone, rtol=1e-7, atol=1e-20)

@@ -202,6 +202,36 @@ def test_a_disk_that_fills(tmp_path, computed):
         same(table, fq.fit_many(LAG, records, **ASKED))
 
 
+@pytest.mark.parametrize("error", [OSError(116, "stale"), MemoryError("full"), ImportError("lib")])
+def test_a_reason_that_may_pass_is_tried_again(tmp_path, files, computed, monkeypatch, error):
+    """What a disk or a library said once is nothing that the record has to keep."""
+    path, every = tmp_path / "t.parquet", sorted(files.iterdir())
+    real = rows.read
+
+    def flaky(source, **options):
+        if source == every[2]:
+            raise error
+        return real(source, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rows, "read", flaky)
+        first = fq.fit_many(LAG, every, path, **ASKED)
+    assert first["error"].ne("").tolist() == [i == 2 for i in range(7)]
+    computed.clear()
+    same(fq.fit_many(LAG, every, path, **ASKED), fq.fit_many(LAG, every, **ASKED))
+    assert computed[0] == str(every[2])
+    computed.clear()
+    fq.fit_many(LAG, every, path, **ASKED)
+    assert not computed
+    # a record that cannot be fitted is not tried again and again
+    every[3].write_text("time,u,y\n")
+    fq.fit_many(LAG, every, path, **ASKED)
+    tried = []
+    monkeypatch.setattr(rows, "read", lambda source, **o: tried.append(source) or real(source, **o))
+    fq.fit_many(LAG, every, path, **ASKED)
+    assert not tried
+
+
 def test_names_that_would_lose_a_row(tmp_path):
     first, second = runs(2)
     with pytest.raises(ValueError, match="names must differ"):
@@ -256,10 +286,7 @@ def lag_that_tells(folder, b, a):
 
 
 @pytest.mark.parametrize("count", [6, 40])
-def test_a_cluster_that_is_asked_for_is_used_and_may_lose_a_worker(tmp_path, count):
-    distributed = pytest.importorskip("dask.distributed")
-    import joblib
-
+def test_a_cluster_that_is_asked_for_is_used_and_may_lose_a_worker(tmp_path, count, two_workers):
     folder = tmp_path / "seen"
     folder.mkdir()
     plant = fq.GreyBox(partial(lag_that_tells, folder), LAG.parameters)
@@ -268,13 +295,7 @@ def test_a_cluster_that_is_asked_for_is_used_and_may_lose_a_worker(tmp_path, cou
     for each in folder.iterdir():
         each.unlink()
     (folder / "kill").write_text(str(os.getpid()))
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster),
-        joblib.parallel_config(backend="dask"),
-    ):
+    with two_workers():
         seen = fq.fit_many(plant, records, tmp_path / "t.parquet", verdicts=False, chunk=2)
     assert not (folder / "kill").exists()
     assert seen["name"].tolist() == [f"record {i}" for i in range(count)]

@@ -190,19 +190,10 @@ def test_a_plant_that_fails_is_a_row():
     assert "no licence" in table["error"][1]
 
 
-def test_on_a_cluster(tmp_path):
-    distributed = pytest.importorskip("dask.distributed")
-    import joblib
-
+def test_on_a_cluster(two_workers):
     records = runs(12, samples=100)
     alone = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster),
-        joblib.parallel_config(backend="dask"),
-    ):
+    with two_workers():
         same(alone, fq.fit_many(LAG, records, n_jobs=2, verdicts=False, chunk=3))
 
 

@@ -50,18 +50,9 @@ def test_processes_give_the_same_numbers(plant, tmp_path, name):
         ASKED[name](plant, n_jobs=0)
 
 
-def test_a_cluster_is_used_where_joblib_says_so(plant, tmp_path):
-    distributed = pytest.importorskip("dask.distributed")
-    import joblib
-
+def test_a_cluster_is_used_where_joblib_says_so(plant, tmp_path, two_workers):
     here = {name: ask(plant) for name, ask in ASKED.items()}
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-        ) as cluster,
-        distributed.Client(cluster),
-        joblib.parallel_config(backend="dask"),
-    ):
+    with two_workers():
         for name, ask in ASKED.items():
             for path in tmp_path.iterdir():
                 path.unlink()

@@ -333,3 +333,19 @@ def test_the_noise_of_few_periods_in_a_loop_is_told_next_to_a_resonance():
     each = np.mean(far, axis=0)
     assert 0.6 < each.mean() < 1.1
     assert each.min() > 0.2
+
+
+@pytest.mark.parametrize("offset", [0.0, 10.0, 1e4])
+@pytest.mark.parametrize("referred", [False, True])
+def test_an_offset_of_the_input_takes_no_lines_away(offset, referred):
+    """It once was the strongest line, beside which others were none: silently, or all of them."""
+    rng = np.random.default_rng(0)
+    u = fq.multisine((1, 199), 1.0, 1e-3, periods=6)
+    record = fq.simulate(fq.first_order(), u, 1e-3, hold="bl").with_noise(1e-4)
+    moved = fq.Record(
+        record.u + offset + 1e-4 * rng.standard_normal(len(u)), record.y, 1e-3, "bl",
+        reference=record.u + offset if referred else None,
+    )  # fmt: skip
+    found = fq.periodic(moved, 1.0)
+    assert found.frequency.tolist() == list(range(1, 200))
+    assert found.response == pytest.approx(fq.periodic(record, 1.0).response, rel=0.05)

@@ -91,8 +91,28 @@ def test_rows_that_failed_and_rows_without_errors():
     assert marked(pd.DataFrame({"k": [1.0] * 20, "k_std": 0.0})) == []
 
 
+@pytest.mark.parametrize("spread", [0.4, 1.0])
+@pytest.mark.parametrize("rows", [5, 8, 12])
+def test_rounded_values_are_no_changes(rows, spread):
+    """Most of them are the same, beside which each other one looked like a change."""
+    false = 0
+    for seed in range(50):
+        values = np.round(10 + spread * np.random.default_rng(seed).standard_normal(rows))
+        false += bool(marked(pd.DataFrame({"k": values, "k_std": 0.01})))
+    assert false <= 4
+
+
 def test_what_is_refused():
     table = fleet(1)
+    for missing in (np.nan, None, pd.NA):
+        for kind in (object, "string"):
+            given = pd.Series(["a"] * 57 + [missing] * 3, dtype=kind)
+            with pytest.raises(ValueError, match="machine='m': row 57 has none"):
+                fq.fleet_alarms(table.assign(m=given), "k", machine="m")
+    with pytest.raises(ValueError, match="have no order"):
+        fq.fleet_alarms(table.assign(day=[3, "a"] * 30), "k", by="day")
+    with pytest.raises(ValueError, match="k_std=-1 in row 0"):
+        fq.fleet_alarms(table.assign(k_std=-1.0), "k")
     for level in (0, 1, 2, -1, np.nan):
         with pytest.raises(ValueError, match="level"):
             fq.fleet_alarms(table, "k", level=level)

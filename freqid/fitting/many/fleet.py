@@ -142,7 +142,8 @@ def _joined(tables: Sequence[pd.DataFrame], named: Mapping[str, Source]) -> pd.D
     """The rows of all chunks, in the order of the records."""
     import pandas as pd
 
-    table = pd.concat(tables, ignore_index=True)
+    # a chunk with a failure has columns of objects, which the whole need not have
+    table = pd.concat(tables, ignore_index=True).infer_objects()
     order = {name: i for i, name in enumerate(named)}
     table = table.sort_values("name", key=lambda names: names.map(order), ignore_index=True)
     return table[columns_of_rows(table)]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freqid.fitting.many.identity import at_conditions, fingerprint
-from freqid.fitting.many.rows import Source
+from freqid.fitting.many.rows import Source, may_pass
 from freqid.fitting.many.store import TableStore
 from freqid.models import GreyBox
 
@@ -47,7 +47,7 @@ class Known:
         found = self.store.whole()
         if found is None or not self._same(*found) or len(found[0]) < len(self.named):
             return None
-        return found[0]
+        return None if found[0]["error"].map(may_pass).any() else found[0]
 
     def begun(self) -> int:
         """Take what is finished of the table and of its chunks; the number of the next chunk."""
@@ -77,7 +77,8 @@ class Known:
 
     def _take(self, table: pd.DataFrame, rows: Mapping[str, str]) -> None:
         fits = [
-            rows.get(n) == self.prints[n] and n not in self.names for n in table["name"].tolist()
+            rows.get(n) == self.prints[n] and n not in self.names and not may_pass(error)
+            for n, error in zip(table["name"], table["error"], strict=True)
         ]
         if any(fits):
             some = table[fits]

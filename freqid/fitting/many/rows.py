@@ -30,6 +30,13 @@ _SAID = (
     "cost", "fit_percent", "converged", "verdict", "witness", "warnings", "seconds", "error"
 )  # fmt: skip
 
+# the reason of a row without a process, and how reasons begin that may be others the next time
+_ENDED = "the process that computed it was ended: out of memory, or by the plant"
+_PASSING = (
+    _ENDED, "OSError", "PermissionError", "TimeoutError", "ConnectionError", "MemoryError",
+    "ImportError", "ModuleNotFoundError",
+)  # fmt: skip
+
 Source = DataSet | str | Path
 Row = dict[str, Any]
 
@@ -72,13 +79,17 @@ def rows_of(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
     return rows
 
 
+def may_pass(error: str) -> bool:
+    """Whether a row's reason says nothing of the record itself: a disk, memory, a library."""
+    return error.startswith(_PASSING)
+
+
 def lost_rows(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
     """Rows of a chunk that ends whatever process computes it: its halves in processes of their own,
     down to the record that does it.
     """
     if len(job) == 1:
-        error = "the process that computed it was ended: out of memory, or by the plant"
-        return [{"name": job[0][0], "seconds": np.nan, "error": error}]
+        return [{"name": job[0][0], "seconds": np.nan, "error": _ENDED}]
     rows: list[Row] = []
     for half in (job[: len(job) // 2], job[len(job) // 2 :]):
         done = alone(partial(rows_of, task), half)
