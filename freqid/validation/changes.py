@@ -9,6 +9,12 @@ import numpy as np
 import scipy
 
 from freqid.checks import Array, BoolArray, FloatArray, InputError, IntArray, finite, unknown
+from freqid.validation.scatter import (
+    cautious_variance,
+    farthest_row,
+    variance_between,
+    weighted_median,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,13 +29,6 @@ _CUT = 4.0
 _ORDERS, _NUMBERS = 20, 20_000_000
 # runs of rows grow by this factor, and borders of one are looked for so many rows off at most
 _LONGER, _REACH = 1.4, 200
-# fleets without a change that are drawn to learn how far the farthest of their rows lies, the part
-# of them beyond it, and rows from which on theory tells it
-_DRAWN, _BEYOND, _MANY = 1000, 0.02, 400
-# part of fleets in which the scatter that is taken is too small
-_UNSURE = 0.02
-# median distance of a normal distribution, and halvings of a variance
-_NORMAL, _HALVINGS = 0.6744897501960817, 30
 
 
 def fleet_alarms(
@@ -131,8 +130,10 @@ def _changed(x: FloatArray, s: FloatArray, level: float) -> BoolArray:
         if between.min() > far:
             break
         borders = np.delete(borders, int(np.argmin(between)) + 1)
-    between_rows = float(_cautious(parts.left, s))
-    found = np.abs(parts.left) > _limit(s, between_rows, level / 2) * np.sqrt(s**2 + between_rows)
+    between_rows = float(cautious_variance(parts.left, s))
+    found = np.abs(parts.left) > farthest_row(s, between_rows, level / 2) * np.sqrt(
+        s**2 + between_rows
+    )
     away = np.abs(parts.mean - parts.mean[0]) > far * np.hypot(parts.std, parts.std[0])
     away[0] = False
     return np.asarray(found | away[parts.number])
@@ -148,9 +149,9 @@ class _Parts:
         self.number = np.repeat(np.arange(count), np.diff(borders))
         each = [self.number == i for i in range(count)]
         rough = np.array([np.median(x[own]) for own in each])
-        size = np.sqrt(s**2 + _between(x - rough[self.number], s))
+        size = np.sqrt(s**2 + variance_between(x - rough[self.number], s))
         size = np.where(size > 0, size, 1e-150)
-        middle = np.array([_middle(x[own], size[own]) for own in each])
+        middle = np.array([weighted_median(x[own], size[own]) for own in each])
         self.left = x - middle[self.number]
         # single rows far off are no part of the mean
         clear = middle[self.number] + np.clip(self.left, -_CUT * size, _CUT * size)
@@ -180,7 +181,7 @@ def _lasting(x: FloatArray, s: FloatArray, level: float) -> tuple[int, int] | No
     if n < _FEWEST:
         return None
     left = x - np.median(x)
-    size = np.sqrt(s**2 + _between(left, s))
+    size = np.sqrt(s**2 + variance_between(left, s))
     if not (size > 0).all():
         return None
     y, w = np.clip(left, -_CUT * size, _CUT * size), 1 / size**2
@@ -234,77 +235,3 @@ def _sharp(y: FloatArray, w: FloatArray, first: int, last: int) -> tuple[int, in
     begin, end = (a[kept] for a in each)
     at = int(np.argmax(_apart(y[None], w[None], begin, end)[0]))
     return int(begin[at]), int(end[at])
-
-
-def _limit(s: FloatArray, between: float, level: float) -> float:
-    """How many scatters, as ``_cautious`` takes them, the farthest row lies from the middle in so
-    many fleets without a change.
-
-    Few rows tell their own scatter badly, and unequal ones worse: fleets with more and with less of
-    it are drawn, and Student's t with the freedom that the worst of them shows tells the rest.
-    """
-    n = len(s)
-    if n >= _MANY:
-        return float(scipy.stats.norm.isf(level / 2 / n))
-    rng, freedom = np.random.default_rng(n), np.inf
-    for variance in {0.0, between}:
-        scatter = np.sqrt(s**2 + variance)
-        if not scatter.any():
-            continue
-        drawn = rng.standard_normal((_DRAWN, n)) * scatter
-        left = drawn - _middle(drawn, scatter)[:, None]
-        size = np.sqrt(s**2 + _cautious(left, s)[..., None])
-        farthest = (np.abs(left) / np.where(size > 0, size, np.inf)).max(axis=1)
-        shown = float(np.quantile(farthest, 1 - _BEYOND))
-        freedom = min(freedom, _freedom(shown, _BEYOND / 2 / n))
-    return float(scipy.stats.t.isf(level / 2 / n, freedom))
-
-
-def _cautious(left: FloatArray, std: FloatArray) -> FloatArray:
-    """A variance between rows that is too small in one fleet of fifty alone."""
-    half = (std.shape[-1] + 1) / 2
-    low = scipy.stats.beta.ppf(_UNSURE, half, half)
-    return _between(left, std, float(scipy.stats.norm.ppf((1 + low) / 2)))
-
-
-def _middle(x: FloatArray, size: FloatArray) -> FloatArray:
-    """Median of rows (…, n), each counting as much as its scatter (n,) lets it."""
-    order = np.argsort(x, axis=-1)
-    weight = np.cumsum((1 / np.where(size > 0, size, 1e-300))[order], axis=-1)
-    at = (weight < weight[..., -1:] / 2).sum(axis=-1)
-    which = np.take_along_axis(order, at[..., None], axis=-1)
-    return np.asarray(np.take_along_axis(x, which, axis=-1)[..., 0])
-
-
-def _freedom(limit: float, beyond: float) -> float:
-    """Of the t distribution whose part ``beyond`` a limit is this."""
-
-    def more(log_freedom: float) -> float:
-        return float(scipy.stats.t.isf(beyond, np.exp(log_freedom))) - limit
-
-    low, high = np.log(0.5), np.log(1e6)
-    if more(low) <= 0:
-        return 0.5
-    if more(high) >= 0:
-        return 1e6
-    return float(np.exp(scipy.optimize.brentq(more, low, high)))
-
-
-def _between(left: FloatArray, std: FloatArray, normal: float = _NORMAL) -> FloatArray:
-    """Variance between rows (…, n) beside their standard errors (n,), which makes the median
-    distance that of a normal distribution: a few changed rows do not move it.
-
-    Where most rows are the very same, rounded or at a bound, it is that of all of them.
-    """
-    size = np.abs(left)
-    tied = np.median(size, axis=-1) == 0
-    # the variance lies between nothing and what the median distance alone would take
-    high = (np.median(size, axis=-1) / normal) ** 2
-    low = np.zeros_like(high)
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        own = np.sqrt(std**2 + np.asarray(middle)[..., None])
-        distance = np.median(size / np.where(own > 0, own, 1e-300), axis=-1)
-        far = distance > normal
-        low, high = np.where(far, middle, low), np.where(far, high, middle)
-    return np.where(tied, (left**2).mean(axis=-1), (low + high) / 2)
