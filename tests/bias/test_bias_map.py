@@ -236,7 +236,7 @@ def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
         map_rows.Batch, "unresolved", lambda self, x, tolerance: np.ones(len(x), bool)
     )
     table = fq.bias_map(
-        fq.first_order(), {"2-40": fq.ChirpSpectrum(2, 40)}, [2, 5], ["zoh"], 5e-3, n_jobs=1
+        fq.first_order(), {"2-40": fq.ChirpSpectrum(2, 40)}, [2, 3], ["zoh"], 5e-3, n_jobs=1
     )
     assert len(alone) == 2
     assert table["converged"].all()
