@@ -204,16 +204,24 @@ def check_name(name: str, path: Path, has_reference: bool = False) -> None:
 
 
 @contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Errors of the system are of the file ``path``, not of the one beside it, nor of none."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None and Path(str(error.filename)).parent != path.parent:
+            raise
+        if error.errno is None:
+            raise type(error)(f"{path}: {error}") from error
+        raise type(error)(error.errno, error.strerror, str(path)) from None
+
+
+@contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """A path beside ``path`` to write to, renamed into place when the block ends well."""
     path = Path(path)
-    try:
+    with naming(path):
         yield from _renamed(path)
-    except OSError as error:
-        # of the file that was asked for, not of the one beside it
-        if error.filename is not None and Path(error.filename).parent == path.parent:
-            raise type(error)(error.errno, error.strerror, str(path)) from None
-        raise
 
 
 def _renamed(path: Path) -> Iterator[Path]:
@@ -225,8 +233,9 @@ def _renamed(path: Path) -> Iterator[Path]:
         raise InputError(f"{path}: {path.parent} is no folder; give another name") from None
     beside = path.parent / f".{path.stem}-{secrets.token_hex(8)}{path.suffix}"
     # made here, so that nobody else's is taken and the rights are those of any new file
-    os.close(os.open(beside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    made = os.open(beside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     try:
+        os.close(made)
         yield beside
         with beside.open("rb") as file:
             os.fsync(file.fileno())

@@ -6,6 +6,7 @@ import errno
 import hashlib
 import shutil
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 from filelock import FileLock, Timeout
 
 from freqid.checks import InputError
-from freqid.data import whole_file
+from freqid.data import naming, whole_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +59,15 @@ class TableStore:
                 raise InputError(
                     f"path={str(self.path)!r}: {self.path.parent} is no folder; give another name"
                 ) from None
+            except OSError as error:
+                with suppress(OSError):  # not where something is kept
+                    self.parts.rmdir()
+                raise OSError(
+                    error.errno,
+                    f"{error.strerror}: {self.parts} cannot be locked; give a path on a disk that "
+                    "has room and locks",
+                    str(self.path),
+                ) from error
             # a job that has just ended takes its folder with it
             if (self.parts / "lock").exists():
                 return self
@@ -144,4 +154,5 @@ class TableStore:
 
 
 def _sum_of(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:_SUM]
+    with naming(path):
+        return hashlib.sha256(path.read_bytes()).hexdigest()[:_SUM]
