@@ -78,7 +78,8 @@ class TableStore:
     ) -> None:
         if not any(self._chunks()):
             shutil.rmtree(self.parts, ignore_errors=True)
-        self.lock.release()
+        with naming(self.path):
+            self.lock.release()
 
     def whole(self) -> tuple[pd.DataFrame, dict[str, str]] | None:
         """The finished table, where there is one, and what its rows are of, by name; ValueError
