@@ -2,10 +2,11 @@
 
     python benchmarks/fuzz.py [inputs a target, 2000] [first seed, 0]
 
-Each target starts from files that its own writers made and changes, cuts, repeats or swaps bytes of
-them; a seed says which. Targets run in processes of their own, so that an end of the interpreter is
-seen, and said with its seed; a longer run goes on where another ended. Printed for each target: how
-many inputs were read, refused, or ended otherwise, the slowest, and the most memory.
+Each target starts from files that its own writers, or libraries of other programs, made and
+changes, cuts, repeats or swaps bytes of them; a seed says which. Targets run in processes of their
+own, so that an end of the interpreter is seen, and said with its seed; a longer run goes on where
+another ended. Printed for each target: how many inputs were read, refused, or ended otherwise, the
+slowest, and the most memory.
 """
 
 import collections
@@ -25,6 +26,7 @@ import freqid as fq
 from freqid.checks import InputError
 
 sys.path.insert(0, str(Path(__file__).parent))
+import foreign_files
 from table import show
 
 # seconds that an input may take
@@ -163,7 +165,8 @@ def link_target(seeds):
 def main(count=2000, first=0):
     seeds, failed = range(first, first + count), 0
     with tempfile.TemporaryDirectory() as folder:
-        found = {p.name: file_target(p, read, seeds) for p, read in corpus(Path(folder)).items()}
+        targets = corpus(Path(folder)) | foreign_files.written(Path(folder))
+        found = {p.name: file_target(p, read, seeds) for p, read in targets.items()}
     found |= {"ties": expression_target(seeds), "links": link_target(seeds)}
     for name, (outcomes, slowest, most) in found.items():
         other = {k: n for k, n in outcomes.items() if k not in ("read", "refused")}

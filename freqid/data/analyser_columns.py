@@ -71,7 +71,7 @@ def complex_of(frame: pd.DataFrame, names: Sequence[str], units: Mapping[str, st
         )
     magnitude = numbers_of(frame, size)
     if _in_decibel(size, units):
-        magnitude = 10 ** (magnitude / 20)
+        magnitude = from_decibel(magnitude)
     elif (magnitude < 0).any():
         raise InputError(
             f"column {size!r} is below zero, as magnitudes in dB are; name it {size} [dB], or real "
@@ -81,7 +81,19 @@ def complex_of(frame: pd.DataFrame, names: Sequence[str], units: Mapping[str, st
         raise InputError(
             f"the columns {', '.join(names)} hold no phase: a fit needs it; export it too"
         )
-    return magnitude * np.exp(1j * _radians(frame, phase, units))
+    return polar(magnitude, _radians(frame, phase, units))
+
+
+def from_decibel(size: FloatArray) -> FloatArray:
+    """Magnitudes; those beyond numbers are infinite, which a response refuses."""
+    with np.errstate(over="ignore"):
+        return np.asarray(10 ** (size / 20))
+
+
+def polar(magnitude: FloatArray, phase: FloatArray) -> ComplexArray:
+    """Complex numbers of a phase in rad; not finite where magnitude or phase is not."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(magnitude * np.exp(1j * phase))
 
 
 def _single(what: str, found: Sequence[str]) -> None:

@@ -13,6 +13,7 @@ from freqid.checks import InputError
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.kinds import damaged, existing, missing
 from freqid.data.readers.mat import loaded
+from freqid.data.readers.uff import data_sets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,17 +56,7 @@ def of_touchstone(path: Path) -> FrequencyResponse:
 
 
 def of_universal(path: Path) -> FrequencyResponse:
-    try:
-        import pyuff
-    except ImportError:
-        raise missing("UFF58", "pyuff", "uff") from None
-    existing(path)
-    try:
-        sets = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:
-        # pyuff has errors of many kinds for a file that is not what it says
-        raise damaged("UFF58", error) from None
-    sets = [sets] if isinstance(sets, dict) else list(sets)
+    sets = data_sets(path)
     # function type 4 is a frequency response
     found = [s for s in sets if s.get("type") == 58 and s.get("func_type") == 4]
     if not found:
@@ -88,6 +79,8 @@ def of_universal(path: Path) -> FrequencyResponse:
     for s in found:
         if len(s["x"]) != len(f) or not np.allclose(s["x"], f):
             raise InputError("its responses have unlike frequencies; read them one file each")
+        if np.shape(s["data"]) != f.shape:
+            raise InputError(f"holds {np.size(s['data'])} values at {len(f)} frequencies")
         G[outputs.index(end(s, "rsp")), inputs.index(end(s, "ref"))] = s["data"]
     if np.isnan(G).any():
         raise InputError(f"holds {len(found)} responses, not all of {outputs} from {inputs}")

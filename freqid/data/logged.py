@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, path_of, unknown
 from freqid.data.logs import record_from_logs
-from freqid.data.readers.kinds import LOGS, Channel
+from freqid.data.readers.kinds import LOGS, Channel, Log
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept
 from freqid.data.tables import frame_of
@@ -100,10 +101,12 @@ def logged_record(
     own = {n: found[n].unit for n in (*u_names, *y_names) if found[n].unit}
     u_time, u = _together("inputs", u_names, found, held=hold in (None, "zoh"))
     y_time, y = _together("outputs", y_names, found, held=False)
-    return record_from_logs(
+    record = record_from_logs(
         u_time, u, y_time, y, "zoh" if hold is None else hold, resample,
         u_names, y_names, own | dict(units or {}),
     )  # fmt: skip
+    notes = found.notes if isinstance(found, Log) else ()
+    return dataclasses.replace(record, notes=(*record.notes, *notes)) if notes else record
 
 
 def _names(

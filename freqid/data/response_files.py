@@ -15,9 +15,11 @@ from freqid.checks import Array, InputError, listed, numbers, path_of
 from freqid.data.analyser_columns import (
     coherence_of,
     complex_of,
+    from_decibel,
     joined,
     numbers_of,
     one_of,
+    polar,
 )
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
 from freqid.data.foreign_frames import as_pandas
@@ -123,7 +125,7 @@ def of_db(
         raise InputError(
             f"magnitude_db has shape {size.shape} and phase_deg {turn.shape}; they must agree"
         )
-    return FrequencyResponse(frequency, 10 ** (size / 20) * np.exp(1j * np.deg2rad(turn)), **fields)
+    return FrequencyResponse(frequency, polar(from_decibel(size), np.deg2rad(turn)), **fields)
 
 
 def _long(frame: pd.DataFrame) -> FrequencyResponse:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError, unknown
-from freqid.data.readers.kinds import damaged, missing, reads
-from freqid.data.readers.limits import check_size
+from freqid.data.readers.apart import needs, read_apart
+from freqid.data.readers.kinds import existing, reads
 from freqid.data.readers.table import heading
 
 if TYPE_CHECKING:
@@ -21,21 +20,17 @@ def read_excel(path: Path, group: str | None = None) -> pd.DataFrame:
 
     Raises ValueError for a damaged file, a sheet that is not there, or without python-calamine.
     """
-    import pandas as pd
+    needs("python_calamine", "a workbook", "excel")
+    return read_apart("a workbook", sheet_of, existing(path), group)
 
-    try:
-        from python_calamine import CalamineWorkbook
-    except ImportError:
-        raise missing("a workbook", "python-calamine", "excel") from None
-    if zipfile.is_zipfile(path):
-        with zipfile.ZipFile(path) as archive:
-            check_size(path, sum(part.file_size for part in archive.infolist()), "its sheets")
-    try:
-        book = CalamineWorkbook.from_path(str(path))
-        sheets = {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}
-    except Exception as error:
-        # calamine has errors of many kinds for a file that is not what it says
-        raise damaged("a workbook", error) from None
+
+def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
+    """What ``read_excel`` returns, with whatever errors calamine has."""
+    import pandas as pd
+    from python_calamine import CalamineWorkbook
+
+    book = CalamineWorkbook.from_path(str(path))
+    sheets = {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}
     if group is not None and group not in sheets:
         raise InputError(unknown("group", group, sheets))
     found: list[pd.DataFrame] = []

@@ -28,6 +28,12 @@ class Channel:
     unit: str = ""
 
 
+class Log(dict[str, Channel]):
+    """Channels by name, and what is to be said of them, in sentences."""
+
+    notes: tuple[str, ...] = ()
+
+
 # files whose channels have clocks of their own
 LOGS: dict[str, Callable[[Path], dict[str, Channel]]] = {}
 
@@ -98,11 +104,11 @@ def missing(kind: str, package: str, extra: str) -> InputError:
     return InputError(f"is {kind}, which needs {package}: pip install 'freqid[{extra}]'")
 
 
-def damaged(kind: str, error: Exception) -> InputError:
+def damaged(kind: str, error: BaseException) -> InputError:
     """The error of a file that is not what its suffix says."""
     return InputError(f"is not {kind} or is damaged ({first_line(error)})")
 
 
-def first_line(error: Exception) -> str:
+def first_line(error: BaseException) -> str:
     """What an error says, in one line."""
     return (str(error).splitlines() or [type(error).__name__])[0]

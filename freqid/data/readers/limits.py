@@ -19,7 +19,7 @@ def limit_of(path: Path) -> int:
     """
     told = os.environ.get(_VARIABLE)
     if told is None:
-        return max(_FREE, _TIMES * path.stat().st_size)
+        return max(_FREE, _TIMES * _size(path))
     if not told.isdecimal():
         raise InputError(f"{_VARIABLE}={told!r} must be a whole number of bytes")
     return int(told)
@@ -31,9 +31,23 @@ def check_size(path: Path, size: float, what: str = "its samples") -> None:
     if size > limit:
         raise InputError(
             f"{what} would take {_mebibytes(size)} of memory, and a file of "
-            f"{_mebibytes(path.stat().st_size)} may take {_mebibytes(limit)}; if it is to be "
+            f"{_mebibytes(_size(path))} may take {_mebibytes(limit)}; if it is to be "
             f"trusted, set the environment variable {_VARIABLE} to more bytes, or read it with open"
         )
+
+
+def too_large(path: Path, limit: int) -> InputError:
+    """The error of a file whose reader has asked for more memory than it may take."""
+    return InputError(
+        f"takes more than {_mebibytes(limit)} of memory to read and has {_mebibytes(_size(path))}; "
+        f"if it is to be trusted, set the environment variable {_VARIABLE} to more bytes"
+    )
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file, or of those in a folder."""
+    parts = path.iterdir() if path.is_dir() else [path]
+    return sum(part.stat().st_size for part in parts)
 
 
 def _mebibytes(size: float) -> str:

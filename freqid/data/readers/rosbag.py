@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data.readers.kinds import Channel, damaged, missing, reads_log
+from freqid.data.readers.apart import needs, read_apart
+from freqid.data.readers.kinds import Channel, Log, reads_log
 
 # entries of an array that become channels of their own
 _LONGEST = 64
@@ -19,38 +20,37 @@ _SECOND, _CALENDAR = 10**9, 10**17
 
 
 @reads_log(".bag", ".mcap", ".db3")
-def read_bag(path: Path) -> dict[str, Channel]:
+def read_bag(path: Path) -> Log:
     """Every number of every message by topic and field, ``joint_states.velocity[2]``.
 
     Times are those of the messages' headers, where they have one, and else those of the log; in s,
     of a clock that counts from 1970 from a whole second before the first, as a float has no digits
     for both.
     """
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise missing("a ROS bag", "rosbags", "ros") from None
+    needs("rosbags.highlevel", "a ROS bag", "ros")
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; check the path")
     # a ROS 2 bag is a folder of which any file may be named
     in_folder = path.suffix != ".bag" and (path.parent / "metadata.yaml").is_file()
-    where = path.parent if in_folder else path
+    return read_apart("a ROS bag", bag_channels, path.parent if in_folder else path)
+
+
+def bag_channels(path: Path) -> Log:
+    """What ``read_bag`` returns, with whatever errors rosbags has."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
     rows: dict[str, tuple[list[int], dict[str, list[float]]]] = {}
-    try:
-        usual = get_typestore(Stores.LATEST)
-        with AnyReader([where], default_typestore=usual) as bag:
-            for connection, stamp, raw in bag.messages():
-                message = bag.deserialize(raw, connection.msgtype)
-                topic = connection.topic.strip("/")
-                times, fields = rows.setdefault(topic, ([], {}))
-                times.append(_time(message, stamp))
-                for name, value in _numbers(message, ""):
-                    fields.setdefault(name, []).append(value)
-    except Exception as error:
-        # rosbags has errors of many kinds for a file that is not what it says
-        raise damaged("a ROS bag", error) from None
-    found = {}
+    usual = get_typestore(Stores.LATEST)
+    with AnyReader([path], default_typestore=usual) as bag:
+        for connection, stamp, raw in bag.messages():
+            message = bag.deserialize(raw, connection.msgtype)
+            topic = connection.topic.strip("/")
+            times, fields = rows.setdefault(topic, ([], {}))
+            times.append(_time(message, stamp))
+            for name, value in _numbers(message, ""):
+                fields.setdefault(name, []).append(value)
+    found = Log()
     base = min((min(times) for times, _ in rows.values()), default=0) // _SECOND * _SECOND
     base = base if base > _CALENDAR else 0
     for topic, (counts, fields) in rows.items():

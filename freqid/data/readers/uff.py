@@ -3,37 +3,52 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from freqid.checks import Array, InputError
+from freqid.data.readers.apart import needs, read_apart
 from freqid.data.readers.columns import columns_of
-from freqid.data.readers.kinds import ResponseFile, damaged, missing, reads
+from freqid.data.readers.kinds import ResponseFile, existing, reads
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
+# a data set as pyuff gives it, by the names of its fields
+DataSet: TypeAlias = dict[str, Any]
 # what stands for no unit
 _NO_UNIT = {"", "NONE", "UNKNOWN"}
 # part of the length by which the times of two channels may differ by rounding
 _AGREE = 1e-6
 
 
+def data_sets(path: Path) -> list[DataSet]:
+    """All data sets of a universal file, as pyuff calls what is in them."""
+    needs("pyuff", "UFF58", "uff")
+    return read_apart("UFF58", pyuff_sets, existing(path))
+
+
+def pyuff_sets(path: Path) -> list[DataSet]:
+    """What ``data_sets`` returns, with whatever errors pyuff has."""
+    import pyuff
+
+    sets = pyuff.UFF(str(path)).read_sets()
+    sets = [sets] if isinstance(sets, dict) else list(sets)
+    for number, s in enumerate(sets, 1):
+        # values would be taken for those of other times or frequencies
+        if s.get("type") == 58 and s["num_pts"] != len(s["data"]):
+            raise InputError(
+                f"is cut: data set {number} says {s['num_pts']} values and holds {len(s['data'])}"
+            )
+    return sets
+
+
 @reads(".uff", ".unv")
 def read_uff(path: Path) -> pd.DataFrame:
     """The time responses of a UFF as columns; ValueError for none of them, or without pyuff."""
-    try:
-        import pyuff
-    except ImportError:
-        raise missing("UFF58", "pyuff", "uff") from None
-    try:
-        sets = pyuff.UFF(str(path)).read_sets()
-    except Exception as error:
-        # pyuff has errors of many kinds for a file that is not what it says
-        raise damaged("UFF58", error) from None
-    sets = [sets] if isinstance(sets, dict) else list(sets)
+    sets = data_sets(path)
     arrays: dict[str, Array] = {}
     units: dict[str, str] = {}
     for number, s in enumerate(sets):
