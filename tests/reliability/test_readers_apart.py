@@ -162,5 +162,5 @@ def test_a_folder_that_a_user_is_in_is_none_to_import_from(files, tmp_path, monk
 def test_decibels_beyond_numbers_are_refused_without_a_warning(size, turn, tmp_path):
     path = tmp_path / "a.txt"
     path.write_text(f"Frequency [Hz];Magnitude [dB];Phase [deg]\n1;{size};{turn}\n2;0;0\n3;0;0\n")
-    with pytest.raises(InputError, match="finite|number"):
+    with pytest.raises(InputError, match=r"finite|number"):
         fq.read_response(path)
