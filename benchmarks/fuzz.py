@@ -51,10 +51,24 @@ def corpus(folder):
     else:
         with h5py.File(folder / "record.h5", "w") as file:
             file["time"], file["u"], file["y"] = t, record.u, record.y
+    np.save(folder / "stream.npy", np.column_stack([record.u, record.y]).astype("f4"))
+    for kind in ("parquet", "h5"):
+        if (folder / f"record.{kind}").exists():
+            (folder / f"stream.{kind}").write_bytes((folder / f"record.{kind}").read_bytes())
     fq.etfe(record).to_frame().to_csv(folder / "response.csv", index=False)
     fq.fit(fq.first_order(), record).save(folder / "estimate.json")
     readers = {"response.csv": fq.read_response, "estimate.json": fq.load}
-    return {path: readers.get(path.name, fq.read) for path in sorted(folder.iterdir())}
+    usual = {"record": fq.read, "stream": passed}
+    return {
+        path: readers.get(path.name, usual.get(path.stem, fq.read))
+        for path in sorted(folder.iterdir())
+    }
+
+
+def passed(path):
+    """A pass over a file that is read block by block."""
+    own = {"dt": 0.01, "columns": ["u", "y"]} if path.suffix == ".npy" else {}
+    return fq.open(path, "u", "y", block=25, **own).load()
 
 
 def damaged(raw, r):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, unknown
-from freqid.data.readers.kinds import damaged, existing, missing
+from freqid.data.readers.kinds import damaged, existing, missing, refusing
 from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_conditions, kept_hold
@@ -42,9 +42,10 @@ def of_file(path: Path, asked: Asked) -> Found:
 def _of_npy(path: Path, block: int, columns: Sequence[str] | None) -> Found:
     try:
         return of_array(np.load(path, mmap_mode="r", allow_pickle=False), columns, block, str(path))
-    except (ValueError, OSError, EOFError) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except Exception as error:
+        # numpy reads a header as Python, whose errors are of many kinds
         cut = _ended_early(path)
         if cut is None:
             raise InputError(f"{path}: {damaged('NPY', error)}") from None
@@ -72,7 +73,7 @@ def _ended_early(path: Path) -> tuple[Array, int] | None:
             )
             shape, columnwise, dtype = read_header(file)
             begin = file.tell()
-    except (ValueError, OSError, EOFError):
+    except Exception:  # of the same kinds
         return None
     if len(shape) != 2 or columnwise or dtype.hasobject or not shape[1]:
         return None
@@ -101,21 +102,23 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     names = [named(n)[0] for n in columns]
     count, dt = file.metadata.num_rows, None
     kept = [n for n in every if n != time and is_kept(n)]
-    told = (
-        next(file.iter_batches(batch_size=1, columns=kept)).to_pandas() if kept and count else None
-    )
-    if time is not None and count > 1 and given is None:
-        # both ends say whether the time is even, which only all of it could prove
-        dt = even(str(path), time, _ends(file, time), count)
+    told = None
+    with refusing(path, "Parquet"):
+        if kept and count:
+            told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
+        if time is not None and count > 1 and given is None:
+            # both ends say whether the time is even, which only all of it could prove
+            dt = even(str(path), time, _ends(file, time), count)
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]
-        batches = pq.ParquetFile(path).iter_batches(batch_size=block, columns=wanted)
-        rows = (
-            np.column_stack([batch[name].to_numpy(zero_copy_only=False) for name in wanted])
-            for batch in batches
-        )
-        return from_the_first(rows, first)
+        with refusing(path, "Parquet"):
+            batches = pq.ParquetFile(path).iter_batches(batch_size=block, columns=wanted)
+            rows = (
+                np.column_stack([batch[name].to_numpy(zero_copy_only=False) for name in wanted])
+                for batch in batches
+            )
+            yield from from_the_first(rows, first)
 
     hold = None if told is None else kept_hold(told, names)
     conditions = {} if told is None else kept_conditions(told)

@@ -57,7 +57,11 @@ def open(
     size = whole("block", block)
     if isinstance(source, (str, Path)):
         both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
-        found = of_file(Path(source), Asked(size, dt, columns, group, both))
+        try:
+            found = of_file(Path(source), Asked(size, dt, columns, group, both))
+        except InputError as error:
+            text = str(error)
+            raise InputError(text if str(source) in text else f"{source}: {text}") from None
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
@@ -71,7 +75,10 @@ def open(
     step = found.dt if dt is None else positive("dt", dt, "s")
     if step is None:
         raise InputError(f"dt=None and {found.origin} says no sample time; give dt in s")
-    u_names, y_names = _chosen(found.names, inputs, outputs)
+    try:
+        u_names, y_names = _chosen(found.names, inputs, outputs)
+    except InputError as error:
+        raise InputError(f"{found.origin}: {error}") from None
     pick = [found.names.index(n) for n in (*u_names, *y_names)]
     factors = _factors(scale, [*u_names, *y_names])
 

@@ -122,18 +122,25 @@ def spectral(
         if not isinstance(records, Stream):
             raise InputError(f"state={str(state)!r} is kept of a stream; records are in memory")
         sums = RunningSums.kept(path_of("state", state), pairs, records, averaging, length, step)
-    for i, record in enumerate(sets):
-        signal = None if signals is None else signals[i]
-        if isinstance(record, Stream):
-            with Bar(progress, record.n_samples, sums.sums.at, "samples") as advance, sums:
-                for n, channels in pieces(record, length, step, signal, sums.sums.at):
-                    sums.add(averaging.transforms(channels, length, step), n, n * step)
-                    advance(n * step)
-            continue
-        for n, channels in pieces(record, length, step, signal):
-            sums.add(averaging.transforms(channels, length, step), n, n * step)
+    # what is beyond numbers is told below, by name
+    with np.errstate(over="ignore", invalid="ignore"):
+        for i, record in enumerate(sets):
+            signal = None if signals is None else signals[i]
+            if isinstance(record, Stream):
+                with Bar(progress, record.n_samples, sums.sums.at, "samples") as advance, sums:
+                    for n, channels in pieces(record, length, step, signal, sums.sums.at):
+                        sums.add(averaging.transforms(channels, length, step), n, n * step)
+                        advance(n * step)
+                continue
+            for n, channels in pieces(record, length, step, signal):
+                sums.add(averaging.transforms(channels, length, step), n, n * step)
     total, count = dict(sums.sums.total), sums.sums.count
     f, density = averaging.density(length, first.dt)
+    if not all(np.isfinite(S).all() for S in total.values()):
+        where = first.origin if isinstance(first, Stream) else "records"
+        raise InputError(
+            f"{where}: squares of the samples are beyond numbers; give them in other units"
+        )
     total = {pair: S * density[:, None, None] for pair, S in total.items()}
     limits = averaging.band
     if limits is None and isinstance(first, Stream):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.checks import InputError
 
 N, DT = 30_000, 1e-3
 RECORD = fq.simulate(fq.two_mass(), fq.white_noise(N, seed=1), DT).with_noise(0.1)
@@ -304,3 +305,39 @@ def test_channels_of_a_stream_turn_with_their_holds(monkeypatch):
     assert est.values == pytest.approx([20, 50, 10], rel=1e-8)
     assert fq.fit(fq.TransferFunction(1, 2), stream, band=(2, 30)).fit_percent > 99.9
     assert fq.fit(fq.OutputError(2), stream, band=(2, 30)).fit_percent > 95
+
+
+def test_a_damaged_file_is_named_wherever_it_is_noticed(tmp_path):
+    """numpy's own error of a header, pyarrow's of a page, and no name of the file."""
+    record = fq.Record(np.sin(np.arange(60)), np.cos(np.arange(60)), 0.01)
+    np.save(tmp_path / "log.npy", np.column_stack([record.u, record.y]))
+    content = (tmp_path / "log.npy").read_bytes()
+    (tmp_path / "log.npy").write_bytes(content.replace(b"}", b"("))
+    with pytest.raises(InputError, match=r"log\.npy: is not NPY or is damaged"):
+        fq.open(tmp_path / "log.npy", dt=0.01)
+    pytest.importorskip("pyarrow")
+    fq.write(record, tmp_path / "log.parquet")
+    with pytest.raises(InputError, match=r"log\.parquet: outputs='z' is not one of"):
+        fq.open(tmp_path / "log.parquet", "u", "z")
+    content = bytearray((tmp_path / "log.parquet").read_bytes())
+    refusals = []
+    for at in range(20, 700, 7):
+        changed = bytearray(content)
+        changed[at] ^= 0xFF
+        (tmp_path / "log.parquet").write_bytes(changed)
+        try:
+            fq.h1(fq.open(tmp_path / "log.parquet", "u", "y"), segment=20)
+        except InputError as error:
+            refusals.append(str(error))
+    assert len(refusals) > 10
+    assert all("log.parquet" in text for text in refusals)
+
+
+def test_samples_whose_squares_are_beyond_numbers_are_told():
+    """It was a warning of numpy, and a response that is no number."""
+    u, y = np.random.default_rng(0).standard_normal((2, 200))
+    y[7] = 1e200
+    with pytest.raises(InputError, match=r"records: squares of the samples are beyond numbers"):
+        fq.h1(fq.Record(u, y, 0.01), segment=20)
+    with pytest.raises(InputError, match=r"ndarray: squares of the samples are beyond numbers"):
+        fq.h1(fq.open(np.column_stack([u, y]), dt=0.01), segment=20)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
@@ -107,6 +108,21 @@ def missing(kind: str, package: str, extra: str) -> InputError:
 def damaged(kind: str, error: BaseException) -> InputError:
     """The error of a file that is not what its suffix says."""
     return InputError(f"is not {kind} or is damaged ({first_line(error)})")
+
+
+@contextmanager
+def refusing(path: Path, kind: str) -> Iterator[None]:
+    """Errors of a library that has opened a file are an InputError that names it; those of the
+    system, and ours, stay as they are.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        raise InputError(f"{path}: {damaged(kind, error)}") from None
 
 
 def first_line(error: BaseException) -> str:
