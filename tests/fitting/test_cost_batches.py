@@ -83,7 +83,7 @@ def test_only_experiments_that_differ_in_data_alone_are_of_one_shape():
         "hold": Reading.of(record, "foh", None).lines(),
         "lines": Reading.of(record, None, (20, 60)).lines(),
         "length": Reading.of(record.slice(0, 1.5), None, None).lines(),
-        "lift": dataclasses.replace(one, lift=0),
+        "lift": dataclasses.replace(one, lift=2),
         "added": one.with_rows(np.ones((1, one.n_rows))),
     }
     assert [name for name, other in others.items() if one_shape([one, other])] == []
