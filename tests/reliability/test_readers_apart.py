@@ -106,6 +106,10 @@ def ends(path):
     os._exit(3)
 
 
+def ends_quietly(path):
+    os._exit(0)
+
+
 def panics(path):
     raise SystemExit("a panic")
 
@@ -130,7 +134,7 @@ def some(tmp_path):
 def test_what_a_reader_may_do_in_its_own_process(some, capfd):
     assert apart.read_apart("a thing", prints, some) == "some.bin"
     assert capfd.readouterr() == ("", "")
-    for read, why in ((ends, "ended with 3"), (panics, "a panic")):
+    for read, why in ((ends, "with 3"), (ends_quietly, "with 0"), (panics, "a panic")):
         with pytest.raises(InputError, match=rf"is not a thing or is damaged \(.*{why}"):
             apart.read_apart("a thing", read, some)
 
@@ -143,8 +147,12 @@ def test_the_memory_that_a_reader_may_take(some, monkeypatch):
     assert apart.read_apart("a thing", takes, some) == 60_000_000
 
 
-def test_inside_another_program_it_is_read_there(some, monkeypatch, capfd):
-    monkeypatch.setattr(sys, "executable", None)
+@pytest.mark.parametrize("frozen", [False, True])
+def test_inside_another_program_it_is_read_there(frozen, some, monkeypatch, capfd):
+    if frozen:
+        monkeypatch.setattr(sys, "frozen", True, raising=False)
+    else:
+        monkeypatch.setattr(sys, "executable", None)
     assert apart.read_apart("a thing", prints, some) == "some.bin"
     assert "nobody" in capfd.readouterr().out
     with pytest.raises(InputError, match="a panic"):

@@ -41,7 +41,7 @@ def read_apart(kind: str, read: Callable[..., Result], path: Path, *more: str | 
     or where it takes more memory than ``limit_of`` the file allows (on Linux).
     """
     limit = limit_of(path)
-    if not sys.executable:
+    if not sys.executable or getattr(sys, "frozen", False):
         # inside another program there is no interpreter to start
         return _refused(kind, read, path, *more)
     asked = pickle.dumps((kind, read.__module__, read.__name__, path, more, limit))
@@ -51,12 +51,14 @@ def read_apart(kind: str, read: Callable[..., Result], path: Path, *more: str | 
         [sys.executable, *_CALL], input=asked, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         env=environment, check=False,
     )  # fmt: skip
-    if ended.returncode:
+    try:
+        result, problem = pickle.loads(ended.stdout)
+    except (EOFError, pickle.UnpicklingError):
+        # it has ended before it could answer
         told = str(too_large(path, limit))
         raise InputError(
             f"is not {kind} or is damaged (its reader ended with {ended.returncode}), or {told}"
-        )
-    result, problem = pickle.loads(ended.stdout)
+        ) from None
     if problem is MemoryError:
         raise too_large(path, limit)
     if problem is not None:
