@@ -20,6 +20,7 @@ from freqid.data.readers.limits import limit_of, too_large
 
 Result = TypeVar("Result")
 
+_HERE = Path(__file__).resolve().parents[3]
 # -P: the folder that a user is in is none to import from
 _CALL = ["-P", "-c", "from freqid.data.readers.apart import answer; answer()"]
 
@@ -45,7 +46,8 @@ def read_apart(kind: str, read: Callable[..., Result], path: Path, *more: str | 
         # inside another program there is no interpreter to start
         return _refused(kind, read, path, *more)
     asked = pickle.dumps((kind, read.__module__, read.__name__, path, more, limit))
-    paths = os.pathsep.join(p for p in sys.path if p)
+    # where this process has found what it needs, and this package in a folder it was started in
+    paths = os.pathsep.join([*(p for p in sys.path if p), str(_HERE)])
     environment = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
     ended = subprocess.run(
         [sys.executable, *_CALL], input=asked, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
