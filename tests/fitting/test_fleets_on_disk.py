@@ -107,16 +107,19 @@ def test_unfinished_chunks_of_another_job_are_kept(tmp_path, monkeypatch):
     same(fq.fit_many(LAG, records, path, **ASKED), fq.fit_many(LAG, records, **ASKED))
 
 
+# prints each row that it begins, and waits at one of them until it is told to go on
 JOB = """
-import sys, time
+import sys
 import freqid as fq
 from freqid.fitting.many import rows
-real = rows._fitted
-def slow(*given):
+real, begun = rows._fitted, []
+def told(*given):
     print("row", flush=True)
-    time.sleep(0.5)
+    begun.append(given)
+    if sys.argv[2:] == [str(len(begun))]:
+        sys.stdin.readline()
     return real(*given)
-rows._fitted = slow
+rows._fitted = told
 lag = fq.first_order(b=50, a=20)
 each = [fq.simulate(lag, fq.white_noise(100, seed=s), 0.01).with_noise(0.01) for s in range(6)]
 fq.fit_many(lag, each, sys.argv[1], n_jobs=1, verdicts=False, chunk=1, band=(1, 40))
@@ -125,8 +128,8 @@ fq.fit_many(lag, each, sys.argv[1], n_jobs=1, verdicts=False, chunk=1, band=(1, 
 
 def test_two_jobs_never_write_one_path(tmp_path):
     path = tmp_path / "t.parquet"
-    call = [sys.executable, "-c", JOB, str(path)]
-    with subprocess.Popen(call, stdout=subprocess.PIPE, text=True) as first:
+    call, pipe = [sys.executable, "-c", JOB, str(path)], subprocess.PIPE
+    with subprocess.Popen([*call, "1"], stdin=pipe, stdout=pipe, text=True) as first:
         assert first.stdout.readline() == "row\n"
         with pytest.raises(ValueError, match=r"another job is writing.*t\.parquet"):
             fq.fit_many(LAG, runs(6), path, **ASKED)
@@ -134,14 +137,15 @@ def test_two_jobs_never_write_one_path(tmp_path):
         second = subprocess.run(call, capture_output=True, text=True, check=False)
         assert "another job is writing" in second.stderr
         assert "row" not in second.stdout
-        assert first.wait() == 0
+        first.communicate("go on\n")
+        assert first.returncode == 0
     assert len(pd.read_parquet(path)) == 6
 
 
 def test_a_job_that_was_killed_leaves_no_lock(tmp_path):
     path = tmp_path / "t.parquet"
-    call = [sys.executable, "-c", JOB, str(path)]
-    with subprocess.Popen(call, stdout=subprocess.PIPE, text=True) as first:
+    call, pipe = [sys.executable, "-c", JOB, str(path)], subprocess.PIPE
+    with subprocess.Popen([*call, "3"], stdin=pipe, stdout=pipe, text=True) as first:
         for _ in range(3):
             first.stdout.readline()
         first.kill()
