@@ -17,6 +17,7 @@ from freqid.fitting.cost.time_experiments import _independent
 from freqid.fitting.reading import Reading
 from freqid.lti import ZeroOrderHold, rounding, sampled_response
 from freqid.lti.state_space import StateSpace
+from tests.robots.test_logs import simulated
 
 OMEGA = 2 * np.pi * np.linspace(5, 90, 30)
 HOLD = ZeroOrderHold(1e-3)
@@ -145,3 +146,39 @@ def test_rounding_is_asked_of_rates_that_lie_far_apart_or_close():
     assert told(0.01, 3.0) > 0
     assert told(5.0, 5.001) > 0
     assert told(5.0, 5.1) == 0
+
+
+def two_lags(a, b, c):
+    return [[-a, 0], [0, -b]], [[a, 0], [0, c]], [[1, 1]], [[0, 0]]
+
+
+LAGS = [fq.Parameter("a", 5.0), fq.Parameter("b", 20.0), fq.Parameter("c", 8.0)]
+OFF = {"a": 6.0, "b": 17.0, "c": 9.0}
+
+
+def assert_found(est, rtol):
+    np.testing.assert_allclose(est.values, [5, 20, 8], rtol=rtol)
+
+
+@pytest.mark.parametrize("late", [(0.02, -0.03), (0.01, -0.01), (0.024, -0.016)])
+def test_one_input_late_and_another_early(late):
+    """What both ends of the record do not hold is left open, and nothing else."""
+    u = np.column_stack([fq.white_noise(900, seed=s) for s in (1, 2)])
+    plant = fq.GreyBox(two_lags, LAGS, input_delay=late)
+    record = fq.simulate(plant, u, 0.01).slice(1, 7.5)
+    assert_found(fq.fit(plant, record, start=OFF), 1e-8)
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_two_inputs_at_stamps_of_their_own(straight):
+    rng = np.random.default_rng(0)
+    u = np.column_stack([fq.white_noise(600, seed=s) for s in (1, 2)])
+    u_time = 1e-2 * (np.arange(600) + 0.3 * rng.random(600))
+    y_time = 0.2 + 1.3e-2 * (np.arange(400) + 0.3 * rng.random(400))
+    y = sum(
+        simulated(fq.first_order(b=b, a=a), u_time, u[:, i], y_time, straight)
+        for i, (b, a) in enumerate([(5, 5), (8, 20)])
+    )
+    record = fq.Record.from_logs(u_time, u, y_time, y)
+    hold = "foh" if straight else "zoh"
+    assert_found(fq.fit(fq.GreyBox(two_lags, LAGS), record, hold=hold, start=OFF), 1e-10)
