@@ -284,6 +284,9 @@ def as_rows(block: Array, what: str, width: int) -> Array:
         raise InputError(f"{what} has masked samples; fill them, or slice() takes what is beside")
     rows = np.asarray(block)
     rows = rows[:, None] if rows.ndim == 1 else rows
+    if rows.dtype.kind == "f" and rows.dtype.itemsize > 8:
+        with np.errstate(over="ignore"):  # what is beyond numbers is infinite, and told so
+            rows = rows.astype(float)
     if rows.dtype.kind not in "fiu":
         # what is narrower is widened by whoever copies it
         if rows.dtype.kind not in "bO":
