@@ -64,11 +64,11 @@ def chosen(known, path, source, line, most):
     """Tests that run a line, the quick ones first, of ``most`` seconds together."""
     contexts = known["lines"].get(path, {})
     names = {c for n in _statement(source, line) for c in contexts.get(str(n), ())}
-    seconds = known["seconds"]
-    if "" in names:  # run when it is imported: any test may notice
-        names = set(seconds)
+    seconds, own = known["seconds"], names - {""}
+    # what is run while modules are imported, any test may notice; those that run it come first
+    others = set(seconds) - own if "" in names else set()
     spent, taken = 0.0, []
-    for name in sorted(names, key=lambda n: seconds.get(n, 0.0)):
+    for name in sorted(own | others, key=lambda n: (n in others, seconds.get(n, 0.0))):
         spent += seconds.get(name, 0.0)
         if taken and spent > most:
             break

@@ -13,8 +13,8 @@ import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
 from freqid.data.readers.columns import CLOCKS, step_of
-from freqid.data.readers.hdf5_structure import check_superblock
-from freqid.data.readers.kinds import damaged, missing, refusing
+from freqid.data.readers.hdf5_structure import check_structure
+from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
 from freqid.data.stream_found import Asked, Found, Source, even, of_array
 from freqid.data.time_column import time_named
@@ -118,7 +118,7 @@ class _Arrays:
         def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
             wanted = [channels[i][1:] for i in which]
             full = dict.fromkeys(name for name, _ in wanted)
-            with refusing(self.path, "what its suffix says"), self.opened() as file:
+            with self.opened() as file:
                 for at in range(first, count, asked.block):
                     read = {name: file[name][at : at + asked.block] for name in full}
                     flat = {name: rows.reshape(len(rows), -1) for name, rows in read.items()}
@@ -179,7 +179,7 @@ def of_hdf5(path: Path, asked: Asked) -> Found:
         arrays.add_clocks(_folder(name), item.parent.attrs)
 
     try:
-        check_superblock(path)
+        check_structure(path)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     try:

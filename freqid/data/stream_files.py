@@ -112,13 +112,12 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]
-        with refusing(path, "Parquet"):
-            batches = pq.ParquetFile(path).iter_batches(batch_size=block, columns=wanted)
-            rows = (
-                np.column_stack([batch[name].to_numpy(zero_copy_only=False) for name in wanted])
-                for batch in batches
-            )
-            yield from from_the_first(rows, first)
+        batches = pq.ParquetFile(path).iter_batches(batch_size=block, columns=wanted)
+        rows = (
+            np.column_stack([batch[name].to_numpy(zero_copy_only=False) for name in wanted])
+            for batch in batches
+        )
+        return from_the_first(rows, first)
 
     hold = None if told is None else kept_hold(told, names)
     conditions = {} if told is None else kept_conditions(told)

@@ -318,3 +318,18 @@ def test_an_hdf5_file_that_names_a_driver(tmp_path):
     with h5py.File(tmp_path / "new.h5", "w", libver="latest") as file:
         file["u"], file["y"], file["dt"] = np.arange(9.0), np.arange(9.0), 0.1
     assert fq.read(tmp_path / "new.h5").dt == 0.1
+
+
+@pytest.mark.parametrize("read", [fq.read, lambda path: fq.open(path, "u", "y")])
+def test_a_tree_that_leads_back_to_itself(tmp_path, read):
+    """HDF5's library went round in it for ever, and Ctrl-C could not end it."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "circle.h5"
+    with h5py.File(path, "w") as file:
+        file["time"], file["u"], file["y"] = np.arange(9.0), np.ones(9), np.ones(9)
+    content = bytearray(path.read_bytes())
+    at = content.index(b"TREE")
+    content[at + 16 : at + 24] = at.to_bytes(8, "little")
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=rf"circle\.h5.*byte {at}: a node of a tree is its own"):
+        read(path)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError, unknown
 from freqid.data.readers.apart import needs, read_apart
 from freqid.data.readers.kinds import existing, reads
+from freqid.data.readers.limits import check_size
 from freqid.data.readers.table import heading
 
 if TYPE_CHECKING:
@@ -29,27 +31,39 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
     import pandas as pd
     from python_calamine import CalamineWorkbook
 
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            check_size(path, sum(part.file_size for part in archive.infolist()), "its sheets")
     book = CalamineWorkbook.from_path(str(path))
-    sheets = {name: book.get_sheet_by_name(name).to_python() for name in book.sheet_names}
-    if group is not None and group not in sheets:
-        raise InputError(unknown("group", group, sheets))
+    if group is not None and group not in book.sheet_names:
+        raise InputError(unknown("group", group, book.sheet_names))
     found: list[pd.DataFrame] = []
-    for name, rows in sheets.items() if group is None else [(group, sheets[group])]:
-        rows = [r for r in rows if any(c not in ("", None) for c in r)]
-        body = [
-            i for i, r in enumerate(rows) if sum(_is_number(c) for c in r) >= max(len(r) - 1, 1)
+    for name in book.sheet_names if group is None else [group]:
+        # a sheet at a time, and a column: a million rows are a hundred times that in lists
+        rows = [
+            r
+            for r in book.get_sheet_by_name(name).to_python()
+            if any(c not in ("", None) for c in r)
         ]
-        if len(body) < 2:
+        body = (
+            i for i, r in enumerate(rows) if sum(_is_number(c) for c in r) >= max(len(r) - 1, 1)
+        )
+        first, second = next(body, None), next(body, None)
+        if first is None or second is None:
             continue
-        first, width = body[0], len(rows[body[0]])
+        width = len(rows[first])
         names, units, _ = heading([[str(c) for c in r] for r in rows[:first]], width)
-        frame = pd.DataFrame([[None if c == "" else c for c in r] for r in rows[first:]])
-        frame = frame.iloc[:, :width].infer_objects()
+        columns = {
+            i: pd.Series([None if r[i] == "" else r[i] for r in rows[first:]]) for i in range(width)
+        }
+        frame = pd.DataFrame(columns).infer_objects()
         frame.columns = names
         frame.attrs.update(units=units, found=f"sheet {name!r}, columns {', '.join(names)}")
         found.append(frame)
     if not found:
-        raise InputError(f"holds no columns of numbers in its sheets ({', '.join(sheets)})")
+        raise InputError(
+            f"holds no columns of numbers in its sheets ({', '.join(book.sheet_names)})"
+        )
     if len(found) > 1:
         others = ", ".join(f.attrs["found"].split(",")[0] for f in found[1:])
         found[0].attrs["notes"] = [f"the first sheet was read; {others} are there, too: group="]

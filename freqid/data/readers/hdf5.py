@@ -9,7 +9,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError
 from freqid.data.readers.columns import CLOCKS, columns_of
-from freqid.data.readers.hdf5_structure import check_superblock
+from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
 from freqid.data.readers.limits import check_size
 
@@ -27,7 +27,7 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
         import h5py
     except ImportError:
         raise missing("HDF5", "h5py", "hdf5") from None
-    check_superblock(path)
+    check_structure(path)
     found: dict[str, dict[str, Array]] = {}
     taken = 0.0
 

@@ -1,11 +1,13 @@
-"""Whether the first block of an HDF5 file is one of a plain file, before its library trusts it.
+"""Whether an HDF5 file is a plain one whose trees end, before its library trusts it.
 
-Format: "HDF5 File Format Specification", The HDF Group, section II.A (superblock). A driver's block
-that is not there sends the library through gigabytes of memory in search of it.
+Format: "HDF5 File Format Specification", The HDF Group, sections II.A (superblock) and III.A.1
+(B-trees of version 1). A driver's block that is not there sends the library through gigabytes of
+memory in search of it; nodes whose siblings lead in a circle keep it for ever.
 """
 
 from __future__ import annotations
 
+import mmap
 from pathlib import Path
 
 from freqid.checks import InputError
@@ -16,10 +18,16 @@ _BEGINS = {0: 24, 1: 28}
 # places of a superblock: at the beginning, or behind a block of the user's of 512 bytes or a power
 # of two times as many
 _USERS, _MOST = 512, 1 << 30
+# a node of a tree begins with these, and the addresses of its siblings so far behind
+_NODE, _SIBLINGS = b"TREE", 8
+# bytes of a file that are looked through for nodes: longer ones are mostly samples
+_LOOKED = 1 << 26
 
 
-def check_superblock(path: Path) -> None:
-    """ValueError for a file of several parts, or a superblock that is damaged."""
+def check_structure(path: Path) -> None:
+    """ValueError for a file of several parts, a superblock that is damaged, or, in the first 64
+    MiB, trees that never end.
+    """
     size, at = path.stat().st_size, 0
     with path.open("rb") as file:
         while at < min(size, _MOST):
@@ -27,6 +35,7 @@ def check_superblock(path: Path) -> None:
             block = file.read(96)
             if block[:8] == _SIGNATURE:
                 _check(block)
+                _check_trees(path, at, block)
                 return
             at = 2 * at or _USERS
 
@@ -45,3 +54,29 @@ def _check(block: bytes) -> None:
             "is not HDF5 or is damaged (its first block names a driver; files of several parts "
             "are not read)"
         )
+
+
+def _check_trees(path: Path, begin: int, superblock: bytes) -> None:
+    """ValueError where nodes are siblings in a circle; ``begin`` is the superblock's place, from
+    which addresses count.
+    """
+    width = superblock[13 if superblock[8] in _BEGINS else 9]
+    after: dict[int, int] = {}
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        at = content.find(_NODE, begin, _LOOKED)
+        while at >= 0:
+            right = content[at + _SIBLINGS + width : at + _SIBLINGS + 2 * width]
+            after[at - begin] = int.from_bytes(right, "little")
+            at = content.find(_NODE, at + 1, _LOOKED)
+    ends: set[int] = set()
+    for node in after:
+        seen: set[int] = set()
+        while node in after and node not in ends:
+            if node in seen:
+                raise InputError(
+                    f"is not HDF5 or is damaged (byte {begin + node}: a node of a tree is its own "
+                    "sibling)"
+                )
+            seen.add(node)
+            node = after[node]
+        ends |= seen
