@@ -15,6 +15,8 @@ from freqid.checks import InputError
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 # versions whose superblock has the fields below, and where they begin, the second's being later
 _BEGINS = {0: 24, 1: 28}
+# bytes of the shortest superblock, of version 2 with addresses of two bytes
+_SHORTEST = 24
 # places of a superblock: at the beginning, or behind a block of the user's of 512 bytes or a power
 # of two times as many
 _USERS, _MOST = 512, 1 << 30
@@ -34,18 +36,20 @@ def check_structure(path: Path) -> None:
             file.seek(at)
             block = file.read(96)
             if block[:8] == _SIGNATURE:
-                _check(block)
-                _check_trees(path, at, block)
+                _check_trees(path, at, _width(block))
                 return
             at = 2 * at or _USERS
 
 
-def _check(block: bytes) -> None:
-    version = block[8] if len(block) > 8 else 255
+def _width(block: bytes) -> int:
+    """Bytes of an address, from a superblock that was looked at as far as this can be done."""
+    if len(block) < _SHORTEST:
+        raise InputError(f"is not HDF5 or is damaged (it ends after {len(block)} bytes)")
+    version = block[8]
+    width = block[13 if version in _BEGINS else 9]
     if version not in _BEGINS:
         # later ones carry a checksum, and the library looks at it
-        return
-    width = block[13] if len(block) > 13 else 0
+        return width
     if width not in (2, 4, 8) or len(block) < _BEGINS[version] + 4 * width:
         raise InputError("is not HDF5 or is damaged (its first block)")
     first = _BEGINS[version] + 3 * width
@@ -54,13 +58,13 @@ def _check(block: bytes) -> None:
             "is not HDF5 or is damaged (its first block names a driver; files of several parts "
             "are not read)"
         )
+    return width
 
 
-def _check_trees(path: Path, begin: int, superblock: bytes) -> None:
+def _check_trees(path: Path, begin: int, width: int) -> None:
     """ValueError where nodes are siblings in a circle; ``begin`` is the superblock's place, from
-    which addresses count.
+    which addresses of ``width`` bytes count.
     """
-    width = superblock[13 if superblock[8] in _BEGINS else 9]
     after: dict[int, int] = {}
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         at = content.find(_NODE, begin, _LOOKED)
