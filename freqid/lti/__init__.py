@@ -3,7 +3,8 @@
 It may import ``freqid.checks`` only.
 """
 
-from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many, eigenvalues_and_derivatives
+from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many
+from freqid.lti.eigenvectors import eigenvalues_and_derivatives
 from freqid.lti.exponential import exponential
 from freqid.lti.holds import (
     BandLimited,

@@ -1,4 +1,4 @@
-"""The exponential of a matrix, right where a triangular one has eigenvalues that nearly agree."""
+"""The exponential of a matrix, right where eigenvalues nearly agree or lie many decades apart."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import numpy as np
 import scipy
 
 from freqid.checks import Array
+from freqid.lti.double_double import Doubled
 
 # neighbours on a diagonal that are nearer than this lose digits in a difference of exponentials
 _NEAR = 1.0
+# terms of a series, and the size of its argument, that give all digits of a sum of two doubles
+_TERMS, _SMALL = 14, 2.0**-6
 
 
 def exponential(X: Array) -> Array:
@@ -25,6 +28,23 @@ def exponential(X: Array) -> Array:
         apart = np.abs(np.diff(X[at].diagonal()))
         if ((apart > 0) & (apart < _NEAR)).any():
             E[at] = _upper(X[at]) if low == 0 else _upper(X[at].T).T
+    return E
+
+
+def doubled_exponential(X: Doubled) -> Doubled:
+    """exp(X) of a matrix (n, n) by its series, scaled and squared with twice the digits.
+
+    In doubles an exponential errs by the last digit of its fastest motion, which may be all that is
+    known of the slowest.
+    """
+    size = float(np.linalg.norm(X.high, 1))
+    squarings = max(int(np.ceil(np.log2(size / _SMALL))), 0) if size > 0 else 0
+    small = Doubled(*(M / 2.0**squarings for M in X))
+    one = E = Doubled.of(np.eye(len(X.high), dtype=X.high.dtype))
+    for k in range(_TERMS, 0, -1):
+        E = one + (small @ E) / k
+    for _ in range(squarings):
+        E = E @ E
     return E
 
 
