@@ -10,7 +10,7 @@ from freqid.lti.double_double import Doubled
 from freqid.lti.state_space import StateSpace
 
 # beyond this the eigenbasis loses more digits than the fit can spare
-WORST_CONDITION = 1e5
+WORST_CONDITION = 2e4
 # relative errors of eigenvalues and vectors from which on they are refined, and gaps, as parts of
 # the largest rate, that are none: what doubles leave of zero, or of two equal rates
 _LOST, _NO_GAP = 1e-12, 1e-13

@@ -8,8 +8,6 @@ import scipy
 from freqid.checks import Array
 from freqid.lti.double_double import Doubled
 
-# neighbours on a diagonal that are nearer than this lose digits in a difference of exponentials
-_NEAR = 1.0
 # terms of a series, and the size of its argument, that give all digits of a sum of two doubles
 _TERMS, _SMALL = 14, 2.0**-6
 
@@ -18,16 +16,17 @@ def exponential(X: Array) -> Array:
     """exp(X) of matrices (…, n, n).
 
     scipy's own divides eˣ − eʸ by x − y for neighbours on the diagonal of a triangular matrix, of
-    which nothing is left where they nearly agree, as two equal lags do after a fit.
+    which nothing is left where they nearly agree, as two equal lags do after a fit, and loses four
+    digits of a chain of equal lags beside an input's integrator.
     """
-    E = np.asarray(scipy.linalg.expm(X))
-    for at in np.ndindex(X.shape[:-2]):
-        low, high = scipy.linalg.bandwidth(X[at])
-        if low and high:
-            continue
-        apart = np.abs(np.diff(X[at].diagonal()))
-        if ((apart > 0) & (apart < _NEAR)).any():
-            E[at] = _upper(X[at]) if low == 0 else _upper(X[at].T).T
+    bands = {at: scipy.linalg.bandwidth(X[at]) for at in np.ndindex(X.shape[:-2])}
+    full = any(low and high for low, high in bands.values())
+    E = np.asarray(scipy.linalg.expm(X)) if full else np.empty(X.shape, X.dtype)
+    for at, (low, high) in bands.items():
+        if low == 0:
+            E[at] = _upper(X[at])
+        elif high == 0:
+            E[at] = _upper(X[at].T).T
     return E
 
 
