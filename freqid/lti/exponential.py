@@ -19,6 +19,8 @@ def exponential(X: Array) -> Array:
     which nothing is left where they nearly agree, as two equal lags do after a fit, and loses four
     digits of a chain of equal lags beside an input's integrator.
     """
+    if not np.isfinite(X).all():
+        return np.full(X.shape, np.nan, X.dtype)
     bands = {at: scipy.linalg.bandwidth(X[at]) for at in np.ndindex(X.shape[:-2])}
     full = any(low and high for low, high in bands.values())
     E = np.asarray(scipy.linalg.expm(X)) if full else np.empty(X.shape, X.dtype)

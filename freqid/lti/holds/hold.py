@@ -18,10 +18,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import scipy
 
-from freqid.checks import Array, ComplexArray, FloatArray, InputError, positive
+from freqid.checks import Array, ComplexArray, FloatArray, InputError, numbers, positive
 from freqid.lti.double_double import Doubled
 from freqid.lti.exponential import doubled_exponential, exponential
 from freqid.lti.holds.pulse import Pulse
+from freqid.lti.holds.units import Units, near_one
 
 # A times the period, from which on an exponential in doubles errs in the thirteenth digit; nothing
 # is gained where it comes near the largest number
@@ -118,16 +119,19 @@ class PeriodicHold(Hold):
         array([[0.904837]])
         """
         A, B = _checked(A, B)
+        units = Units.of(A, B, self.period)
+        return Sampled(*units.back(*self._sampled(*units.into(A, B))))
+
+    def _sampled(self, A: FloatArray, B: FloatArray) -> Sampled:
+        """The same in units that suit."""
         h = self.period
         plain = self._blocks(exponential(self.pulse.generator(A * h, B * h)), B.shape)
         if not _delicate(A * h, plain):
             return plain
         exact = Doubled.product(A, h), Doubled.product(B, h)
-        E = doubled_exponential(self._generator(*exact))
-        high, low = (self._blocks(M, B.shape) for M in E)
         # by itself, Φ keeps its digits however little of the states is left
         phi = doubled_exponential(exact[0]).high
-        return Sampled(phi, *(a + b for a, b in zip(high[1:], low[1:], strict=True)))
+        return self._of(doubled_exponential(self._generator(*exact)), B.shape)._replace(phi=phi)
 
     def sampled_derivatives(
         self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray
@@ -141,6 +145,18 @@ class PeriodicHold(Hold):
         A, B = _checked(A, B)
         if len(dA) == 0:
             return self.sampled(A, B), Sampled(dA, dB, dB)
+        h, units = self.period, Units.of(A, B, self.period)
+        A, B = units.into(A, B)
+        dA, dB = units.into(dA, dB)
+        lengths = near_one(h * np.abs(np.concatenate([dA, dB], axis=-1)).max(axis=(1, 2)))
+        value, change = self._differentiated(A, B, *(lengths[:, None, None] * d for d in (dA, dB)))
+        back = units.back(*(M / lengths[:, None, None] for M in change))
+        return Sampled(*units.back(*value)), Sampled(*back)
+
+    def _differentiated(
+        self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray
+    ) -> tuple[Sampled, Sampled]:
+        """The same in units that suit, along directions of a length that does."""
         h = self.period
         X = self.pulse.generator(A * h, B * h)
         dX = self.pulse.generator(dA * h, dB * h, moving=True)
@@ -150,13 +166,13 @@ class PeriodicHold(Hold):
         big[:, :size, size:] = dX
         E = exponential(big)
         value = self._blocks(E[0, :size, :size], B.shape)
-        if _delicate(A * h, value):
-            value = self.sampled(A, B)
-            low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
-            for one in range(len(dA)):
-                rest = scipy.linalg.block_diag(low, low)
-                E[one] = doubled_exponential(Doubled(big[one], rest)).high
-        return value, self._blocks(E[:, :size, size:], B.shape)
+        if not _delicate(A * h, value):
+            return value, self._blocks(E[:, :size, size:], B.shape)
+        low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
+        both = scipy.linalg.block_diag(low, low)
+        every = [doubled_exponential(Doubled(one, both)) for one in big]
+        change = Doubled(*(np.stack(part)[:, :size, size:] for part in zip(*every, strict=True)))
+        return self._sampled(A, B), self._of(change, B.shape)
 
     def modal(self, eigenvalues: ComplexArray) -> ModalSampled:
         """φ, γ, γ⁺ and their divided differences at the eigenvalues of A, (…, n) in rad/s."""
@@ -177,6 +193,11 @@ class PeriodicHold(Hold):
             self.pulse.generator(A.high, B.high), self.pulse.generator(A.low, B.low, moving=True)
         )
 
+    def _of(self, exponential: Doubled, shape: tuple[int, ...]) -> Sampled:
+        """Sampled matrices from an exponential; what cancels between its blocks is not lost."""
+        high, low = (self._blocks(M, shape) for M in exponential)
+        return Sampled(*(a + b for a, b in zip(high, low, strict=True)))
+
     def _blocks(self, exponential: Array, shape: tuple[int, ...]) -> Sampled:
         phi, (gamma, following) = self.pulse.blocks(exponential, *shape)
         return Sampled(phi, gamma, np.zeros_like(gamma) if following is None else following)
@@ -189,11 +210,14 @@ def _delicate(step: FloatArray, plain: Sampled) -> bool:
 
 
 def _checked(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
-    A, B = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
+    A, B = numbers("A", A), numbers("B", B)
     if A.ndim != 2 or A.shape[0] != A.shape[1] or B.ndim != 2 or B.shape[0] != A.shape[0]:
         raise InputError(
             f"A has shape {A.shape} and B has shape {B.shape}; expected (n, n) and (n, inputs)"
         )
+    for name, M in (("A", A), ("B", B)):
+        if not np.isfinite(M).all():
+            raise InputError(f"{name} has entries that are NaN or infinite; expected numbers")
     return A, B
 
 
