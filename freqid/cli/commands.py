@@ -80,7 +80,7 @@ def demo(out: Path = Path("data"), *, force: Force = False) -> None:
     names = ["chirp_fast.csv", "chirp_slow.csv"]
     folder(out, names, force)
     for name, record in zip(names, fq.paper.study_records(), strict=False):
-        fq.write(record, out / name)
+        fq.write(record, out / name, overwrite=force)
         print(f"{out / name}: {record!r}")
 
 

@@ -11,13 +11,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from freqid.checks import InputError, an, path_of, unknown
+from freqid.checks import InputError, an, flag, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
 from freqid.data.readers.table import named, named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
+from freqid.data.replacing import check_replacing, has_written
 from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
@@ -168,12 +169,14 @@ def _cut(record: Record, start: float | None, stop: float | None, detrend: int |
     return record if detrend is None else record.detrend(detrend)
 
 
-def write(record: Record, path: str | Path) -> None:
+def write(record: Record, path: str | Path, overwrite: bool = False) -> None:
     """Write a record to the file ``path`` that ``read`` reads: .csv, .parquet or .npz.
 
     Holds, conditions, units (``torque [N m]``) and what decimation has folded are kept in the file.
-    Folders that are missing are made. Raises ValueError for another suffix, and for channels whose
-    names could not be read back: those that a file uses itself, blank ones, ones in quotes.
+    Folders that are missing are made. A file that was read is never replaced, another one that is
+    there with ``overwrite``, or where this process wrote it. Raises ValueError for these, for
+    another suffix, and for channels whose names could not be read back: those that a file uses
+    itself, blank ones, ones in quotes.
     """
     an("record", record, Record)
     path = path_of("path", path)
@@ -181,10 +184,12 @@ def write(record: Record, path: str | Path) -> None:
     if kind not in WRITERS:
         raise InputError(f"{path}: {unknown('suffix', path.suffix, WRITERS)}")
     _check_names(record, path)
+    check_replacing(path, flag("overwrite", overwrite))
     frame = record.to_frame().assign(**kept_in_files(record))
     frame.columns = [named_with(str(c), record.units.get(str(c), "")) for c in frame.columns]
     with whole_file(path) as beside:
         WRITERS[kind](frame, beside)
+    has_written(path)
 
 
 def _check_names(record: Record, path: Path) -> None:

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from freqid.data.replacing import has_read
 from freqid.lti import Hold, InputHolds
 
 P = ParamSpec("P")
@@ -55,8 +56,13 @@ def _remembering(
 
 
 def that_reads(function: Callable[P, Made]) -> Callable[P, Made]:
-    """A function that reads data, which remembers how it was called."""
-    return _remembering(function, lambda args: ("fq", (), args))
+    """A function that reads data, which remembers how it was called, and the file."""
+
+    def begin(args: Sequence[object]) -> tuple[str, Sequence[str | None], Sequence[object]]:
+        has_read(args[0] if args else None)
+        return "fq", (), args
+
+    return _remembering(function, begin)
 
 
 def that_follows(method: Callable[P, Made]) -> Callable[P, Made]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import Array, FloatArray, InputError, finite, listed, positive, unknown, whole
 from freqid.data.conditions import as_conditions
+from freqid.data.replacing import has_read
 from freqid.data.selection import as_holds
 from freqid.data.stream_files import of_file
 from freqid.data.stream_found import Asked, Found, Source, of_array
@@ -62,6 +63,7 @@ def open(
         except InputError as error:
             text = str(error)
             raise InputError(text if str(source) in text else f"{source}: {text}") from None
+        has_read(source)
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):

@@ -23,12 +23,14 @@ def exponential(X: Array) -> Array:
         return np.full(X.shape, np.nan, X.dtype)
     bands = {at: scipy.linalg.bandwidth(X[at]) for at in np.ndindex(X.shape[:-2])}
     full = any(low and high for low, high in bands.values())
-    E = np.asarray(scipy.linalg.expm(X)) if full else np.empty(X.shape, X.dtype)
-    for at, (low, high) in bands.items():
-        if low == 0:
-            E[at] = _upper(X[at])
-        elif high == 0:
-            E[at] = _upper(X[at].T).T
+    # what grows beyond numbers is infinite
+    with np.errstate(over="ignore", invalid="ignore"):
+        E = np.asarray(scipy.linalg.expm(X)) if full else np.empty(X.shape, X.dtype)
+        for at, (low, high) in bands.items():
+            if low == 0:
+                E[at] = _upper(X[at])
+            elif high == 0:
+                E[at] = _upper(X[at].T).T
     return E
 
 
@@ -39,13 +41,16 @@ def doubled_exponential(X: Doubled) -> Doubled:
     known of the slowest.
     """
     size = float(np.linalg.norm(X.high, 1))
+    if not np.isfinite(size):
+        return Doubled.of(np.full_like(X.high, np.nan))
     squarings = max(int(np.ceil(np.log2(size / _SMALL))), 0) if size > 0 else 0
     small = Doubled(*(M / 2.0**squarings for M in X))
     one = E = Doubled.of(np.eye(len(X.high), dtype=X.high.dtype))
     for k in range(_TERMS, 0, -1):
         E = one + (small @ E) / k
-    for _ in range(squarings):
-        E = E @ E
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(squarings):
+            E = E @ E
     return E
 
 

@@ -33,10 +33,10 @@ def propagate(phi: FloatArray, forcing: Array, initial: Array) -> FloatArray:
 
     Args: phi (n, n), forcing (…, n, N), initial (…, n).
     """
-    S, Q = _triangular(phi)
-    f = np.einsum("ji,...jk->...ik", Q.conj(), forcing)
+    S, into, back = _triangular(phi)
+    f = np.einsum("ij,...jk->...ik", into, forcing)
     forward = np.ones(len(S), bool)
-    return np.einsum("ij,...jk->...ik", Q, _chain(S, f, initial @ Q.conj(), forward)).real
+    return np.einsum("ij,...jk->...ik", back, _chain(S, f, initial @ into.T, forward)).real
 
 
 class FreeMotion:
@@ -47,27 +47,34 @@ class FreeMotion:
     """
 
     def __init__(self, phi: FloatArray, n_samples: int) -> None:
-        self.S, self.Q = _triangular(phi)
+        self.S, self.into, self.back = _triangular(phi)
         self.forward = np.abs(np.diag(self.S)) <= 1
         n = len(phi)
         quiet = np.zeros((n, n, n_samples), complex)
-        motions = self.Q @ _chain(self.S, quiet, np.eye(n, dtype=complex), self.forward)
+        motions = self.back @ _chain(self.S, quiet, np.eye(n, dtype=complex), self.forward)
         # real and imaginary parts of n complex motions: 2n real ones that span n dimensions
         self.motions = np.concatenate([motions.real, motions.imag])
 
     def particular(self, forcing: Array) -> FloatArray:
         """One motion, (…, n, N), under the forcing (…, n, N); all others differ by ``motions``."""
-        f = np.einsum("ji,...jk->...ik", self.Q.conj(), forcing)
+        f = np.einsum("ij,...jk->...ik", self.into, forcing)
         x = _chain(self.S, f, np.zeros(f.shape[:-1], complex), self.forward)
-        return np.einsum("ij,...jk->...ik", self.Q, x).real
+        return np.einsum("ij,...jk->...ik", self.back, x).real
 
 
-def _triangular(phi: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Schur's form S and basis Q; LinAlgError where a plant grows beyond all numbers."""
+def _triangular(phi: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Schur's form of Φ, and what takes states there and back; LinAlgError where a plant grows
+    beyond all numbers.
+
+    States in units of unlike size are balanced first: a unitary basis would mix them.
+    """
     if not np.isfinite(phi).all():
         raise np.linalg.LinAlgError("the sampled matrices are not finite")
+    scale = np.ones(len(phi))
+    if len(phi) > 1:
+        phi, (scale, _) = scipy.linalg.matrix_balance(phi, permute=False, separate=True)
     S, Q = scipy.linalg.schur(phi, output="complex")
-    return S, Q
+    return S, Q.conj().T / scale, scale[:, None] * Q
 
 
 def _chain(S: Array, f: Array, boundary: Array, forward: Array) -> Array:

@@ -24,9 +24,8 @@ from freqid.lti.exponential import doubled_exponential, exponential
 from freqid.lti.holds.pulse import Pulse
 from freqid.lti.holds.units import Units, near_one
 
-# A times the period, from which on an exponential in doubles errs in the thirteenth digit; nothing
-# is gained where it comes near the largest number
-_LARGE, _HUGE = 300.0, 1e280
+# A times the period, from which on an exponential in doubles errs in the thirteenth digit
+_LARGE = 300.0
 
 
 class Sampled(NamedTuple):
@@ -125,13 +124,14 @@ class PeriodicHold(Hold):
     def _sampled(self, A: FloatArray, B: FloatArray) -> Sampled:
         """The same in units that suit."""
         h = self.period
-        plain = self._blocks(exponential(self.pulse.generator(A * h, B * h)), B.shape)
-        if not _delicate(A * h, plain):
-            return plain
-        exact = Doubled.product(A, h), Doubled.product(B, h)
-        # by itself, Φ keeps its digits however little of the states is left
-        phi = doubled_exponential(exact[0]).high
-        return self._of(doubled_exponential(self._generator(*exact)), B.shape)._replace(phi=phi)
+        if _delicate(A * h):
+            exact = Doubled.product(A, h), Doubled.product(B, h)
+            found = self._of(doubled_exponential(self._generator(*exact)), B.shape)
+            # by itself, Φ keeps its digits however little of the states is left
+            found = found._replace(phi=doubled_exponential(exact[0]).high)
+            if all(np.isfinite(M).all() for M in found):
+                return found
+        return self._blocks(exponential(self.pulse.generator(A * h, B * h)), B.shape)
 
     def sampled_derivatives(
         self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray
@@ -164,15 +164,17 @@ class PeriodicHold(Hold):
         big = np.zeros((len(dA), 2 * size, 2 * size), X.dtype)
         big[:, :size, :size] = big[:, size:, size:] = X
         big[:, :size, size:] = dX
+        if _delicate(A * h):
+            low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
+            both = scipy.linalg.block_diag(low, low)
+            every = [doubled_exponential(Doubled(one, both)) for one in big]
+            parts = (np.stack(part)[:, :size, size:] for part in zip(*every, strict=True))
+            change = self._of(Doubled(*parts), B.shape)
+            if all(np.isfinite(M).all() for M in change):
+                return self._sampled(A, B), change
         E = exponential(big)
         value = self._blocks(E[0, :size, :size], B.shape)
-        if not _delicate(A * h, value):
-            return value, self._blocks(E[:, :size, size:], B.shape)
-        low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
-        both = scipy.linalg.block_diag(low, low)
-        every = [doubled_exponential(Doubled(one, both)) for one in big]
-        change = Doubled(*(np.stack(part)[:, :size, size:] for part in zip(*every, strict=True)))
-        return self._sampled(A, B), self._of(change, B.shape)
+        return value, self._blocks(E[:, :size, size:], B.shape)
 
     def modal(self, eigenvalues: ComplexArray) -> ModalSampled:
         """φ, γ, γ⁺ and their divided differences at the eigenvalues of A, (…, n) in rad/s."""
@@ -203,10 +205,9 @@ class PeriodicHold(Hold):
         return Sampled(phi, gamma, np.zeros_like(gamma) if following is None else following)
 
 
-def _delicate(step: FloatArray, plain: Sampled) -> bool:
+def _delicate(step: FloatArray) -> bool:
     """Whether motions are so fast within a period that doubles leave too little of slow ones."""
-    finite = all(np.isfinite(M).all() and np.abs(M).max(initial=0) < _HUGE for M in plain)
-    return finite and float(np.linalg.norm(step, 1)) > _LARGE
+    return float(np.linalg.norm(step, 1)) > _LARGE
 
 
 def _checked(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
