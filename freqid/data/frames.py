@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, listed, positive, real, unknown
+from freqid.data.cells import no_number
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
 from freqid.data.readers.table import named
@@ -277,7 +278,7 @@ def _numbers(frame: pd.DataFrame, names: list[str]) -> FloatArray:
     try:
         return frame[names].to_numpy(dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"columns {names} hold values that are not numbers") from None
+        raise no_number(frame, names) from None
 
 
 def _slow_output(y: FloatArray) -> int:

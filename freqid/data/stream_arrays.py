@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
-from freqid.data.readers.columns import CLOCKS, step_of
+from freqid.data.readers.columns import CLOCKS, step_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
-from freqid.data.stream_found import Asked, Found, Source, even, of_array
+from freqid.data.stream_found import Asked, Found, Source, even, of_array, places
 from freqid.data.time_column import time_named
 
 
@@ -64,9 +64,11 @@ class _Arrays:
             return self.step(wanted)
         beside = [n for n in times if _folder(n) == _folder(wanted[0])]
         time = (beside or times)[0]
+        at = places(count)
         with self.opened() as file:
-            stamps = np.concatenate([file[time][:2], file[time][-2:]])
-        return even(str(self.path), _leaf(time), stamps, count)
+            stamps = np.array([file[time][i] for i in at])
+            unit = unit_of(file[time].attrs)
+        return even(str(self.path), _leaf(time), at, stamps, unit)
 
     def step(self, names: Iterable[str]) -> float | None:
         """The sample time of arrays in s: what their folders say, those around these, or any.

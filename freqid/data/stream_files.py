@@ -107,8 +107,7 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
         if kept and count:
             told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
         if time is not None and count > 1 and given is None:
-            # both ends say whether the time is even, which only all of it could prove
-            dt = even(str(path), time, _ends(file, time), count)
+            dt = even(str(path), time, *_stamps(file, time))
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]
@@ -124,15 +123,33 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     return Found(blocks, names, count, dt, str(path), hold, conditions)
 
 
-def _ends(file: Source, time: str) -> Array:
-    """The first two and the last two stamps, whatever the groups of rows they are in."""
-    ends: list[list[Array]] = [[], []]
-    groups = range(file.num_row_groups)
-    for end, order in zip(ends, (groups, reversed(groups)), strict=True):
-        for g in order:
-            stamps = file.read_row_group(g, columns=[time]).column(0).to_numpy()
-            end.append(stamps)
-            if sum(map(len, end)) >= 2:
-                break
-    first, last = np.concatenate(ends[0]), np.concatenate(ends[1][::-1])
-    return np.concatenate([first[:2], last[-2:]])
+def _stamps(file: Source, time: str) -> tuple[list[int], Array]:
+    """Rows and their stamps: the first two, the last two, and the ends of each group of rows, which
+    the footer knows.
+    """
+    import pandas as pd
+
+    metadata = file.metadata
+    number = file.schema_arrow.names.index(time)
+    sizes = [metadata.row_group(g).num_rows for g in range(metadata.num_row_groups)]
+    starts = np.concatenate([[0], np.cumsum(sizes)]).tolist()
+
+    def group(g: int) -> Array:
+        column = file.read_row_group(g, columns=[time]).column(0)
+        if column.null_count:
+            raise InputError(f"the time {time!r} has {column.null_count} blanks; mend the file")
+        return np.asarray(column.to_numpy())
+
+    found: dict[int, object] = {}
+    full = [g for g, size in enumerate(sizes) if size]
+    for g in full:
+        first, last = starts[g], starts[g] + sizes[g] - 1
+        told = metadata.row_group(g).column(number).statistics
+        if g in (*full[:2], *full[-2:]) or told is None or not told.has_min_max or told.null_count:
+            stamps = group(g)
+            found |= {first + i: stamps[i] for i in (0, min(1, sizes[g] - 1))}
+            found |= {last - i: stamps[-1 - i] for i in (min(1, sizes[g] - 1), 0)}
+        else:
+            found |= {first: told.min, last: told.max}
+    at = sorted(found)
+    return at, pd.Series([found[i] for i in at]).to_numpy()

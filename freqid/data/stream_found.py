@@ -18,6 +18,8 @@ Source = Any
 
 # part of a step that the ends of a time may be off
 _EVEN = 1e-2
+# rows at which a long time is looked at
+_PLACES = 256
 
 
 @dataclass(frozen=True)
@@ -72,22 +74,38 @@ def _array_names(columns: Sequence[str] | None, count: int) -> list[str]:
     return list(channel_names("columns", columns, count, "channel"))
 
 
-def even(origin: str, name: str, stamps: Array, count: int) -> float:
-    """The sample time in s of a time by its first and last two stamps; ValueError where they do not
-    agree.
+def places(count: int) -> list[int]:
+    """Where a time is looked at that is too long to be read: its ends, and some between."""
+    between = np.linspace(0, count - 1, min(count, _PLACES)).astype(int)
+    return sorted({0, 1, count - 2, count - 1, *between.tolist()})
+
+
+def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "") -> float:
+    """The sample time in s of a time by its stamps ``at`` some rows, the first two and the last two
+    among them; ValueError where these do not agree, or samples are missing between.
     """
     import pandas as pd
 
-    plain, unit = named(name)
+    plain, told = named(name)
     try:
-        t, _ = in_seconds(plain, pd.Series(stamps), unit)
+        t, _ = in_seconds(plain, pd.Series(stamps), told or unit)
     except InputError as error:
         raise InputError(f"{origin}: {error}") from None
-    step, steps = float(t[-1] - t[0]) / (count - 1), (float(t[1] - t[0]), float(t[-1] - t[-2]))
-    if not np.isfinite(step) or step <= 0 or any(abs(s - step) > _EVEN * step for s in steps):
+    step, steps = float(t[-1] - t[0]) / at[-1], (float(t[1] - t[0]), float(t[-1] - t[-2]))
+    if not np.isfinite(step) or step <= 0 or not all(abs(s - step) <= _EVEN * step for s in steps):
         raise InputError(
             f"{origin}: the time {name!r} is not even: its first step is {steps[0]:g} s and the "
             f"mean one {step:g} s; where it is, but for rounding, give dt in s"
+        )
+    off = np.diff(t) - step * np.diff(at)
+    # a sample that is missing between two places is a whole step, rounding less than half of one
+    wrong = ~(np.abs(off) <= step / 2)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(
+            f"{origin}: the time {name!r} is not even: rows {at[row]} to {at[row + 1]} take "
+            f"{t[row + 1] - t[row]:.9g} s, at {step:g} s on average; read the file with "
+            "resample=True, or give dt in s where the samples are even"
         )
     # a time printed with few digits carries their rounding
     return float(f"{step:.9g}")

@@ -145,6 +145,12 @@ def _converted(column: Column) -> Column | None:
     # what pandas takes for a count of nanoseconds is a number that it could not read
     numbers = column.astype(str).str.fullmatch(_NUMERAL)
     if numbers.any():
+        others = column[~numbers & column.notna()]
+        if len(others) and 2 * len(others) < len(column):
+            raise InputError(
+                f"column {column.name!r} holds {others.iloc[0]!r} in row {others.index[0]} among "
+                "its numbers; mend or leave out the row"
+            )
         cell = column[numbers].iloc[-1]
         raise InputError(
             f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
@@ -192,12 +198,22 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
                 f"the unit of {name!r} is {wanted!r}; expected one of {', '.join(UNITS)}"
             )
         scale = UNITS[wanted.casefold()]
+        if _since_1970(column, scale):
+            # whole numbers keep digits that their seconds have not
+            return _scaled(values - values[0], scale), f"{wanted} since 1970"
         return _scaled(values, scale), wanted
     size = float(np.nan_to_num(np.abs(column.to_numpy(dtype=float)), nan=0.0).max(initial=0))
     for least, most, scale, text in EPOCHS:
         if least < size < most:
             return _scaled(values - values[0], scale), f"{text} since 1970"
     return values, "s"
+
+
+def _since_1970(column: Column, scale: float) -> bool:
+    """Whether a column counts units of so many seconds since 1970."""
+    size = np.abs(column.to_numpy().astype(float))
+    largest = float(size.max(initial=0, where=np.isfinite(size)))
+    return any(least < largest < most and scale == s for least, most, s, _ in EPOCHS)
 
 
 def of_this_world(name: str, seconds: FloatArray) -> FloatArray:

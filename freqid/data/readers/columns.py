@@ -30,11 +30,26 @@ def in_numbers(values: object) -> object:
     return array / np.timedelta64(1, "s") if array.dtype.kind == "m" else values
 
 
+def unit_of(attributes: Mapping[str, object]) -> str:
+    """The unit that an array's attributes name, ``ms since 2020-01-01`` without its beginning."""
+    for name in ("units", "unit", "Units", "Unit"):
+        told = attributes.get(name)
+        told = told.decode("utf-8", "replace") if isinstance(told, bytes) else told
+        if isinstance(told, str) and told.strip():
+            return told.split(" since ")[0].strip()
+    return ""
+
+
 def step_of(numbers: Mapping[str, float]) -> float | None:
     """The sample time in s that a file's numbers tell by their names, as one or as a rate."""
     step = next((numbers[n] for n in _STEPS if n in numbers), None)
     rate = next((numbers[n] for n in _RATES if n in numbers), None)
     return 1 / rate if step is None and rate is not None and rate > 0 else step
+
+
+def _is_long(x: Array) -> bool:
+    """Whether whole numbers have more digits than a double."""
+    return x.dtype.kind in "iu" and x.ndim == 1 and x.size > 1 and int(np.abs(x).max()) > 2**53
 
 
 def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
@@ -56,8 +71,10 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
                 continue
             # complex samples stay so: who uses that column is told
             # a long double beyond a double is no number, as whoever uses that column is told
+            # whole numbers that a double would round, stamps since 1970, stay so too
             with np.errstate(over="ignore", invalid="ignore"):
-                x = x if x.dtype.kind == "c" and x.imag.any() else x.real.astype(float)
+                if not (_is_long(x) or (x.dtype.kind == "c" and x.imag.any())):
+                    x = x.real.astype(float)
         except (TypeError, ValueError):
             continue
         if not x.size:
@@ -80,7 +97,7 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
             # coefficients, sizes, a list of names' lengths: no channel beside so many samples
             left_out.append(f"array {name!r} of {len(x)} numbers is no channel: left out")
         elif len(x) > 1 and N % len(x) == 0 and name != "time":
-            full[name] = np.full(N, np.nan, dtype=x.dtype)
+            full[name] = np.full(N, np.nan, dtype=complex if x.dtype.kind == "c" else float)
             full[name][:: N // len(x)] = x
         else:
             raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import Array, InputError
-from freqid.data.readers.columns import CLOCKS, columns_of
+from freqid.data.readers.columns import CLOCKS, columns_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
 from freqid.data.readers.limits import check_size
@@ -29,11 +29,15 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
         raise missing("HDF5", "h5py", "hdf5") from None
     check_structure(path)
     found: dict[str, dict[str, Array]] = {}
+    units: dict[str, str] = {}
     taken = 0.0
 
     def keep(name: str, item: object) -> None:
         nonlocal taken
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not name.startswith("#"):
+            if item.shape is None:
+                # an empty data set, which has no shape
+                return
             # samples that lie in another file, which the file's maker chose, are not fetched
             if item.external or item.is_virtual:
                 raise InputError(f"{name!r} refers to another file, which is not read; copy it in")
@@ -41,6 +45,7 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
             check_size(path, taken)
             parent, _, leaf = name.rpartition("/")
             found.setdefault(parent, {})[leaf] = item[()]
+            units[leaf] = unit_of(item.attrs)
             clocks = {n: v for n, v in item.parent.attrs.items() if n in CLOCKS and np.size(v) == 1}
             found[parent] |= {n: np.asarray(v).reshape(()) for n, v in clocks.items()}
 
@@ -53,4 +58,6 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
     except Exception as error:
         # h5py has errors of many kinds for a file that is not what it says
         raise damaged("HDF5", error) from None
-    return columns_of(of_one_group(found, group, "group"))
+    frame = columns_of(of_one_group(found, group, "group"))
+    frame.attrs["units"] = {n: unit for n, unit in units.items() if unit and n in frame.columns}
+    return frame

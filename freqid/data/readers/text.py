@@ -6,6 +6,7 @@ import bz2
 import gzip
 import io
 import lzma
+import re
 import zipfile
 import zlib
 from pathlib import Path
@@ -36,6 +37,8 @@ def unzipped(path: Path, mode: str) -> IO[bytes]:
 
 # part of a text that may be no plain characters
 _ODD = 0.2
+# characters in which names stand, and of one of them
+_HEAD, _NAME = 4000, 100
 _TWICE = 4
 # what zipfile raises for archives that are damaged, locked or of a kind of its own
 _NO_ARCHIVE = zipfile.BadZipFile, NotImplementedError, RuntimeError, KeyError
@@ -53,6 +56,7 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     if "\r" in text:
         # line ends of other machines, and of old ones
         text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = _plain(text)
     text, clock, said = body_of(text)
     # lines as pandas counts them: splitlines() ends some at form feeds, too
     lines = [line for line in text[: 400 * LOOK].split("\n")[:LOOK] if line.strip()]
@@ -80,6 +84,23 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
         frame["time"] = clock[0] + clock[1] * frame["time"].to_numpy(dtype=float)
     frame.attrs["notes"] = [*said, *frame.attrs.get("notes", [])]
     return frame
+
+
+def _plain(text: str) -> str:
+    """The text with names in one line, and infinite or undefined numbers as words that are known.
+
+    Excel breaks lines within quoted names; old programs of Microsoft's print ``-1.#IND``, whose
+    end would be a comment.
+    """
+    head, rest = text[:_HEAD], text[_HEAD:]
+    parts = head.split('"')
+    if len(parts) % 2 and any("\n" in part for part in parts[1::2]):
+        parts[1::2] = [" ".join(p.split("\n")) if len(p) < _NAME else p for p in parts[1::2]]
+        text = '"'.join(parts) + rest
+    if re.search(r"1[.,]#", text):
+        text = re.sub(r"(?<![\w.])([+-]?)1[.,]#INF\w*(\+\d+)?", r"\1inf", text)
+        text = re.sub(r"(?<![\w.])[+-]?1[.,]#(IND|QNAN|SNAN)\w*(\+\d+)?", "nan", text)
+    return text
 
 
 def _begin(text: str, skipped: int) -> int:

@@ -1,0 +1,28 @@
+"""Cells of a table that hold no numbers, named so that they can be found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def no_number(frame: pd.DataFrame, names: Sequence[str]) -> InputError:
+    """The error for the first cell of columns that is neither a number nor blank."""
+    import pandas as pd
+
+    for name in names:
+        wrong = frame[name].notna() & pd.to_numeric(frame[name], errors="coerce").isna()
+        if wrong.any():
+            row = int(np.argmax(wrong.to_numpy()))
+            return InputError(
+                f"column {name!r} holds {frame[name].iloc[row]!r:.60} in row {row}, which is not a "
+                "number; mend or leave out the row"
+            )
+    return InputError(f"columns {list(names)} hold values that are not numbers")

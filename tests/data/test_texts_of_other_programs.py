@@ -1,0 +1,64 @@
+"""Text tables with names in two lines, words for infinite numbers, and one bad cell."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+ROWS = [[f"{0.01 * i:.2f}", f"{i % 7}", f"{i % 5}"] for i in range(200)]
+
+
+def written(tmp_path, rows, head="time,u,y"):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([head, *(",".join(r) for r in rows)]) + "\n")
+    return path
+
+
+def with_cell(row, column, text):
+    rows = [list(r) for r in ROWS]
+    rows[row][column] = text
+    return rows
+
+
+@pytest.mark.parametrize(
+    "text", ["1.#INF", "-1.#INF", "1.#INF000e+000", "-1.#IND", "1.#QNAN", "1.#SNAN00"]
+)
+@pytest.mark.parametrize("column", [1, 2])
+def test_old_words_for_no_number_are_none(tmp_path, text, column):
+    with pytest.raises(ValueError, match=r"(NaN|infinite).*row 40"):
+        fq.read(written(tmp_path, with_cell(40, column, text)))
+
+
+def test_names_of_two_lines_are_names(tmp_path):
+    path = written(tmp_path, [[str(10 * i), r[1], r[2]] for i, r in enumerate(ROWS)],
+                   '"Time\n(ms)","Torque\n[N m]","Speed"')  # fmt: skip
+    record = fq.read(path, inputs="Torque", outputs="Speed")
+    assert record.dt == pytest.approx(0.01)
+    assert record.units == {"Torque": "N m"}
+    assert record.n_samples == 200
+
+
+def test_quoted_rows_are_not_joined(tmp_path):
+    path = tmp_path / "quoted.csv"
+    rows = [["time", "u", "y"], *ROWS]
+    path.write_text("\n".join(",".join(f'"{c}"' for c in r) for r in rows) + "\n")
+    np.testing.assert_array_equal(fq.read(path).u, [float(r[1]) for r in ROWS])
+
+
+def test_a_stray_quotation_mark_joins_nothing(tmp_path):
+    record = fq.read(written(tmp_path, ROWS, 'time,u 5",y'))
+    assert record.n_samples == 200
+
+
+@pytest.mark.parametrize("text", ["0.1x45", "OVL"])
+@pytest.mark.parametrize("column", [0, 2])
+def test_a_cell_that_is_no_number_is_named_with_its_row(tmp_path, text, column):
+    with pytest.raises(
+        ValueError, match=rf"'{['time', 'u', 'y'][column]}' holds '{text}' in row 150"
+    ):
+        fq.read(written(tmp_path, with_cell(150, column, text)))
+
+
+def test_a_last_line_of_words_is_named(tmp_path):
+    with pytest.raises(ValueError, match="holds 'End of file' in row 200"):
+        fq.read(written(tmp_path, [*ROWS, ["End of file"]]))

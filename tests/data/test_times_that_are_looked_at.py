@@ -1,0 +1,98 @@
+"""Times of files: stamps since 1970, units beside them, and gaps that only a look between shows."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+
+N = 20_000
+U = np.random.default_rng(0).standard_normal((N, 2))
+
+
+def written(path, time, rows=U, unit=None, name="time"):
+    if path.suffix == ".parquet":
+        name = name if unit is None else f"{name} [{unit}]"
+        pd.DataFrame({name: time, "u": rows[:, 0], "y": rows[:, 1]}).to_parquet(
+            path, row_group_size=3000
+        )
+    else:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            file[name], file["u"], file["y"] = time, rows[:, 0], rows[:, 1]
+            if unit is not None:
+                file[name].attrs["units"] = unit
+    return path
+
+
+KINDS = pytest.mark.parametrize("kind", [".parquet", ".h5"])
+
+
+@KINDS
+@pytest.mark.parametrize("lost", [1, 100])
+@pytest.mark.parametrize("at", [3000, 7001, 12_000])
+def test_samples_that_are_missing_in_the_middle_are_told(tmp_path, kind, lost, at):
+    keep = np.ones(N, bool)
+    keep[at : at + lost] = False
+    path = written(tmp_path / f"gap{kind}", 0.01 * np.arange(N)[keep], U[keep])
+    with pytest.raises(ValueError, match=rf"gap\{kind}.*not even: rows \d+ to \d+ take"):
+        fq.open(path, "u", "y")
+    # whoever knows better says so
+    assert fq.open(path, "u", "y", dt=0.01).n_samples == N - lost
+
+
+@KINDS
+def test_times_with_few_digits_are_even(tmp_path, kind):
+    path = written(tmp_path / f"t{kind}", np.round(0.0123 * np.arange(N), 3))
+    with pytest.raises(ValueError, match="not even: its first step"):
+        fq.open(path, "u", "y")
+    path = written(tmp_path / f"other{kind}", np.round(0.0123 * np.arange(N), 5))
+    assert fq.open(path, "u", "y").dt == pytest.approx(0.0123, rel=1e-6)
+
+
+@KINDS
+def test_a_time_that_is_no_number_is_told(tmp_path, kind):
+    time = 0.01 * np.arange(N)
+    time[1] = np.nan
+    # pandas writes it to Parquet as a blank
+    with pytest.raises(ValueError, match=r"nan.*(not even: its first step|1 blanks)"):
+        fq.open(written(tmp_path / f"nan{kind}", time), "u", "y")
+
+
+@KINDS
+@pytest.mark.parametrize(("unit", "scale"), [("ms", 1e3), ("us", 1e6), ("s", 1.0)])
+def test_units_beside_a_time_count(tmp_path, kind, unit, scale):
+    path = written(tmp_path / f"t{kind}", 0.01 * scale * np.arange(N), unit=unit)
+    assert fq.open(path, "u", "y").dt == pytest.approx(0.01, rel=1e-9)
+    assert fq.read(path, inputs="u", outputs="y").dt == pytest.approx(0.01, rel=1e-9)
+
+
+def test_units_of_hdf5_are_those_of_its_channels(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"], file["u"], file["y"] = np.arange(9.0), np.ones(9), np.arange(9.0) ** 2
+        file["time"].attrs["units"] = "ms since 2020-01-01"
+        file["u"].attrs["unit"] = b"N m"
+        file["empty"] = h5py.Empty("f8")
+    record = fq.read(tmp_path / "a.h5", inputs="u", outputs="y")
+    assert record.dt == pytest.approx(1e-3)
+    assert record.units == {"u": "N m"}
+
+
+@pytest.mark.parametrize("kind", [".csv", ".npz", ".parquet", ".h5"])
+@pytest.mark.parametrize(
+    ("name", "unit"), [("timestamp_us", 1e-6), ("timestamp_ns", 1e-9), ("timestamp", 1e-9)]
+)
+@pytest.mark.parametrize("step", [1e-5, 1e-3])
+def test_stamps_since_1970_keep_their_digits(tmp_path, kind, name, unit, step):
+    since = round(1.7e9 / unit) + round(step / unit) * np.arange(200)
+    path = tmp_path / f"t{kind}"
+    if kind == ".csv":
+        pd.DataFrame({name: since, "u": U[:200, 0], "y": U[:200, 1]}).to_csv(path, index=False)
+    elif kind == ".npz":
+        np.savez(path, u=U[:200, 0], y=U[:200, 1], **{name: since})
+    else:
+        written(path, since, U[:200], name=name)
+    assert fq.read(path, inputs="u", outputs="y").dt == pytest.approx(step, rel=1e-12)
+    if kind in (".parquet", ".h5"):
+        assert fq.open(path, "u", "y").dt == pytest.approx(step, rel=1e-12)
