@@ -22,7 +22,7 @@ def no_number(frame: pd.DataFrame, names: Sequence[str]) -> InputError:
         if wrong.any():
             row = int(np.argmax(wrong.to_numpy()))
             return InputError(
-                f"column {name!r} holds {frame[name].iloc[row]!r:.60} in row {row}, which is not a "
-                "number; mend or leave out the row"
+                f"columns {list(names)} hold values that are not numbers, first "
+                f"{frame[name].iloc[row]!r:.60} in row {row} of {name!r}; mend or leave out the row"
             )
     return InputError(f"columns {list(names)} hold values that are not numbers")
