@@ -27,6 +27,8 @@ Severity = Literal["serious", "minor"]
 _AT_BOUND = 1e-6
 # beyond its physical range by so many standard errors a value is unphysical for certain
 _CERTAIN = 2.0
+# standard deviations of a prior that an estimate is off by chance once in two thousand fits
+_CONTRADICTED = 3.5
 # an estimated hold of so large a part of the sample time says nothing of decimation
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
@@ -177,6 +179,26 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
                     f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
                 )
                 yield Finding("edge of a bound", sentence, number=float(value))
+
+
+@sign
+def prior_contradicted(e: Evidence) -> Iterator[Finding]:
+    """A parameter that the data pull further from its prior than chance does.
+
+    The estimate of a right prior is no further from its mean than the prior's own scatter.
+    """
+    for p, value in zip(e.parameters, e.values, strict=True):
+        if p.prior is None:
+            continue
+        mean, std = p.prior
+        away = abs(value - mean) / std
+        if away > _CONTRADICTED:
+            sentence = (
+                f"{p.name}={value:.6g} lies {away:.3g} standard deviations from its prior "
+                f"{mean:g} ± {std:g}: data and prior contradict each other, and every parameter "
+                "has moved for it; widen the prior, or take it off"
+            )
+            yield Finding("prior contradicted", sentence, number=float(away))
 
 
 @sign

@@ -153,9 +153,15 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
     if start is None:
         return None
     values = dict(start)
+    held = {p.name: p.value for p in model.parameters if p.fixed}
     for name in values:
         if name not in model.values:
-            raise InputError(unknown("start", name, model.values))
+            raise InputError(unknown("start", name, [p.name for p in model.free_parameters]))
+        if name in held and values[name] != held[name]:
+            raise InputError(
+                f"start: {name}={values[name]!r:.80} is fixed at {held[name]:g}, from which no "
+                f"search moves it; give the model with_values({name}=…), or free it"
+            )
     model.with_values(**values)
     return values
 

@@ -18,8 +18,10 @@ _MOVED, _TIMES = 8 * float(np.finfo(float).eps), 3
 VISIBLE = 1e-11
 # and from which on it is said unasked
 _SAID = 1e-9
-# rates further apart than this, or closer as a part of the largest, cost digits
-_APART, _CLOSE = 100.0, 1e-3
+# rates further apart than this, or eigenvectors of this condition, cost digits
+_APART, _CLOSE = 100.0, 1e3
+# a response that is so small a part of the largest is a zero
+_ZERO = 1e-6
 # lines at which a response is tried
 _LINES = 6
 
@@ -77,23 +79,23 @@ def sentence(plant: StateSpace, lost: float) -> str:
 
 
 def _delicate(A: FloatArray, apart: float) -> bool:
-    """Whether rates lie so far apart, or so close, that entries may not tell them well."""
-    poles = np.linalg.eigvals(A)
+    """Whether rates lie so far apart, or eigenvectors so close, that entries may not tell them."""
+    poles, V = np.linalg.eig(A)
     size = np.abs(poles)
     largest = float(size.max())
     if not np.isfinite(largest) or largest == 0 or len(A) == 1:
         return False
-    gaps = np.abs(poles[:, None] - poles) + largest * np.eye(len(A))
-    return bool(size.min() * apart < largest or gaps.min() < _CLOSE * largest)
+    # rates that nearly agree are pulled apart by rounding; their vectors stay near each other
+    return bool(size.min() * apart < largest or np.linalg.cond(V) > _CLOSE)
 
 
 def _seen(plant: StateSpace, hold: Hold, omega: FloatArray) -> list[tuple[Array, float]]:
     """The response, lines first, and the sampled matrices, with the least size that counts: what
     is left of a state after a long step is told against the state, exp(A·0) = I.
     """
-    found = [
-        (np.moveaxis(transfer(basis_of(plant).through(hold), points(omega, hold)), -1, 0), 0.0)
-    ]
+    G = np.moveaxis(transfer(basis_of(plant).through(hold), points(omega, hold)), -1, 0)
+    # a zero, as a double integrator has one at half the sample rate, is told by the other lines
+    found = [(G, _ZERO * float(np.abs(G).max(initial=0)))]
     if isinstance(hold, PeriodicHold):
         phi, *gammas = hold.sampled(plant.A, plant.B)
         found += [(phi[None], 1.0), *((gamma[None], 0.0) for gamma in gammas)]

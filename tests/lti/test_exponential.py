@@ -120,3 +120,22 @@ def test_a_fit_says_what_rounding_leaves():
     assert found
     assert found[0].severity == "minor"
     assert found[0].number > 1e-6
+
+
+def test_equal_lags_that_were_mixed_are_told():
+    """Rounding pulls their rates apart, by the sixth root of a last digit."""
+    rng, n = np.random.default_rng(4), 6
+    A = -11 * np.eye(n) + np.diag(np.full(n - 1, 1000.0), 1)
+    Q = np.linalg.qr(rng.standard_normal((n, n)))[0]
+    A, B, C = Q @ A @ Q.T, rng.standard_normal((n, 1)), rng.standard_normal((1, n))
+    model = fq.GreyBox(lambda k: (A * k, B, C, None), [fq.Parameter("k", 1.0)])
+    with pytest.warns(RuntimeWarning, match="rounding: the model's matrices"):
+        fq.simulate(model, np.ones(200), 0.02)
+
+
+def test_a_zero_on_a_line_is_no_loss():
+    body = StateSpace(
+        np.array([[0.0, 1.0], [0.0, -5e-10]]), np.array([[0.0], [0.5]]), np.array([[1.0, 0.0]]),
+        np.zeros((1, 1)),
+    )  # fmt: skip
+    assert rounding(body, fq.ZeroOrderHold(0.01), np.pi / 0.01 * np.array([0.1, 0.3, 1.0])) < 1e-9
