@@ -31,6 +31,8 @@ P = ParamSpec("P")
 State = dict[str, Any]
 # processes that may be asked for; samples that a signal may have: 64 GiB of them
 _PROCESSES = 10_000
+# channels of a single sample that are samples of a single channel
+_ACROSS = 64
 _MOST = 2**33
 
 
@@ -183,6 +185,11 @@ def samples(name: str, values: ArrayLike) -> FloatArray:
     if array.ndim not in (1, 2) or array.size == 0:
         raise InputError(
             f"{name} has shape {array.shape}; expected (N,) or (N, channels) at least one sample"
+        )
+    if array.ndim == 2 and len(array) == 1 and array.shape[1] > _ACROSS:
+        raise InputError(
+            f"{name} has shape {array.shape}: {array.shape[1]} channels of one sample; samples go "
+            f"down, give {name}.T"
         )
     bad = ~np.isfinite(array)
     if bad.any():

@@ -108,7 +108,10 @@ class Asked:
     delay: Annotated[
         str | None, Option(help="transfer-function with a delay in s, or 'estimate'")
     ] = None
-    fix: Annotated[list[str] | None, _several("parameters that keep their values")] = None
+    fix: Annotated[
+        list[str] | None,
+        _several("parameters that keep their values, those of --start where it has them"),
+    ] = None
     bounds: Annotated[Limits, Option(help="NAME LOW HIGH of the search")] = None
     prior: Annotated[Limits, Option(help="NAME MEAN STD that were known before")] = None
     start: Annotated[list[str] | None, _several("NAME=VALUE to begin from, as often as wanted")] = (
@@ -119,6 +122,9 @@ class Asked:
         """The model, fixed, bounded and believed in as was asked."""
         box = self.order, self.zeros, self.poles, self.feedthrough, self.stable, self.delay
         found = model_of(self.model, *box)
+        if isinstance(found, GreyBox) and self.fix:
+            # what is fixed and begun from is fixed there
+            found = found.with_values(**{n: v for n, v in self.values().items() if n in self.fix})
         return with_options(found, self.fix or (), self.bounds or (), self.prior or ())
 
     def grey_box(self) -> GreyBox:

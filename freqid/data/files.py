@@ -6,12 +6,13 @@ import dataclasses
 import os
 import re
 import secrets
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from freqid.checks import InputError, an, flag, path_of, unknown
+from freqid.checks import InputError, an, flag, listed, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
@@ -157,7 +158,7 @@ def _known(names: Sequence[str] | str | None, frame: pd.DataFrame) -> Sequence[s
     """Columns as the frame calls them: the unit in brackets behind a name may be given or not."""
     if names is None:
         return None
-    given = [names] if isinstance(names, str) else list(names)
+    given = [names] if isinstance(names, str) else listed("columns", names)
     plain = [n if n in frame.columns or named(n)[0] not in frame.columns else named(n)[0]
              for n in given]  # fmt: skip
     return plain[0] if isinstance(names, str) else plain
@@ -226,7 +227,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     """A path beside ``path`` to write to, renamed into place when the block ends well."""
     path = Path(path)
     with naming(path):
-        yield from _renamed(path)
+        # what a link points to is replaced, not the link
+        yield from _renamed(path.resolve() if path.is_symlink() else path)
 
 
 def _renamed(path: Path) -> Iterator[Path]:
@@ -240,6 +242,9 @@ def _renamed(path: Path) -> Iterator[Path]:
     # made here, so that nobody else's is taken and the rights are those of any new file
     made = os.open(beside, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     try:
+        if path.exists():
+            # who could not read the old one is not to read the new one
+            beside.chmod(stat.S_IMODE(path.stat().st_mode))
         os.close(made)
         yield beside
         with beside.open("rb") as file:

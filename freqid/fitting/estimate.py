@@ -131,10 +131,10 @@ class Estimate(Questioned, Shown):
         self.__dict__.update(state)
 
     def __getitem__(self, name: str) -> float:
-        if name in self.names:
+        if isinstance(name, str) and name in self.names:
             return float(self.values[list(self.names).index(name)])
         fixed = getattr(self.model, "values", {})
-        if name in fixed:
+        if isinstance(name, str) and name in fixed:
             return float(fixed[name])
         raise KeyError(unknown("parameter", name, self.names))
 

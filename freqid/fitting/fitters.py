@@ -67,5 +67,8 @@ def fitter_of(model: object) -> Fitter:
     """The function that fits a model; ValueError for what nothing fits."""
     if type(model) not in FITTERS:
         names = ", ".join(kind.__name__ for kind in FITTERS)
-        raise InputError(f"model={type(model).__name__} is not a model; expected one of {names}")
+        call = ": call it first" if callable(model) else ""
+        raise InputError(
+            f"model={type(model).__name__} is not a model{call}; expected one of {names}"
+        )
     return FITTERS[type(model)]

@@ -154,7 +154,7 @@ def spectral(
             f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
             "segments or more experiments"
         )
-    _excited(mean["uu"], first)
+    _excited(mean["uu"], f[keep], first)
     joint = None
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
@@ -182,12 +182,18 @@ def powers(S: ComplexArray) -> FloatArray:
     return np.einsum("kii->ki", S).real
 
 
-def _excited(uu: ComplexArray, first: Record | Stream) -> None:
-    """ValueError for inputs that stand still, or move together."""
+def _excited(uu: ComplexArray, frequency: FloatArray, first: Record | Stream) -> None:
+    """ValueError for inputs that stand still, at some lines or at all, or move together."""
     power = powers(uu)
     if not (power.max(axis=0) > 0).all():
         silent = first.input_names[int(np.argmin(power.max(axis=0)))]
         raise InputError(f"input {silent!r} is constant in the band; it excites nothing")
+    idle = np.asarray(~(power > 0).all(axis=1))
+    if idle.any():
+        raise InputError(
+            f"an input has no power at {idle.sum()} of {len(idle)} lines, the first at "
+            f"{frequency[idle.argmax()]:g} Hz; give a band= that it excites"
+        )
     size = np.sqrt(np.where(power > 0, power, 1))
     least = np.linalg.eigvalsh(uu / (size[:, :, None] * size[:, None, :]))[:, 0]
     if uu.shape[-1] > 1 and np.median(least) < 1e-10:

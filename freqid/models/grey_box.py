@@ -198,11 +198,11 @@ class GreyBox(Model):
 
     def fix(self, *names: str) -> GreyBox:
         """The same plant with these parameters held at their values in a fit."""
-        return self._changed({name: {"fixed": True} for name in names})
+        return self._changed({self.parameter(n).name: {"fixed": True} for n in names})
 
     def free(self, *names: str) -> GreyBox:
         """The same plant with these parameters estimated in a fit."""
-        return self._changed({name: {"fixed": False} for name in names})
+        return self._changed({self.parameter(n).name: {"fixed": False} for n in names})
 
     def with_bounds(self, **bounds: tuple[float, float]) -> GreyBox:
         """The same plant with other search bounds, ``with_bounds(k=(1e4, 1e6))``."""

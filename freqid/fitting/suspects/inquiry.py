@@ -156,6 +156,10 @@ class Inquiry:
         if not merged:
             return []
         ranked = ordered(list(merged.values()), scene)
+        if "hold rejected" in merged and not all(_remembered(r) for r in self.readings):
+            # the record says another hold itself: what is left is no loop's
+            others = [a for a in ranked if a.name not in ("hold rejected", "feedback")]
+            return [merged["hold rejected"], *others]
         # a fault that explains what is left leaves no room for a loop
         runaway = bool((self.model.poles.real > 0).any()) and not self.model.dt
         alike = "unlike experiments" not in merged and self.share is None
@@ -284,3 +288,9 @@ def _equally_weighted(reading: Reading) -> bool:
     """Whether errors of a response were taken to be of one size at all of its lines."""
     plain = reading.noise.plain and not reading.logarithmic
     return isinstance(reading.data, FrequencyResponse) and plain
+
+
+def _remembered(reading: Reading) -> bool:
+    """Whether data are read under the hold that they remember."""
+    told = getattr(reading.data, "hold", None)
+    return told is None or told == reading.hold
