@@ -31,9 +31,9 @@ P = ParamSpec("P")
 State = dict[str, Any]
 # processes that may be asked for; samples that a signal may have: 64 GiB of them
 _PROCESSES = 10_000
+_MOST = 2**33
 # channels of a single sample that are samples of a single channel
 _ACROSS = 64
-_MOST = 2**33
 
 
 class InputError(ValueError):
