@@ -27,8 +27,9 @@ Severity = Literal["serious", "minor"]
 _AT_BOUND = 1e-6
 # beyond its physical range by so many standard errors a value is unphysical for certain
 _CERTAIN = 2.0
-# standard deviations of a prior that an estimate is off by chance once in two thousand fits
-_CONTRADICTED = 3.5
+# standard deviations between data and prior that are chance once in two thousand fits, and part of
+# a prior's own that is the least which data can be seen to have taken off
+_CONTRADICTED, _LEAST_TAKEN = 3.5, 0.05
 # an estimated hold of so large a part of the sample time says nothing of decimation
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
@@ -183,22 +184,24 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
 
 @sign
 def prior_contradicted(e: Evidence) -> Iterator[Finding]:
-    """A parameter that the data pull further from its prior than chance does.
+    """A prior that what the data say by themselves contradicts.
 
-    The estimate of a right prior is no further from its mean than the prior's own scatter.
+    An estimate scatters about the mean of a right prior by what the data have taken off its
+    variance (the innovation of a Kalman filter).
     """
-    for p, value in zip(e.parameters, e.values, strict=True):
-        if p.prior is None:
+    for p, value, error in zip(e.parameters, e.values, e.std, strict=True):
+        if p.prior is None or not np.isfinite(error):
             continue
         mean, std = p.prior
-        away = abs(value - mean) / std
+        taken = std * np.sqrt(max(1 - (error / std) ** 2, _LEAST_TAKEN**2))
+        away = float(abs(value - mean) / taken)
         if away > _CONTRADICTED:
             sentence = (
-                f"{p.name}={value:.6g} lies {away:.3g} standard deviations from its prior "
-                f"{mean:g} ± {std:g}: data and prior contradict each other, and every parameter "
-                "has moved for it; widen the prior, or take it off"
+                f"{p.name}={value:.6g} beside its prior {mean:g} ± {std:g}: the data by themselves "
+                f"are {away:.3g} standard deviations from it, and every parameter has moved for "
+                "it; widen the prior, or take it off"
             )
-            yield Finding("prior contradicted", sentence, number=float(away))
+            yield Finding("prior contradicted", sentence, number=away)
 
 
 @sign

@@ -11,7 +11,7 @@ from freqid.data import replacing
 def measured(tmp_path, monkeypatch):
     """A file of another program's, and nothing that this process knows of."""
     monkeypatch.setattr(replacing, "_READ", set())
-    monkeypatch.setattr(replacing, "_WRITTEN", set())
+    monkeypatch.setattr(replacing, "_WRITTEN", {})
     path = tmp_path / "run.csv"
     path.write_text("time,u,y\n" + "".join(f"{0.01 * i},{i % 7},{i % 5}\n" for i in range(50)))
     return path
@@ -53,3 +53,27 @@ def test_what_this_process_wrote_it_may_write_again(measured, tmp_path):
 def test_only_a_truth_is_a_truth(measured):
     with pytest.raises(ValueError, match="overwrite"):
         fq.write(fq.Record(np.ones(4), np.arange(4.0), 0.01), measured, overwrite="yes")
+
+
+def test_a_file_that_another_program_has_written_since_is_not_this_process_own(tmp_path):
+    record = fq.Record(np.ones(4), np.arange(4.0), 0.01)
+    path = tmp_path / "out.csv"
+    fq.write(record, path)
+    path.write_text("time,u,y\n0,1,2\n0.1,3,4\n0.2,5,6\n")
+    back = fq.read(path)
+    with pytest.raises(ValueError, match="a file that was read, which is never overwritten"):
+        fq.write(back, path)
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o644])
+def test_a_file_that_is_replaced_keeps_its_rights_and_its_links(tmp_path, mode):
+    record = fq.Record(np.ones(4), np.arange(4.0), 0.01)
+    path, link = tmp_path / "a.npz", tmp_path / "link.npz"
+    path.write_bytes(b"old")
+    path.chmod(mode)
+    link.symlink_to(path)
+    fq.write(record, link, overwrite=True)
+    assert link.is_symlink()
+    assert path.stat().st_mode & 0o777 == mode
+    assert fq.read(path).n_samples == 4
+    assert len(list(tmp_path.iterdir())) == 2

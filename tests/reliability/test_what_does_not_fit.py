@@ -54,6 +54,27 @@ REFUSALS = {
         lambda: fq.multisine([1.0, 2.0], 1.0, DT, powers=[0.0, 0.0]),
         "powers are all zero",
     ),
+    "rows for columns": (
+        lambda: fq.Record(RECORD.u[None], RECORD.y[None], DT),
+        "channels of one sample; samples go down",
+    ),
+    "a list where one name is wanted": (lambda: PLANT.fix(["a", "b"]), "parameter=['a', 'b']"),
+    "a function for a model": (
+        lambda: fq.fit(fq.first_order, RECORD),
+        "model=function is not a model: call it first",
+    ),
+    "an input without power at some lines": (
+        lambda: fq.h1(fq.Record(np.arange(200) % 2.0, RECORD.y[:200], DT), 20),
+        "an input has no power at 1 of 10 lines, the first at",
+    ),
+    "matrices that are not finite": (
+        lambda: fq.ZeroOrderHold(1.0).sampled(np.array([[np.nan]]), np.ones((1, 1))),
+        "A has entries that are NaN or infinite",
+    ),
+    "matrices that are complex": (
+        lambda: fq.ZeroOrderHold(1.0).sampled(np.array([[1j]]), np.ones((1, 1))),
+        "A is complex",
+    ),
     "a register too long": (lambda: fq.PRBSSpectrum(30), "at most 24"),
     "a channel that is not there": (lambda: fq.MeasuredSpectrum(RECORD, channel=1), "channel=1"),
     "a difference of unlike records": (lambda: RECORD - RECORD.slice(0, 0.5), "unlike lengths"),

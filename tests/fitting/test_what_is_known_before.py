@@ -1,0 +1,59 @@
+"""Priors that the data contradict, and starts of what no search moves."""
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+
+@pytest.fixture(scope="module")
+def record():
+    u = fq.chirp(2, 40, 4, 5e-3)
+    return fq.simulate(fq.first_order(), u, 5e-3).with_noise(0.02, seed=3)
+
+
+@pytest.mark.parametrize("away", [-40.0, 6.0])
+def test_a_prior_that_the_data_contradict_is_said(record, away):
+    plant = fq.first_order()
+    alone = fq.fit(plant, record)
+    std = float(alone.parameters.loc["a", "std"])
+    est = fq.fit(plant.with_prior(a=(alone["a"] + away * std, 0.1 * std)), record)
+    said = [w for w in est.warnings if w.kind == "prior contradicted"]
+    assert len(said) == 1
+    assert "a=" in said[0]
+    assert said[0].number == pytest.approx(abs(away) / np.sqrt(1.01), rel=0.1)
+    assert est.verdict.grade != "trust"
+
+
+def test_right_priors_are_seldom_contradicted(record):
+    """Of a hundred priors whose means scatter as they say none is far off."""
+    rng, plant = np.random.default_rng(0), fq.first_order()
+    alone = fq.fit(plant, record)
+    truth, std = plant["a"], float(alone.parameters.loc["a", "std"])
+    for width in (0.3, 1.0, 10.0):
+        for _ in range(8):
+            prior = truth + width * std * rng.standard_normal(), width * std
+            est = fq.fit(plant.with_prior(a=prior), record)
+            assert not [w for w in est.warnings if w.kind == "prior contradicted"]
+
+
+def test_a_start_of_a_fixed_parameter_is_refused_unless_it_is_its_value(record):
+    plant = fq.first_order().fix("b")
+    with pytest.raises(ValueError, match=r"start: b=7.* is fixed at .*with_values\(b="):
+        fq.fit(plant, record, start={"b": 7.0})
+    est = fq.fit(plant, record, start={"b": plant["b"], "a": 1.2 * plant["a"]})
+    assert list(est.names) == ["a"]
+    with pytest.raises(ValueError, match=r"start='c' is not one of"):
+        fq.fit(plant, record, start={"c": 7.0})
+
+
+def test_a_hold_that_the_record_contradicts_is_no_loop():
+    """The paper's experiment: what a wrong hold leaves looks like a loop, too."""
+    fast, slow = fq.paper.study_records()
+    for record in (slow, fast.decimate(10)):
+        for hold in ("foh", "bl"):
+            est = fq.fit(fq.two_mass(), record, hold=hold, band=(10, 80))
+            kinds = [w.kind for w in est.warnings]
+            assert kinds[0] == "hold rejected"
+            assert "feedback" not in kinds
+            assert est.verdict.grade == "do not use"
