@@ -54,11 +54,19 @@ plant = fq.GreyBox(lag, [fq.Parameter("a", 20.0, lower=0.1), fq.Parameter("b", 9
     [
         fq.two_mass().fix("d"),
         fq.two_mass().tie(Ja="1e4 * Jm").with_bounds(k=(1e4, np.inf)),
+        fq.two_mass().with_bounds(d=(-np.inf, 100.0)).with_prior(k=(1.5e5, 1e4)),
         fq.drivetrain(2),
         fq.OutputError(3),
         fq.TransferFunction(2, 3),
     ],
-    ids=["fixed", "tied and bounded", "with arguments", "output error", "transfer function"],
+    ids=[
+        "fixed",
+        "tied and bounded",
+        "wide and believed in",
+        "with arguments",
+        "output error",
+        "transfer function",
+    ],
 )
 def test_it_runs_and_gives_the_same_numbers(model, file, tmp_path):
     est = fq.fit(model, fq.read(file, inputs="u"), band=(10, 80))
@@ -98,6 +106,20 @@ def test_what_no_file_holds_is_said(tmp_path):
     code = lines(fq.fit(plant, record), tmp_path)
     assert re.search(r"^model = \.\.\.  # <GreyBox", code, re.M)
     assert re.search(r"^data = \.\.\.  # <Record .*SHA-256 [0-9a-f]{12}$", code, re.M)
+    compile(code, "recipe", "exec")
+
+
+def test_a_function_with_others_around_it_is_said(tmp_path):
+    def lag_of(gain):
+        def lag(a):
+            return [[-a]], [[gain]], [[1.0]], None
+
+        return lag
+
+    plant = fq.GreyBox(lag_of(3.0), [fq.Parameter("a", 20.0)])
+    record = fq.simulate(plant, fq.white_noise(300), 1e-3).with_noise(0.001)
+    code = lines(fq.fit(plant, record), tmp_path)
+    assert re.search(r"^model = \.\.\.  # <GreyBox", code, re.M)
     compile(code, "recipe", "exec")
 
 

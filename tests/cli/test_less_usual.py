@@ -1,0 +1,120 @@
+"""Commands as they are used less often: options that do not go together, own plants, no plot."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+from freqid.cli import commands
+from freqid.cli.plants import from_file, in_python
+
+PLANT = """
+import freqid as fq
+
+def lag(a, b):
+    return [[-a]], [[b]], [[1.0]], None
+
+plant = fq.GreyBox(lag, [fq.Parameter("a", 20.0), fq.Parameter("b", 30.0)])
+box = fq.OutputError(2)
+
+def made():
+    return plant
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A record of a lag of 25 rad/s and a plant of one's own."""
+    monkeypatch.chdir(tmp_path)
+    Path("mine.py").write_text(PLANT)
+    scope = {}
+    exec(PLANT, scope)
+    truth = scope["plant"].with_values(a=25.0)
+    record = fq.simulate(truth, fq.white_noise(2000, seed=1), 0.005).with_noise(0.001, seed=2)
+    fq.write(record, "log.csv")
+    return tmp_path
+
+
+def run(*arguments):
+    with pytest.raises(SystemExit) as end:
+        commands.main([str(a) for a in arguments])
+    return end.value.code
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--reference", "r"], "--reference needs --method h1"),
+        (["--method", "lpm", "--segment", "200"], "--segment needs --method h1"),
+    ],
+)
+def test_options_of_frf_that_do_not_go_together(folder, options, words, capsys):
+    table = fq.read("log.csv").to_frame().assign(r=1.0)
+    table.to_csv("loop.csv")
+    told = ["--input", "u", "--output", "y"]
+    assert run("frf", "loop.csv", *told, *options, "--out", "frf.csv") == 2
+    assert words in capsys.readouterr().err
+    assert not Path("frf.csv").exists()
+
+
+def test_frf_to_a_table_alone(folder, capsys):
+    assert run("frf", "log.csv", "--method", "h1", "--segment", "200", "--out", "frf.csv") == 0
+    frf = fq.read_response("frf.csv")
+    assert len(frf.frequency) == 100
+    np.testing.assert_allclose(frf.response, fq.h1(fq.read("log.csv"), 200).response)
+
+
+def test_what_is_fixed_and_begun_from_is_fixed_there(folder, capsys):
+    assert run("fit", "log.csv", "--model", "mine.py:plant", "--fix", "b", "--start", "b=30",
+               "--out", "est.json") == 0  # fmt: skip
+    scope = {}
+    exec(PLANT, scope)
+    est = fq.load("est.json", model=scope["plant"].fix("b"))
+    assert est["a"] == pytest.approx(25, rel=0.01)
+    assert run("fit", "log.csv", "--model", "mine.py:plant", "--fix", "b", "--start", "b=33",
+               "--out", "other.json") in (0, 1)  # fmt: skip
+    other = fq.load("other.json", model=scope["plant"].with_values(b=33.0).fix("b"))
+    assert other["b"] == 33.0
+    assert other["a"] != pytest.approx(est["a"], rel=0.01)
+
+
+def test_fleets_begin_where_they_are_told_to(folder, capsys):
+    code = run("fit-many", "log.csv", "--model", "mine.py:plant", "--start", "a=24", "--start",
+               "b=29", "--out", "table.parquet", "--no-verdicts")  # fmt: skip
+    assert code == 0
+    assert pd.read_parquet("table.parquet")["a"].iloc[0] == pytest.approx(25, rel=0.01)
+    # a pattern that takes in nothing but the table itself
+    assert (
+        run("fit-many", "tab*.parquet", "--model", "mine.py:plant", "--out", "table.parquet") == 2
+    )
+    assert "matches no file but" in capsys.readouterr().err
+
+
+def test_the_explorer_takes_plants_with_parameters_alone(folder, capsys):
+    assert run("explore", "log.csv", "--model", "mine.py:box") == 2
+    assert "is no grey box; the explorer moves parameters" in capsys.readouterr().err
+
+
+def test_how_python_comes_by_a_model(folder):
+    assert in_python("two-mass") == ("", "fq.two_mass()")
+    for name in ("plant", "made"):
+        imported, called = in_python(f"mine.py:{name}")
+        scope = {}
+        exec(f"{imported}\nfound = {called}", scope)
+        assert scope["found"]["a"] == 20.0
+
+
+def test_a_model_that_is_no_python(folder):
+    Path("mine.txt").write_text(PLANT)
+    with pytest.raises(ValueError, match=r"mine\.txt is no Python file"):
+        from_file(Path("mine.txt"), "plant")
+
+
+def test_bias_for_one_parameter_to_a_table(folder, capsys):
+    code = run("bias", "--model", "first-order", "--chirp", "5", "20", "--factor", "2", "--base-dt",
+               "0.005", "--parameter", "a", "--out", "bias.csv", "--plot", "bias.png")  # fmt: skip
+    assert code == 0, capsys.readouterr().err
+    assert set(pd.read_csv("bias.csv")["parameter"]) == {"a", "b"}
+    assert Path("bias.png").stat().st_size > 1000
