@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+@dataclasses.dataclass(frozen=True, eq=False, init=False, repr=False)
 class StampedRecord(Record):
     """A Record on a regular grid for what needs one, with the samples as they were logged.
 

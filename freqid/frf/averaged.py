@@ -49,7 +49,8 @@ def h1(
             unbiased.
         state: of a stream, a .npz file in which the sums are kept as they grow: interrupted, or
             after a mistake in the data, a call goes on from there, and one on a log that has grown
-            since reads no more than what is new. Another stream or other options are refused.
+            since reads no more than what is new: samples that were read and have changed since are
+            seen at its beginning alone. Another stream or other options are refused.
         progress: as in ``fit_many``, over the samples of a stream.
 
     Returns a FrequencyResponse (outputs, inputs, K) with variance, coherence (multiple, for several

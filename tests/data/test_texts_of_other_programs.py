@@ -61,3 +61,44 @@ def test_a_cell_that_is_no_number_is_named_with_its_row(tmp_path, text, column):
 def test_a_last_line_of_words_is_named(tmp_path):
     with pytest.raises(ValueError, match="holds 'End of file' in row 200"):
         fq.read(written(tmp_path, [*ROWS, ["End of file"]]))
+
+
+def test_a_unit_behind_in_is_one(tmp_path):
+    rows = [[str(10 * i), r[1], r[2]] for i, r in enumerate(ROWS)]
+    record = fq.read(written(tmp_path, rows, "Time in ms,torque in N m,speed"))
+    assert record.dt == pytest.approx(0.01)
+    assert record.units == {"torque": "N m"}
+
+
+def test_the_unit_of_a_universal_files_time(tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    t = 10.0 * np.arange(60)
+    sets = [pyuff.prepare_58(
+        func_type=1, rsp_node=1, rsp_dir=1, ref_node=1, ref_dir=1, data=np.sin(t + k), x=t,
+        id1=name, abscissa_spacing=1, abscissa_inc=10.0, abscissa_min=0.0, binary=0,
+        ord_data_type=4, num_pts=60, ordinate_axis_units_lab="m", abscissa_axis_units_lab="ms",
+        ver_num=0, load_case_id=0, rsp_ent_name="NONE", ref_ent_name="NONE", id2="NONE",
+        id3="NONE", id4="NONE", id5="NONE", z_axis_value=0.0, orddenom_spec_data_type=0,
+        ordinate_spec_data_type=8,
+    ) for k, name in enumerate("uy")]  # fmt: skip
+    pyuff.UFF(str(tmp_path / "a.uff")).write_sets(sets, "overwrite")
+    record = fq.read(tmp_path / "a.uff", inputs="u", outputs="y")
+    assert record.dt == pytest.approx(0.01)
+    assert record.units == {"u": "m", "y": "m"}
+
+
+def test_samples_that_a_measurement_file_marks_as_invalid_are_none(tmp_path):
+    asammdf = pytest.importorskip("asammdf")
+    k = np.arange(50)
+    with asammdf.MDF(version="4.10") as file:
+        signals = [
+            asammdf.Signal(np.sin(k), 0.01 * k, name="u"),
+            asammdf.Signal(np.cos(k), 0.01 * k, name="y", invalidation_bits=k == 3),
+        ]
+        file.append(signals)
+        file.save(tmp_path / "a.mf4", overwrite=True)
+    record = fq.read(tmp_path / "a.mf4", inputs="u", outputs="y")
+    # the first output may come a rounding before the first input
+    assert len(record.y_logged) in (48, 49)
+    assert not np.isclose(record.y_logged, np.cos(3)).any()
+    assert any("1 samples of 'y' are marked as invalid" in note for note in record.notes)

@@ -57,3 +57,14 @@ def test_a_hold_that_the_record_contradicts_is_no_loop():
             assert kinds[0] == "hold rejected"
             assert "feedback" not in kinds
             assert est.verdict.grade == "do not use"
+
+
+def test_a_spike_at_the_end_of_a_decimated_record_says_where_it_comes_from():
+    """How a chirp begins is folded by decimation; with its input kept the record is trusted."""
+    fast = fq.simulate(fq.two_mass(), fq.chirp(10, 80, 5, 5e-4), 5e-4).with_noise(0.05, seed=0)
+    est = fq.fit(fq.two_mass(), fast.decimate(10), band=(10, 80))
+    spikes = [w for w in est.warnings if w.kind == "spikes"]
+    assert len(spikes) == 1
+    assert "at 0 s, an end of a decimated record: decimate(n, keep_input=True)" in spikes[0]
+    kept = fq.fit(fq.two_mass(), fast.decimate(10, keep_input=True), band=(10, 80))
+    assert kept.verdict.grade == "trust"

@@ -33,6 +33,12 @@ def mdf_channels(path: Path) -> Log:
                 again += 1
                 name = f"{signal.name}_{again}"
             times = np.asarray(signal.timestamps, dtype=float)
+            if signal.invalidation_bits is not None:
+                valid = ~np.asarray(signal.invalidation_bits, dtype=bool)
+                if not valid.all():
+                    lost = f"{(~valid).sum()} samples of {name!r} are marked as invalid: left out"
+                    found.notes = (*found.notes, lost)
+                    times, values = times[valid], values[valid]
             found[name] = Channel(times, values.astype(float), str(signal.unit or ""))
     if not found:
         raise InputError("holds no numeric channels")

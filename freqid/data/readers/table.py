@@ -158,6 +158,9 @@ def named(text: str) -> tuple[str, str]:
     if found and found[1] and not re.fullmatch(r"\d+", found[2]):
         # DIN 1338 and ISO 80000 write "v/(m/s)"
         return found[1].rstrip(" /"), found[2].strip() if found[2].strip() != "-" else ""
+    spoken = re.fullmatch(rf"(.+?)\s+in\s+{_UNIT}", plain)
+    if spoken:
+        return spoken[1], spoken[2]
     quotient = re.fullmatch(rf"(.+?)\s*[/,]\s*{_UNIT}", plain)
     if quotient and not re.fullmatch(_UNIT, plain):
         return quotient[1], quotient[2]

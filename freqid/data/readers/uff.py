@@ -74,4 +74,9 @@ def read_uff(path: Path) -> pd.DataFrame:
         if others:
             raise ResponseFile
         raise InputError("holds no time responses (data sets 58 of function type 1)")
+    unit = str(
+        next(s for s in sets if s.get("func_type") == 1).get("abscissa_axis_units_lab") or ""
+    )
+    if unit.strip().upper() not in _NO_UNIT:
+        units["time"] = unit.strip()
     return columns_of({f"{n} [{units[n]}]" if n in units else n: x for n, x in arrays.items()})

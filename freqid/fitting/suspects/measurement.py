@@ -6,9 +6,11 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
+from freqid.data import Record
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
+from freqid.lti import PeriodicHold
 from freqid.models import Model
 
 # samples at one extreme value that make it look like a limit, and the part of the range it is
@@ -82,7 +84,18 @@ def spikes(scene: Scene, model: Model) -> list[Columns]:
         drawn.append(s.sampled(pulse))
     record = scene.seen[where].record
     assert record is not None
-    return [Columns(drawn, "", count, f"at {k * record.dt:.6g} s")]
+    where_in_time = f"at {k * record.dt:.6g} s"
+    if k in (0, record.n_samples - 1) and _faster_held(record):
+        # how an input begins or ends is folded, too
+        where_in_time += (
+            ", an end of a decimated record: decimate(n, keep_input=True) keeps what was folded"
+        )
+    return [Columns(drawn, "", count, where_in_time)]
+
+
+def _faster_held(record: Record) -> bool:
+    """Whether a record remembers a hold that is faster than its samples."""
+    return isinstance(record.hold, PeriodicHold) and record.hold.period < 0.99 * record.input_dt
 
 
 def _whitened(scene: Scene, number: int, s: Seen) -> FloatArray:
