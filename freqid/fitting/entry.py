@@ -34,7 +34,7 @@ from freqid.fitting.robust import robust_fit
 from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
 from freqid.frf import stretches
-from freqid.lti import Hold, in_one_blas_thread
+from freqid.lti import Hold, InputHolds, in_one_blas_thread
 from freqid.models import GreyBox
 
 _LOG = logging.getLogger(__name__)
@@ -146,11 +146,10 @@ def fit(
     flag("progress", progress)
     if isinstance(data, Stream):
         band = data.band if band is None else band
-        data, told = _in_one_pass(data, hold, band, progress, {
+        data, told, hold = _in_one_pass(data, hold, band, progress, {
             "hold": hold == "estimate", "domain": domain == "time", "separate": bool(separate),
             "initial_state": initial_state != "estimate",
         })  # fmt: skip
-        hold = None
         passed = [told]
     given_sets = as_data_sets(data)
     model, clocks = with_clock_offset(model, given_sets)
@@ -228,16 +227,22 @@ def _in_one_pass(
     band: tuple[float, float] | None,
     progress: bool,
     refused: Mapping[str, bool],
-) -> tuple[list[Record], str]:
-    """The experiments of a stream under the hold that is asked for; what was done, in words."""
+) -> tuple[list[Record], str, Hold | None]:
+    """The experiments of a stream, what was done, in words, and the hold that is asked for, where
+    it is not the one that they remember.
+    """
     for name, asked in refused.items():
         if asked:
             raise InputError(f"{name}: what is asked needs the samples of the stream; load() it")
     # a name means the hold at the rate of the stream, not at that of what its band needs
     held = as_holds(hold, stream.dt, stream.hold, stream.input_names)
-    found = stretches(dataclasses.replace(stream, hold=held), band, progress)
+    other = held != stream.hold and not isinstance(held, InputHolds)
+    if not other:
+        # those of several inputs are turned with them
+        stream = dataclasses.replace(stream, hold=held)
+    found = stretches(stream, band, progress)
     follow = f"{len(found)} experiments that follow on" if len(found) > 1 else "one experiment"
-    return found, f"{stream.origin} was read in one pass, as {follow}"
+    return found, f"{stream.origin} was read in one pass, as {follow}", held if other else None
 
 
 def _fitted(
