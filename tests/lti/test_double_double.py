@@ -140,3 +140,17 @@ def test_derivatives_of_a_plant_that_has_no_eigenvectors_keep_their_digits():
         return mpmath.expm((exactly(A) + sign * step * exactly(dA)) * mpmath.mpf(0.1))
 
     assert apart(change.phi[0], (phi(1) - phi(-1)) / (2 * step)) < 1e-13
+
+
+@pytest.mark.parametrize("rate", [1e-3, 0.5])
+def test_long_chains_that_a_balance_grades_keep_their_digits(rate):
+    """Ten lags in a row of nearly one rate, over many samples: entries reach 1e7."""
+    rng = np.random.default_rng(0)
+    A = np.diag(-rate * (1 + 1e-3 * rng.standard_normal(10))) + np.diag(np.ones(9), 1)
+    B, h = rng.standard_normal((10, 2)), 25.0
+    X = mpmath.zeros(12)
+    X[:10, :10], X[:10, 10:] = exactly(A) * h, exactly(B) * h
+    exact = mpmath.expm(X)
+    ours = fq.ZeroOrderHold(h).sampled(A, B)
+    assert apart(ours.phi, exact[:10, :10]) < 1e-14
+    assert apart(ours.gamma, exact[:10, 10:]) < 1e-14

@@ -119,12 +119,12 @@ class PeriodicHold(Hold):
         """
         A, B = _checked(A, B)
         units = Units.of(A, B, self.period)
-        return Sampled(*units.back(*self._sampled(*units.into(A, B))))
+        return Sampled(*units.back(*self._sampled(*units.into(A, B), units.graded)))
 
-    def _sampled(self, A: FloatArray, B: FloatArray) -> Sampled:
+    def _sampled(self, A: FloatArray, B: FloatArray, graded: bool) -> Sampled:
         """The same in units that suit."""
         h = self.period
-        if _delicate(A * h):
+        if graded or _fast(A * h):
             exact = Doubled.product(A, h), Doubled.product(B, h)
             found = self._of(doubled_exponential(self._generator(*exact)), B.shape)
             # by itself, Φ keeps its digits however little of the states is left
@@ -149,12 +149,13 @@ class PeriodicHold(Hold):
         A, B = units.into(A, B)
         dA, dB = units.into(dA, dB)
         lengths = near_one(h * np.abs(np.concatenate([dA, dB], axis=-1)).max(axis=(1, 2)))
-        value, change = self._differentiated(A, B, *(lengths[:, None, None] * d for d in (dA, dB)))
+        dA, dB = lengths[:, None, None] * dA, lengths[:, None, None] * dB
+        value, change = self._differentiated(A, B, dA, dB, units.graded)
         back = units.back(*(M / lengths[:, None, None] for M in change))
         return Sampled(*units.back(*value)), Sampled(*back)
 
     def _differentiated(
-        self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray
+        self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray, graded: bool
     ) -> tuple[Sampled, Sampled]:
         """The same in units that suit, along directions of a length that does."""
         h = self.period
@@ -164,14 +165,14 @@ class PeriodicHold(Hold):
         big = np.zeros((len(dA), 2 * size, 2 * size), X.dtype)
         big[:, :size, :size] = big[:, size:, size:] = X
         big[:, :size, size:] = dX
-        if _delicate(A * h):
+        if graded or _fast(A * h):
             low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
             both = scipy.linalg.block_diag(low, low)
             every = [doubled_exponential(Doubled(one, both)) for one in big]
             parts = (np.stack(part)[:, :size, size:] for part in zip(*every, strict=True))
             change = self._of(Doubled(*parts), B.shape)
             if all(np.isfinite(M).all() for M in change):
-                return self._sampled(A, B), change
+                return self._sampled(A, B, graded), change
         E = exponential(big)
         value = self._blocks(E[0, :size, :size], B.shape)
         return value, self._blocks(E[:, :size, size:], B.shape)
@@ -205,7 +206,7 @@ class PeriodicHold(Hold):
         return Sampled(phi, gamma, np.zeros_like(gamma) if following is None else following)
 
 
-def _delicate(step: FloatArray) -> bool:
+def _fast(step: FloatArray) -> bool:
     """Whether motions are so fast within a period that doubles leave too little of slow ones."""
     return float(np.linalg.norm(step, 1)) > _LARGE
 

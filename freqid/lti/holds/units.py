@@ -9,6 +9,9 @@ import scipy
 
 from freqid.checks import Array, FloatArray
 
+# sizes of states further apart than this cost four digits
+_GRADED = 2.0**12
+
 
 class Units(NamedTuple):
     """Powers of two: of the states (n,), by which A is balanced, and of the inputs (m,).
@@ -24,9 +27,17 @@ class Units(NamedTuple):
     def of(cls, A: FloatArray, B: FloatArray, period: float) -> Units:
         """Those of a plant, for steps of a period (s)."""
         states = np.ones(len(A))
-        if len(A) > 1:
+        # a triangular one keeps the digits of each entry, and a chain would be graded to nothing
+        if min(scipy.linalg.bandwidth(A), default=0) > 0:
             _, (states, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
         return cls(states, near_one(np.abs(B / states[:, None]).max(axis=0, initial=0) * period))
+
+    @property
+    def graded(self) -> bool:
+        """Whether states are so unlike that what is rounding in these units is none in the user's,
+        as those of a long chain are.
+        """
+        return bool(self.states.max(initial=1) > _GRADED * self.states.min(initial=1))
 
     def into(self, A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A (…, n, n) and B (…, n, m) in these units."""
