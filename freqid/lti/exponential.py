@@ -21,17 +21,25 @@ def exponential(X: Array) -> Array:
     """
     if not np.isfinite(X).all():
         return np.full(X.shape, np.nan, X.dtype)
-    bands = {at: scipy.linalg.bandwidth(X[at]) for at in np.ndindex(X.shape[:-2])}
-    full = any(low and high for low, high in bands.values())
+    kinds = {at: _kind(X[at]) for at in np.ndindex(X.shape[:-2])}
     # what grows beyond numbers is infinite
     with np.errstate(over="ignore", invalid="ignore"):
+        full = "full" in kinds.values()
         E = np.asarray(scipy.linalg.expm(X)) if full else np.empty(X.shape, X.dtype)
-        for at, (low, high) in bands.items():
-            if low == 0:
+        for at, kind in kinds.items():
+            if kind == "upper":
                 E[at] = _upper(X[at])
-            elif high == 0:
+            elif kind == "lower":
                 E[at] = _upper(X[at].T).T
     return E
+
+
+def _kind(X: Array) -> str:
+    """Which triangle holds X, where its diagonal is not all one number: integrators are none."""
+    low, high = scipy.linalg.bandwidth(X)
+    if (low and high) or not np.ptp(X.diagonal()):
+        return "full"
+    return "lower" if low else "upper"
 
 
 def doubled_exponential(X: Doubled) -> Doubled:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+import scipy
 
 from freqid.checks import Array, FloatArray
 from freqid.lti.bases import basis_of
@@ -80,10 +81,13 @@ def sentence(plant: StateSpace, lost: float) -> str:
 
 def _delicate(A: FloatArray, apart: float) -> bool:
     """Whether rates lie so far apart, or eigenvectors so close, that entries may not tell them."""
-    poles, V = np.linalg.eig(A)
+    if not np.isfinite(A).all():
+        return False
+    # in units of their own the states of any plant would look alike
+    poles, V = np.linalg.eig(scipy.linalg.matrix_balance(A, permute=False)[0])
     size = np.abs(poles)
     largest = float(size.max())
-    if not np.isfinite(largest) or largest == 0 or len(A) == 1:
+    if largest == 0 or len(A) == 1:
         return False
     # rates that nearly agree are pulled apart by rounding; their vectors stay near each other
     return bool(size.min() * apart < largest or np.linalg.cond(V) > _CLOSE)

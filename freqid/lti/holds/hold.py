@@ -119,16 +119,20 @@ class PeriodicHold(Hold):
         """
         A, B = _checked(A, B)
         units = Units.of(A, B, self.period)
-        return Sampled(*units.back(*self._sampled(*units.into(A, B), units.graded)))
+        within = units.into(A, B)
+        found = self._sampled(*within)
+        if units.hide(found.phi):
+            found = self._sampled(*within, exact=True)
+        return Sampled(*units.back(*found))
 
-    def _sampled(self, A: FloatArray, B: FloatArray, graded: bool) -> Sampled:
-        """The same in units that suit."""
+    def _sampled(self, A: FloatArray, B: FloatArray, exact: bool = False) -> Sampled:
+        """The same in units that suit, with twice the digits on the way where they are needed."""
         h = self.period
-        if graded or _fast(A * h):
-            exact = Doubled.product(A, h), Doubled.product(B, h)
-            found = self._of(doubled_exponential(self._generator(*exact)), B.shape)
+        if exact or _fast(A * h):
+            step = Doubled.product(A, h), Doubled.product(B, h)
+            found = self._of(doubled_exponential(self._generator(*step)), B.shape)
             # by itself, Φ keeps its digits however little of the states is left
-            found = found._replace(phi=doubled_exponential(exact[0]).high)
+            found = found._replace(phi=doubled_exponential(step[0]).high)
             if all(np.isfinite(M).all() for M in found):
                 return found
         return self._blocks(exponential(self.pulse.generator(A * h, B * h)), B.shape)
@@ -150,12 +154,14 @@ class PeriodicHold(Hold):
         dA, dB = units.into(dA, dB)
         lengths = near_one(h * np.abs(np.concatenate([dA, dB], axis=-1)).max(axis=(1, 2)))
         dA, dB = lengths[:, None, None] * dA, lengths[:, None, None] * dB
-        value, change = self._differentiated(A, B, dA, dB, units.graded)
+        value, change = self._differentiated(A, B, dA, dB)
+        if units.hide(value.phi):
+            value, change = self._differentiated(A, B, dA, dB, exact=True)
         back = units.back(*(M / lengths[:, None, None] for M in change))
         return Sampled(*units.back(*value)), Sampled(*back)
 
     def _differentiated(
-        self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray, graded: bool
+        self, A: FloatArray, B: FloatArray, dA: FloatArray, dB: FloatArray, exact: bool = False
     ) -> tuple[Sampled, Sampled]:
         """The same in units that suit, along directions of a length that does."""
         h = self.period
@@ -165,14 +171,14 @@ class PeriodicHold(Hold):
         big = np.zeros((len(dA), 2 * size, 2 * size), X.dtype)
         big[:, :size, :size] = big[:, size:, size:] = X
         big[:, :size, size:] = dX
-        if graded or _fast(A * h):
+        if exact or _fast(A * h):
             low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
             both = scipy.linalg.block_diag(low, low)
             every = [doubled_exponential(Doubled(one, both)) for one in big]
             parts = (np.stack(part)[:, :size, size:] for part in zip(*every, strict=True))
             change = self._of(Doubled(*parts), B.shape)
             if all(np.isfinite(M).all() for M in change):
-                return self._sampled(A, B, graded), change
+                return self._sampled(A, B, exact), change
         E = exponential(big)
         value = self._blocks(E[0, :size, :size], B.shape)
         return value, self._blocks(E[:, :size, size:], B.shape)

@@ -9,8 +9,8 @@ import scipy
 
 from freqid.checks import Array, FloatArray
 
-# sizes of states further apart than this cost four digits
-_GRADED = 2.0**12
+# so much more rounding is worth twice the digits
+_HIDDEN = 1e3
 
 
 class Units(NamedTuple):
@@ -29,15 +29,18 @@ class Units(NamedTuple):
         states = np.ones(len(A))
         # a triangular one keeps the digits of each entry, and a chain would be graded to nothing
         if min(scipy.linalg.bandwidth(A), default=0) > 0:
-            _, (states, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+            _, _, _, states, _ = scipy.linalg.lapack.dgebal(A, scale=1, permute=0)
         return cls(states, near_one(np.abs(B / states[:, None]).max(axis=0, initial=0) * period))
 
-    @property
-    def graded(self) -> bool:
-        """Whether states are so unlike that what is rounding in these units is none in the user's,
-        as those of a long chain are.
+    def hide(self, phi: Array) -> bool:
+        """Whether rounding of Φ (n, n) in these units is more than that in the user's: where an
+        entry that is next to nothing here is the largest there.
         """
-        return bool(self.states.max(initial=1) > _GRADED * self.states.min(initial=1))
+        if not phi.size or not np.isfinite(phi).all():
+            return False
+        spread = self.states.max() / self.states.min()
+        there = np.abs(phi) / self.states * self.states[:, None]
+        return bool(np.abs(phi).max() * spread > _HIDDEN * there.max())
 
     def into(self, A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A (…, n, n) and B (…, n, m) in these units."""
