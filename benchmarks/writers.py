@@ -134,7 +134,7 @@ def text_of(path):
 WRITERS = {
     w.name: w
     for w in (
-        *(Written(f"record.{k}", lambda p, c: fq.write(_record(c), p), _read)
+        *(Written(f"record.{k}", lambda p, c: fq.write(_record(c), p, overwrite=True), _read)
           for k in ("csv", "npz", "parquet")),
         Written("estimate.json", lambda p, c: _estimate(c).save(p, overwrite=True), _loaded),
         Written("response.csv", _spectrum, text_of),

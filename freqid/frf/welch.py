@@ -188,16 +188,16 @@ def _excited(uu: ComplexArray, frequency: FloatArray, first: Record | Stream) ->
     if not (power.max(axis=0) > 0).all():
         silent = first.input_names[int(np.argmin(power.max(axis=0)))]
         raise InputError(f"input {silent!r} is constant in the band; it excites nothing")
-    idle = np.asarray(~(power > 0).all(axis=1))
-    if idle.any():
-        raise InputError(
-            f"an input has no power at {idle.sum()} of {len(idle)} lines, the first at "
-            f"{frequency[idle.argmax()]:g} Hz; give a band= that it excites"
-        )
     size = np.sqrt(np.where(power > 0, power, 1))
     least = np.linalg.eigvalsh(uu / (size[:, :, None] * size[:, None, :]))[:, 0]
     if uu.shape[-1] > 1 and np.median(least) < 1e-10:
         raise InputError(
             "the inputs move together in every segment, so that their effects cannot be told "
             "apart; use as many different experiments as inputs"
+        )
+    idle = np.asarray(~(power > 0).all(axis=1))
+    if idle.any():
+        raise InputError(
+            f"an input has no power at {idle.sum()} of {len(idle)} lines, the first at "
+            f"{frequency[idle.argmax()]:g} Hz; give a band= that it excites"
         )
