@@ -14,7 +14,7 @@ from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_conditions, kept_hold
 from freqid.data.stream_arrays import of_hdf5, of_zarr
-from freqid.data.stream_found import Asked, Found, Source, even, of_array
+from freqid.data.stream_found import Asked, Found, Source, even, of_array, places
 from freqid.data.stream_views import from_the_first
 from freqid.data.time_column import time_named
 
@@ -124,10 +124,11 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
 
 
 def _stamps(file: Source, time: str) -> tuple[list[int], Array]:
-    """Rows and their stamps: the first two, the last two, and the ends of each group of rows, which
-    the footer knows.
+    """Rows and their stamps: the first two, the last two, some of those that lie in groups of rows
+    with these, and the ends of every other group, which the footer knows.
     """
     import pandas as pd
+    import pyarrow as pa
 
     metadata = file.metadata
     number = file.schema_arrow.names.index(time)
@@ -147,9 +148,10 @@ def _stamps(file: Source, time: str) -> tuple[list[int], Array]:
         told = metadata.row_group(g).column(number).statistics
         if g in (*full[:2], *full[-2:]) or told is None or not told.has_min_max or told.null_count:
             stamps = group(g)
-            found |= {first + i: stamps[i] for i in (0, min(1, sizes[g] - 1))}
-            found |= {last - i: stamps[-1 - i] for i in (min(1, sizes[g] - 1), 0)}
+            found |= {first + i: stamps[i] for i in places(len(stamps))}
         else:
-            found |= {first: told.min, last: told.max}
+            # dates and durations as the column has them, whatever the footer calls them
+            ends = pa.array([told.min, told.max], file.schema_arrow.field(time).type)
+            found |= dict(zip((first, last), ends.to_numpy(zero_copy_only=False), strict=True))
     at = sorted(found)
     return at, pd.Series([found[i] for i in at]).to_numpy()

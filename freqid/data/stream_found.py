@@ -77,7 +77,8 @@ def _array_names(columns: Sequence[str] | None, count: int) -> list[str]:
 def places(count: int) -> list[int]:
     """Where a time is looked at that is too long to be read: its ends, and some between."""
     between = np.linspace(0, count - 1, min(count, _PLACES)).astype(int)
-    return sorted({0, 1, count - 2, count - 1, *between.tolist()})
+    ends = {max(i, 0) for i in (0, min(1, count - 1), count - 2, count - 1)}
+    return sorted({*ends, *between.tolist()})
 
 
 def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "") -> float:

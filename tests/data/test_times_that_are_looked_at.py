@@ -96,3 +96,24 @@ def test_stamps_since_1970_keep_their_digits(tmp_path, kind, name, unit, step):
     assert fq.read(path, inputs="u", outputs="y").dt == pytest.approx(step, rel=1e-12)
     if kind in (".parquet", ".h5"):
         assert fq.open(path, "u", "y").dt == pytest.approx(step, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        pd.date_range("2024-03-30 22:00", periods=N, freq="10ms"),
+        pd.date_range("2024-03-30 22:00", periods=N, freq="10ms", tz="Europe/Berlin").as_unit("us"),
+        pd.to_timedelta(0.01 * np.arange(N), unit="s"),
+        (0.01 * np.arange(N)).astype("f4"),
+    ],
+    ids=["dates", "dates of a zone", "durations", "float32"],
+)
+@pytest.mark.parametrize("rows", [700, N])
+def test_dates_and_durations_in_many_groups_of_rows(tmp_path, time, rows):
+    frame = pd.DataFrame({"time": time, "u": U[:, 0], "y": U[:, 1]})
+    frame.to_parquet(tmp_path / "t.parquet", row_group_size=rows, index=False)
+    assert fq.open(tmp_path / "t.parquet", "u", "y").dt == pytest.approx(0.01, rel=1e-6)
+    frame = frame.drop(index=range(9000, 9100))
+    frame.to_parquet(tmp_path / "gap.parquet", row_group_size=rows, index=False)
+    with pytest.raises(ValueError, match="not even"):
+        fq.open(tmp_path / "gap.parquet", "u", "y")
