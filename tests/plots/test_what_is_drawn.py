@@ -13,9 +13,9 @@ from freqid.plots.interactive import POINTS
 
 @pytest.fixture(scope="module")
 def table():
-    """Two spectra by name, at two factors, under two holds."""
-    spectra = {"low": fq.MultisineSpectrum([5.0, 9.0], 1.0), "white": fq.WhiteSpectrum()}
-    found = fq.bias_map(fq.first_order(), spectra, [2, 4], holds=["zoh", "foh"], base_dt=5e-3)
+    """Two spectra by name, at two factors, under two holds, all of which have a minimum."""
+    spectra = {"low": fq.MultisineSpectrum([2.0, 20.0], 1.0), "white": fq.WhiteSpectrum()}
+    found = fq.bias_map(fq.first_order(), spectra, [2, 4], holds=["zoh", "foh"], base_dt=1e-3)
     assert found["converged"].all()
     return found
 
