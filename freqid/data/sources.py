@@ -57,12 +57,15 @@ def _remembering(
 
 def that_reads(function: Callable[P, Made]) -> Callable[P, Made]:
     """A function that reads data, which remembers how it was called, and the file."""
+    known = _remembering(function, lambda args: ("fq", (), args))
 
-    def begin(args: Sequence[object]) -> tuple[str, Sequence[str | None], Sequence[object]]:
-        has_read(args[0] if args else None)
-        return "fq", (), args
+    @wraps(function)
+    def called(*args: P.args, **options: P.kwargs) -> Made:
+        found = known(*args, **options)
+        has_read(args[0] if args else options.get("path"))
+        return found
 
-    return _remembering(function, begin)
+    return called
 
 
 def that_follows(method: Callable[P, Made]) -> Callable[P, Made]:

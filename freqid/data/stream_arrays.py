@@ -66,8 +66,8 @@ class _Arrays:
         time = (beside or times)[0]
         at = places(count)
         with self.opened() as file:
-            stamps = np.array([file[time][i] for i in at])
-            unit = unit_of(file[time].attrs)
+            stored = file[time]
+            stamps, unit = np.array([stored[i] for i in at]), unit_of(stored.attrs)
         return even(str(self.path), _leaf(time), at, stamps, unit)
 
     def step(self, names: Iterable[str]) -> float | None:

@@ -19,10 +19,11 @@ _MOVED, _TIMES = 8 * float(np.finfo(float).eps), 3
 VISIBLE = 1e-11
 # and from which on it is said unasked
 _SAID = 1e-9
-# rates further apart than this, or eigenvectors of this condition, cost digits
-_APART, _CLOSE = 100.0, 1e3
-# a response that is so small a part of the largest is a zero
-_ZERO = 1e-6
+# rates further apart than this, or closer as a part of the largest, cost digits; so do eigenvectors
+# that are as close
+_APART, _CLOSE = 100.0, 1e-3
+# a response that is so small a part of that at a frequency beside it is a zero
+_ZERO, _BESIDE = 1e-4, 0.9
 # lines at which a response is tried
 _LINES = 6
 
@@ -48,7 +49,7 @@ def rounding(plant: StateSpace, hold: Hold, omega: FloatArray, apart: float = _A
         if not all(np.isfinite(seen).all() for seen, _ in after):
             return np.inf
         for (old, floor), (new, _) in zip(before, after, strict=True):
-            size = np.abs(old).max(axis=(-2, -1), initial=floor)
+            size = np.maximum(np.abs(old).max(axis=(-2, -1), initial=0), floor)
             gap = np.abs(new - old).max(axis=(-2, -1), initial=0)
             worst = max(worst, float((gap[size > 0] / size[size > 0]).max(initial=0)))
     return worst
@@ -90,16 +91,25 @@ def _delicate(A: FloatArray, apart: float) -> bool:
     if largest == 0 or len(A) == 1:
         return False
     # rates that nearly agree are pulled apart by rounding; their vectors stay near each other
-    return bool(size.min() * apart < largest or np.linalg.cond(V) > _CLOSE)
+    gaps = np.abs(poles[:, None] - poles) + largest * np.eye(len(A))
+    near = gaps.min() < _CLOSE * largest or np.linalg.cond(V) * _CLOSE > 1
+    return bool(near or size.min() * apart < largest)
 
 
-def _seen(plant: StateSpace, hold: Hold, omega: FloatArray) -> list[tuple[Array, float]]:
+def _seen(
+    plant: StateSpace, hold: Hold, omega: FloatArray
+) -> list[tuple[Array, float | FloatArray]]:
     """The response, lines first, and the sampled matrices, with the least size that counts: what
     is left of a state after a long step is told against the state, exp(A·0) = I.
     """
-    G = np.moveaxis(transfer(basis_of(plant).through(hold), points(omega, hold)), -1, 0)
-    # a zero, as a double integrator has one at half the sample rate, is told by the other lines
-    found = [(G, _ZERO * float(np.abs(G).max(initial=0)))]
+    sampled = basis_of(plant).through(hold)
+
+    def response(at: FloatArray) -> Array:
+        return np.moveaxis(transfer(sampled, points(at, hold)), -1, 0)
+
+    G = response(omega)
+    # a zero, as a double integrator has one at half the sample rate, is told by what is beside it
+    found = [(G, _ZERO * np.abs(response(_BESIDE * omega)).max(axis=(-2, -1), initial=0))]
     if isinstance(hold, PeriodicHold):
         phi, *gammas = hold.sampled(plant.A, plant.B)
         found += [(phi[None], 1.0), *((gamma[None], 0.0) for gamma in gammas)]

@@ -79,6 +79,21 @@ def test_units_of_hdf5_are_those_of_its_channels(tmp_path):
     assert record.units == {"u": "N m"}
 
 
+@pytest.mark.parametrize(("group", "dt"), [("a", 1e-3), ("b", 1e-6)])
+def test_units_are_those_of_the_group_that_is_read(tmp_path, group, dt):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, unit in (("a", "ms"), ("b", "us")):
+            for leaf in ("time", "u", "y"):
+                file[f"{name}/{leaf}"] = np.arange(9.0)
+            file[f"{name}/time"].attrs["units"] = unit
+            file[f"{name}/u"].attrs["units"] = f"N{name}"
+    record = fq.read(tmp_path / "a.h5", inputs="u", outputs="y", group=group)
+    assert record.dt == pytest.approx(dt)
+    assert record.units == {"u": f"N{group}"}
+    assert fq.open(tmp_path / "a.h5", "u", "y", group=group).dt == pytest.approx(dt)
+
+
 @pytest.mark.parametrize("kind", [".csv", ".npz", ".parquet", ".h5"])
 @pytest.mark.parametrize(
     ("name", "unit"), [("timestamp_us", 1e-6), ("timestamp_ns", 1e-9), ("timestamp", 1e-9)]

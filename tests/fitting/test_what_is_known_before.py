@@ -26,7 +26,7 @@ def test_a_prior_that_the_data_contradict_is_said(record, away):
 
 
 def test_right_priors_are_seldom_contradicted(record):
-    """Of a hundred priors whose means scatter as they say none is far off."""
+    """Of priors whose means scatter as they say, narrow and wide, none is far off."""
     rng, plant = np.random.default_rng(0), fq.first_order()
     alone = fq.fit(plant, record)
     truth, std = plant["a"], float(alone.parameters.loc["a", "std"])

@@ -139,3 +139,16 @@ def test_a_zero_on_a_line_is_no_loss():
         np.zeros((1, 1)),
     )  # fmt: skip
     assert rounding(body, fq.ZeroOrderHold(0.01), np.pi / 0.01 * np.array([0.1, 0.3, 1.0])) < 1e-9
+
+
+def test_a_line_far_below_the_largest_response_is_told_too():
+    """A free body is loud at the first line, and what is delicate all that is left at the other."""
+    plant, none = mixed(1e9), np.zeros((2, 2))
+    both = StateSpace(
+        np.block([[np.array([[0.0, 1.0], [0.0, 0.0]]), none], [none, plant.A]]),
+        np.vstack([[[0.0], [1e-2]], plant.B]), np.hstack([[[1.0, 0.0]], plant.C]), plant.D,
+    )  # fmt: skip
+    near, far = np.array([1e-6]), np.array([1e2])
+    told = rounding(both, fq.BandLimited(), far)
+    assert told > 100 * rounding(both, fq.BandLimited(), near)
+    assert rounding(both, fq.BandLimited(), np.concatenate([near, far])) > 0.5 * told

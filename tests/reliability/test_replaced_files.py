@@ -18,7 +18,11 @@ def measured(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-@pytest.mark.parametrize("reads", [fq.read, fq.open], ids=["read", "open"])
+@pytest.mark.parametrize(
+    "reads",
+    [fq.read, fq.open, lambda path, u, y: fq.read(path=path, inputs=u, outputs=y)],
+    ids=["read", "open", "read by name"],
+)
 def test_a_file_that_was_read_is_never_replaced(measured, reads, overwrite, tmp_path, monkeypatch):
     path = tmp_path / "run.parquet"
     fq.read(measured).to_frame().to_parquet(path)

@@ -29,7 +29,7 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
         raise missing("HDF5", "h5py", "hdf5") from None
     check_structure(path)
     found: dict[str, dict[str, Array]] = {}
-    units: dict[str, str] = {}
+    units: dict[str, dict[str, str]] = {}
     taken = 0.0
 
     def keep(name: str, item: object) -> None:
@@ -45,7 +45,7 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
             check_size(path, taken)
             parent, _, leaf = name.rpartition("/")
             found.setdefault(parent, {})[leaf] = item[()]
-            units[leaf] = unit_of(item.attrs)
+            units.setdefault(parent, {})[leaf] = unit_of(item.attrs)
             clocks = {n: v for n, v in item.parent.attrs.items() if n in CLOCKS and np.size(v) == 1}
             found[parent] |= {n: np.asarray(v).reshape(()) for n, v in clocks.items()}
 
@@ -59,5 +59,6 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
         # h5py has errors of many kinds for a file that is not what it says
         raise damaged("HDF5", error) from None
     frame = columns_of(of_one_group(found, group, "group"))
-    frame.attrs["units"] = {n: unit for n, unit in units.items() if unit and n in frame.columns}
+    told = of_one_group(units, group, "group")
+    frame.attrs["units"] = {n: str(u) for n, u in told.items() if u and n in frame.columns}
     return frame
