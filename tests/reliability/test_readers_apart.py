@@ -34,9 +34,12 @@ def changed(path, tmp_path, *bytes_at):
     return other
 
 
-def test_each_is_read(files):
+@pytest.mark.parametrize("frozen", [False, True])
+def test_each_is_read(frozen, files, monkeypatch):
     import foreign_files as written
 
+    if frozen:
+        monkeypatch.setattr(sys, "frozen", True, raising=False)
     for name, (path, read) in files.items():
         found = read(path)
         if name.startswith("response"):
