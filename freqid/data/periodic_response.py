@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
 
 
+@dataclasses.dataclass(frozen=True, eq=False, init=False, repr=False)
 class PeriodicResponse(FrequencyResponse):
     """A FrequencyResponse that also keeps the means it was made of.
 
@@ -74,8 +76,7 @@ class PeriodicResponse(FrequencyResponse):
     @that_follows
     def with_conditions(self, **conditions: float) -> PeriodicResponse:
         """The same with what was set for it, by name."""
-        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
-        return PeriodicResponse(**fields)
+        return dataclasses.replace(self, conditions={**self.conditions, **conditions})
 
     @that_follows
     def select(self, limits: tuple[float, float]) -> PeriodicResponse:

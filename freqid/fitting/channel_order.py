@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -32,11 +33,6 @@ def in_order_of(model: object, data: DataSet) -> DataSet:
     inputs, outputs = own[0] if u else told[0], own[1] if y else told[1]
     if isinstance(data, Record):
         return data.select(list(inputs), list(outputs))
-    if isinstance(data, PeriodicResponse):
-        raise InputError(
-            f"the response has inputs {', '.join(told[0])} and outputs {', '.join(told[1])}, the "
-            "model the same in another order: name the model's channels in that of the data"
-        )
     return _turned(data, u or range(len(told[0])), y or range(len(told[1])))
 
 
@@ -48,12 +44,20 @@ def _order(wanted: Sequence[str], given: Sequence[str]) -> list[int] | None:
 
 
 def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> FrequencyResponse:
-    at = np.ix_(list(y), list(u))
+    u, y = list(u), list(y)
+    at = np.ix_(y, u)
+    means: dict[str, Any] = {}
+    if isinstance(frf, PeriodicResponse):
+        # outputs come first in the noise
+        both = np.array([*y, *(len(y) + i for i in u)])
+        noise = frf.noise[..., both[:, None], both]
+        means = {"inputs": frf.inputs[u], "outputs": frf.outputs[y], "noise": noise}
     return dataclasses.replace(
         frf, response=frf.response[at],
         variance=None if frf.variance is None else frf.variance[at],
         coherence=None if frf.coherence is None else frf.coherence[at],
-        input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[list(u)],
+        input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[u],
         input_names=tuple(frf.input_names[i] for i in u),
         output_names=tuple(frf.output_names[i] for i in y),
+        **means,
     )  # fmt: skip
