@@ -144,6 +144,17 @@ def test_workbooks(suffix, head, tmp_path):
     check(fq.read(tmp_path / "log.xlsx"))
 
 
+def test_a_workbook_that_begins_with_the_time_alone(tmp_path):
+    """Three rows before the first sample of the others: the names were lost."""
+    pytest.importorskip("python_calamine")
+    frame = pd.DataFrame({"time": T, "torque [N m]": U, "speed": Y})
+    frame.iloc[:3, 1:] = np.nan
+    frame.to_excel(tmp_path / "log.xlsx", index=False)
+    record = fq.read(tmp_path / "log.xlsx", "torque", "speed", resample=True)
+    assert record.units["torque"] == "N m"
+    np.testing.assert_allclose(record.y[3:], Y[3:])
+
+
 def test_matlab(tmp_path):
     from scipy.io import savemat
 

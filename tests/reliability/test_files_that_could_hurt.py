@@ -43,6 +43,8 @@ def test_more_memory_than_a_file_may_take(tmp_path, monkeypatch):
         with pytest.raises(InputError, match="FREQID_READ_LIMIT") as error:
             fq.read(path, dt=0.01)
         assert str(path) in str(error.value)
+        # which is told where open knows the kind
+        assert ("or read it with open" in str(error.value)) == (path.suffix == ".parquet")
         monkeypatch.delenv("FREQID_READ_LIMIT", raising=False)
     monkeypatch.setenv("FREQID_READ_LIMIT", "2e9")
     with pytest.raises(InputError, match="whole number of bytes"):

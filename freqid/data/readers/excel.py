@@ -51,6 +51,9 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
         first, second = next(body, None), next(body, None)
         if first is None or second is None:
             continue
+        # samples of which some are not there yet, as those of a slower channel are
+        while first and _holds_numbers_alone(rows[first - 1]):
+            first -= 1
         width = len(rows[first])
         names, units, _ = heading([[str(c) for c in r] for r in rows[:first]], width)
         columns = {
@@ -68,6 +71,10 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
         others = ", ".join(f.attrs["found"].split(",")[0] for f in found[1:])
         found[0].attrs["notes"] = [f"the first sheet was read; {others} are there, too: group="]
     return found[0]
+
+
+def _holds_numbers_alone(row: list[Any]) -> bool:
+    return all(c in ("", None) or _is_number(c) for c in row)
 
 
 def _is_number(cell: Any) -> bool:

@@ -9,6 +9,8 @@ from freqid.checks import InputError
 
 # of what a file may grow to, and what any file may; more with the environment variable below
 _TIMES, _FREE, _VARIABLE = 10, 256 * 2**20, "FREQID_READ_LIMIT"
+# what is also read block by block
+_STREAMED = {".npy", ".h5", ".hdf5", ".parquet"}
 
 
 def limit_of(path: Path) -> int:
@@ -32,7 +34,8 @@ def check_size(path: Path, size: float, what: str = "its samples") -> None:
         raise InputError(
             f"{what} would take {_mebibytes(size)} of memory, and a file of "
             f"{_mebibytes(_size(path))} may take {_mebibytes(limit)}; if it is to be "
-            f"trusted, set the environment variable {_VARIABLE} to more bytes, or read it with open"
+            f"trusted, set the environment variable {_VARIABLE} to more bytes"
+            f"{', or read it with open' if path.suffix.lower() in _STREAMED else ''}"
         )
 
 
