@@ -38,9 +38,10 @@ def two_mass(
 ) -> GreyBox:
     """Motor and arm joined by a flexible gear: the paper's eq. 9-11 with Table 1's values.
 
-    Input: motor torque (N m). Output: motor velocity (rad/s). States: twist of the gear, motor
-    velocity, arm velocity. Jm and Ja are inertias (kg m²), k the stiffness (N m/rad), d the
-    damping of the gear and fm the friction of the motor (N m s/rad); the gear ratio is fixed.
+    With the twist φ, the velocities ω of motor and arm and the gear ratio r, which is fixed:
+    φ' = r ωm − ωa, Jm ωm' = u − fm ωm − r (k φ + d φ'), Ja ωa' = k φ + d φ'; y = ωm.
+    Input: motor torque (N m). Output: motor velocity (rad/s). Jm and Ja are inertias (kg m²), k the
+    stiffness (N m/rad), d the damping of the gear and fm the friction of the motor (N m s/rad).
     Raises ValueError for values that are not finite.
 
     >>> [p.name for p in two_mass().free_parameters]
@@ -76,8 +77,8 @@ def drivetrain(
 ) -> GreyBox:
     """A chain of ``n_masses`` inertias behind a gear, springs and dampers between them.
 
-    The first is the motor, the others parts of the arm. Input: motor torque (N m). ``outputs`` are
-    any of "motor" or "arm" (the last mass) with
+    The first is the motor, the others parts of the arm: ``two_mass`` with more of them. Input:
+    motor torque (N m). ``outputs`` are any of "motor" or "arm" (the last mass) with
     "position" (rad), "velocity" (rad/s) or "acceleration" (rad/s²). Parameters: inertias J1 (motor)
     to Jn in kg m², stiffnesses k1 … in N m/rad and dampings d1 … in N m s/rad of the joints, the
     motor's friction fm in N m s/rad, and the gear ratio, which is fixed; ``values`` replaces the
