@@ -30,6 +30,7 @@ class _Arrays:
     opened: Callable[[], AbstractContextManager[Source]]
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
     numbers: dict[str, dict[str, float]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
     def add(self, name: str, array: Source) -> None:
         """Note an array: one of samples, or a number."""
@@ -45,6 +46,7 @@ class _Arrays:
             )
         if array.ndim in (1, 2) and array.shape[0] > 1 and array.size:
             self.shapes[name] = tuple(int(size) for size in array.shape)
+            self.units[name] = unit_of(array.attrs)
         elif array.size == 1:
             folder = self.numbers.setdefault(_folder(name), {})
             folder[_leaf(name)] = float(np.ravel(array[()])[0])
@@ -126,7 +128,8 @@ class _Arrays:
                     flat = {name: rows.reshape(len(rows), -1) for name, rows in read.items()}
                     yield np.column_stack([flat[name][:, i] for name, i in wanted])
 
-        return Found(blocks, names, count, dt, str(self.path))
+        units = {n: self.units[full] for n, (_, full, _) in zip(names, channels, strict=True)}
+        return Found(blocks, names, count, dt, str(self.path), units=units)
 
     def _of_group(self, group: str | None) -> dict[str, tuple[int, ...]]:
         if group is None:

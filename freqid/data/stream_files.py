@@ -120,7 +120,7 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
 
     hold = None if told is None else kept_hold(told, names)
     conditions = {} if told is None else kept_conditions(told)
-    return Found(blocks, names, count, dt, str(path), hold, conditions)
+    return Found(blocks, names, count, dt, str(path), hold, conditions, dict(map(named, columns)))
 
 
 def _stamps(file: Source, time: str) -> tuple[list[int], Array]:

@@ -48,6 +48,8 @@ class Found:
     # what the file says of the hold, of all inputs or by name, and of the conditions
     hold: Hold | Mapping[str, Hold] | None = None
     conditions: Mapping[str, float] = field(default_factory=dict)
+    # by channel, where the file says them
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: str) -> Found:

@@ -10,11 +10,12 @@ import numpy as np
 from freqid.checks import Array, FloatArray, InputError, finite, listed, positive, unknown, whole
 from freqid.data.conditions import as_conditions
 from freqid.data.replacing import has_read
+from freqid.data.rows import as_rows
 from freqid.data.selection import as_holds
 from freqid.data.stream_files import of_file
 from freqid.data.stream_found import Asked, Found, Source, of_array
 from freqid.data.stream_views import from_the_first
-from freqid.data.streams import BLOCK, Stream, as_rows
+from freqid.data.streams import BLOCK, Stream
 from freqid.lti import Hold, ZeroOrderHold
 
 
@@ -93,6 +94,7 @@ def open(
     return Stream(
         blocks, step, held, tuple(u_names), tuple(y_names), found.n_samples, found.origin,
         as_conditions(found.conditions),
+        {n: found.units[n] for n in (*u_names, *y_names) if found.units.get(n)},
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from freqid.checks import Array, FloatArray, InputError, flag, whole
 from freqid.data.band import Band, as_band
 from freqid.data.conditions import as_conditions
 from freqid.data.record import Record
+from freqid.data.rows import as_rows
 from freqid.data.sampling import samples_between
 from freqid.data.selection import as_holds, channels_of, flat, hold_of
 from freqid.data.stream_views import (
@@ -46,6 +47,7 @@ class Stream:
     n_samples: int | None = None
     origin: str = "stream"
     conditions: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
     band: Band | None = None
     begin: int = 0
     step: int = 1
@@ -128,10 +130,11 @@ class Stream:
         columns = [every.index(n) for n in u] + [
             self.n_inputs + self.output_names.index(n) for n in y
         ]
-        held = hold_of(self, u)
+        units = {n: unit for n, unit in self.units.items() if n in (*u, *y)}
         return replace(
-            self, blocks=of_columns(self.blocks, columns), hold=held, input_names=u, output_names=y
-        )
+            self, blocks=of_columns(self.blocks, columns), hold=hold_of(self, u), input_names=u,
+            output_names=y, units=units,
+        )  # fmt: skip
 
     def with_hold(self, hold: Hold | str | Mapping[str, Hold | str]) -> Stream:
         """The same samples with another hold remembered, as ``Record.with_hold``."""
@@ -269,32 +272,10 @@ class Stream:
         return Record(
             flat(every[:, : self.n_inputs]), flat(every[:, self.n_inputs :]), self.dt, self.hold,
             input_names=self.input_names, output_names=self.output_names,
-            conditions=self.conditions,
+            conditions=self.conditions, units=self.units,
         )  # fmt: skip
 
     def __repr__(self) -> str:
         channels = f"{', '.join(self.input_names)} -> {', '.join(self.output_names)}"
         count = "as many samples as come" if self.n_samples is None else f"{self.n_samples} samples"
         return f"<Stream {channels}: {count} at {self.dt:g} s, {self.hold!r}>"
-
-
-def as_rows(block: Array, what: str, width: int) -> Array:
-    """A block as real rows (n, width); ValueError, which names it, for another."""
-    if isinstance(block, np.ma.MaskedArray) and np.ma.getmaskarray(block).any():
-        raise InputError(f"{what} has masked samples; fill them, or slice() takes what is beside")
-    rows = np.asarray(block)
-    rows = rows[:, None] if rows.ndim == 1 else rows
-    if rows.dtype.kind == "f" and rows.dtype.itemsize > 8:
-        with np.errstate(over="ignore"):  # what is beyond numbers is infinite, and told so
-            rows = rows.astype(float)
-    if rows.dtype.kind not in "fiu":
-        # what is narrower is widened by whoever copies it
-        if rows.dtype.kind not in "bO":
-            raise InputError(f"{what} holds {rows.dtype}; expected real numbers")
-        try:
-            rows = np.asarray(rows, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{what} holds {rows.dtype}; expected real numbers") from None
-    if rows.ndim != 2 or rows.shape[1] != width:
-        raise InputError(f"{what} has shape {rows.shape}; expected (n, {width})")
-    return rows

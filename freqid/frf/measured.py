@@ -39,6 +39,6 @@ def measured(
 
 
 def units_of(record: Record | Stream) -> dict[str, str]:
-    """Units of its channels; a stream has none."""
-    own = record.units if isinstance(record, Record) else {}
+    """Units of its channels."""
+    own = record.units
     return {n: unit for n, unit in own.items() if n in (*record.input_names, *record.output_names)}

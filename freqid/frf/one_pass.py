@@ -117,7 +117,7 @@ def _stretch(
         return None
     record = Record(
         flat(u), flat(y), stream.dt, stream.hold, input_names=stream.input_names,
-        output_names=stream.output_names, conditions=stream.conditions,
+        output_names=stream.output_names, conditions=stream.conditions, units=stream.units,
     )  # fmt: skip
     return record if limits is None else _in_band(record, limits, every)
 

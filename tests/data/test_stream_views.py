@@ -346,3 +346,26 @@ def test_parquet_with_a_last_row_of_its_own_and_other_columns(tmp_path):
     assert fq.open(tmp_path / "two.parquet").dt == pytest.approx(DT)
     # turned
     assert np.array_equal(fq.open(tmp_path / "two.parquet", "y", "u").load().u, X[:2001, 1])
+
+
+@pytest.mark.parametrize("kind", ["h5", "parquet", "zarr"])
+def test_units_stay_with_their_channels(kind, tmp_path):
+    record = fq.Record(RECORD.u, RECORD.y[:, 0], DT, units={"u": "N m", "y": "rad/s"})
+    path = tmp_path / f"log.{kind}"
+    if kind == "parquet":
+        fq.write(record, path)
+    else:
+        library = pytest.importorskip({"h5": "h5py"}.get(kind, kind))
+        file = library.File(path, "w") if kind == "h5" else library.open_group(path, mode="w")
+        for name, x, unit in (("u", record.u, "N m"), ("y", record.y, "rad/s"), ("v", 0, "")):
+            made = file.create_dataset if kind == "h5" else file.create_array
+            made(name, data=np.ascontiguousarray(x * np.ones(len(record.u))))
+            file[name].attrs["units"] = unit
+        if kind == "h5":
+            file.close()
+    stream = fq.open(path, "u", "y", dt=record.dt)
+    assert dict(stream.units) == record.units
+    assert stream.load().units == record.units
+    assert fq.h1(stream, 200).unit() == fq.h1(record, 200).unit() == "(rad/s)/(N m)"
+    assert fq.fit(fq.first_order(), stream, band=(2, 20)).data[0].units == record.units
+    assert stream.select("u", "y").slice(0, 1).decimate(2).load().units == record.units
