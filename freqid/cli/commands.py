@@ -27,6 +27,7 @@ from freqid.cli.terminal import (
     write_picture,
     write_table,
 )
+from freqid.cli.words import typed
 
 # kinds of files whose channels are found as they are read
 TEXTS = (".csv", ".txt", ".dat", ".tsv", ".asc")
@@ -163,7 +164,7 @@ def show_file(
         _print_channels(file)
     print(repr(record).strip("<>"))
     for note in record.notes:
-        print(f"note: {note}")
+        print(f"note: {typed(note)}")
     found = fq.check_record(record)
     for row in found[found["finding"] != "note"].itertuples(index=False):
         print(f"{row.channel}: {row.finding} {row.value:g}")
@@ -290,11 +291,7 @@ def _fail(message: str, status: int = 2) -> None:
     with contextlib.suppress(OSError):
         # what was not said cannot be said later, either
         sys.stdout.flush()
-    print(f"freqid: {' '.join(message.split())}", file=sys.stderr)
+    print(f"freqid: {typed(' '.join(message.split()))}", file=sys.stderr)
     if sys.stdout is sys.__stdout__ and sys.stdout is not None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     sys.exit(status)
-
-
-if __name__ == "__main__":
-    main()

@@ -13,6 +13,7 @@ from freqid.cli.fleets import engine, matching
 from freqid.cli.options import Asked, Force, Reading, Search
 from freqid.cli.plants import TEMPLATE, pairs
 from freqid.cli.terminal import PICTURES, may_write, progress, show, write_picture
+from freqid.cli.words import typed
 from freqid.data import whole_file
 from freqid.fitting import in_digits
 
@@ -106,12 +107,12 @@ def fit(
         from freqid.pages import validated
 
         found = validated(estimate, other)
-    print(f"verdict: {found.grade}: {found.reasons[0]}")
-    print(f"witness {estimate.witness.verdict}: {estimate.witness.sentence}")
+    print(f"verdict: {found.grade}: {typed(found.reasons[0])}")
+    print(f"witness {estimate.witness.verdict}: {typed(estimate.witness.sentence)}")
     for warning in estimate.warnings:
-        print(f"warning: {warning}")
+        print(f"warning: {typed(str(warning))}")
     for note in [*getattr(record, "notes", ()), *estimate.notes]:
-        print(f"note: {note}")
+        print(f"note: {typed(note)}")
     if compared is not None and validate is not None:
         shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)
         print(f"{validate.name}, which was not fitted: {shares} explained")

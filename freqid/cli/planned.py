@@ -12,6 +12,7 @@ import freqid as fq
 from freqid.checks import choice, whole
 from freqid.cli.options import Asked, Force
 from freqid.cli.terminal import PICTURES, TABLES, may_write, show, write_picture, write_table
+from freqid.cli.words import typed
 from freqid.excitation import below_nyquist
 from freqid.lti import holds
 
@@ -68,7 +69,7 @@ def bias(
     if parameter is None and len(finite):
         parameter = finite.loc[finite["relative_bias"].abs().idxmax(), "parameter"]
     for message in dict.fromkeys(m for m in table["message"] if m):
-        print(f"warning: {message}")
+        print(f"warning: {typed(message)}")
     nyquist = 0.5 / base_dt
     uppers = sorted({float(f"{u:.3g}") for u in np.linspace(low, 2 * high - low, 15)[2:]} | {high})
     around = {f"{low:g}-{u:g}": fq.ChirpSpectrum(low, u) for u in uppers if u <= nyquist}

@@ -118,3 +118,17 @@ def test_bias_for_one_parameter_to_a_table(folder, capsys):
     assert code == 0, capsys.readouterr().err
     assert set(pd.read_csv("bias.csv")["parameter"]) == {"a", "b"}
     assert Path("bias.png").stat().st_size > 1000
+
+
+def test_what_is_to_be_done_is_said_as_it_is_typed(folder, capsys):
+    table = fq.read("log.csv").to_frame().reset_index()
+    table.assign(v=table["u"]).rename(columns={"u": "p"}).to_csv("three.csv", index=False)
+    assert run("fit", "three.csv", "--model", "mine.py:plant") == 2
+    assert "no --input, no --output: name them; the columns are" in capsys.readouterr().err
+    uneven = table.assign(time=table["time"] + 2e-3 * np.sin(np.arange(len(table))))
+    uneven.to_csv("uneven.csv", index=False)
+    assert run("frf", "uneven.csv") == 2
+    assert "; --resample puts them on a regular grid" in capsys.readouterr().err
+    table.assign(time=np.arange(len(table))).to_csv("steps.csv", index=False)
+    assert run("show", "steps.csv") == 0
+    assert "give --units time=ms where they are milliseconds" in capsys.readouterr().out
