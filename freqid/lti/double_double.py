@@ -22,7 +22,7 @@ _HALF = 2.0**27 + 1
 
 
 class Doubled(NamedTuple):
-    """``high + low`` (n, m), real or complex, of which low is below the last digit of high."""
+    """``high + low`` (…, n, m), real or complex, of which low is below the last digit of high."""
 
     high: Array
     low: Array
@@ -52,9 +52,9 @@ class Doubled(NamedTuple):
     def __matmul__(self, other: Doubled) -> Doubled:
         if np.iscomplexobj(self.high) or np.iscomplexobj(other.high):
             real = Doubled(*map(_acting, self)) @ Doubled(*map(_stacked, other))
-            n = len(self.high)
-            return Doubled(*(M[:n] + 1j * M[n:] for M in real))
-        left, right = _slices(self, 1), _slices(other, 0)
+            n = self.high.shape[-2]
+            return Doubled(*(M[..., :n, :] + 1j * M[..., n:, :] for M in real))
+        left, right = _slices(self, -1), _slices(other, -2)
         high = left[0] @ right[0]
         low = np.zeros_like(high)
         # what is left out lies below the slices' last bit
@@ -88,12 +88,12 @@ def _sum(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _acting(M: Array) -> FloatArray:
-    """The real matrix (2n, 2m) that acts on real parts above imaginary ones."""
+    """The real matrix (…, 2n, 2m) that acts on real parts above imaginary ones."""
     return np.block([[M.real, -M.imag], [M.imag, M.real]])
 
 
 def _stacked(M: Array) -> FloatArray:
-    return np.concatenate([M.real, M.imag])
+    return np.concatenate([M.real, M.imag], axis=-2)
 
 
 def _slices(M: Doubled, axis: int) -> list[FloatArray]:

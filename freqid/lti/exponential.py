@@ -43,17 +43,17 @@ def _kind(X: Array) -> str:
 
 
 def doubled_exponential(X: Doubled) -> Doubled:
-    """exp(X) of a matrix (n, n) by its series, scaled and squared with twice the digits.
+    """exp(X) of matrices (…, n, n) by its series, scaled and squared with twice the digits.
 
     In doubles an exponential errs by the last digit of its fastest motion, which may be all that is
     known of the slowest.
     """
-    size = float(np.linalg.norm(X.high, 1))
+    size = float(np.linalg.norm(X.high, 1, axis=(-2, -1)).max(initial=0))
     if not np.isfinite(size):
         return Doubled.of(np.full_like(X.high, np.nan))
     squarings = max(int(np.ceil(np.log2(size / _SMALL))), 0) if size > 0 else 0
     small = Doubled(*(M / 2.0**squarings for M in X))
-    one = E = Doubled.of(np.eye(len(X.high), dtype=X.high.dtype))
+    one = E = Doubled.of(np.eye(X.high.shape[-1], dtype=X.high.dtype))
     for k in range(_TERMS, 0, -1):
         E = one + (small @ E) / k
     with np.errstate(over="ignore", invalid="ignore"):

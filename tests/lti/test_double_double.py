@@ -154,3 +154,16 @@ def test_long_chains_that_a_balance_grades_keep_their_digits(rate):
     ours = fq.ZeroOrderHold(h).sampled(A, B)
     assert apart(ours.phi, exact[:10, :10]) < 1e-14
     assert apart(ours.gamma, exact[:10, 10:]) < 1e-14
+
+
+@pytest.mark.parametrize("kind", [float, complex])
+def test_many_at_once_are_what_each_is(kind):
+    rng = np.random.default_rng(8)
+    many = drawn(rng, (4, 5, 5), kind)
+    many = Doubled(*(M / np.abs(many.high).max() * 40 for M in many))
+    both, grown = many @ many, doubled_exponential(many)
+    for i in range(4):
+        one = Doubled(*(M[i] for M in many))
+        assert apart(Doubled(*(M[i] for M in both)), exactly(one) * exactly(one)) < 1e-25
+        wanted = mpmath.expm(exactly(one))
+        assert apart(Doubled(*(M[i] for M in grown)), wanted) < 1e-20

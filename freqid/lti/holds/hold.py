@@ -173,9 +173,9 @@ class PeriodicHold(Hold):
         big[:, :size, size:] = dX
         if exact or _fast(A * h):
             low = self._generator(Doubled.product(A, h), Doubled.product(B, h)).low
-            both = scipy.linalg.block_diag(low, low)
-            every = [doubled_exponential(Doubled(one, both)) for one in big]
-            parts = (np.stack(part)[:, :size, size:] for part in zip(*every, strict=True))
+            both = np.broadcast_to(scipy.linalg.block_diag(low, low), big.shape)
+            every = doubled_exponential(Doubled(big, both))
+            parts = (part[:, :size, size:] for part in every)
             change = self._of(Doubled(*parts), B.shape)
             if all(np.isfinite(M).all() for M in change):
                 return self._sampled(A, B, exact), change
