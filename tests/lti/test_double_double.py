@@ -167,3 +167,15 @@ def test_many_at_once_are_what_each_is(kind):
         assert apart(Doubled(*(M[i] for M in both)), exactly(one) * exactly(one)) < 1e-25
         wanted = mpmath.expm(exactly(one))
         assert apart(Doubled(*(M[i] for M in grown)), wanted) < 1e-20
+
+
+def test_the_slowest_rate_is_known_to_its_own_last_digits():
+    """Of two rates seven decades apart no other is near, and it is their own size that counts."""
+    rng = np.random.default_rng(4)
+    V = rng.standard_normal((2, 2))
+    A = V @ np.diag([-1e-7, -1.0]) @ np.linalg.inv(V)
+    eigen = eigenvectors(StateSpace(A, np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1))))
+    exact = sorted(mpmath.eig(exactly(A), right=False, left=False), key=abs)
+    found = sorted(eigen[0], key=abs)
+    for ours, theirs in zip(found, exact, strict=True):
+        assert abs(mpmath.mpc(ours) / theirs - 1) < 1e-13
