@@ -18,6 +18,7 @@ import sys
 import tempfile
 import warnings
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -129,13 +130,16 @@ def main():
     parser.add_argument("--runs", type=int, default=1_000_000)
     parser.add_argument("--seconds", type=int, default=0, help="of all targets together")
     parser.add_argument("--out", type=Path, default=Path("fuzz_corpus"))
+    parser.add_argument("--jobs", type=int, default=1, help="targets at a time")
     given = parser.parse_args()
     chosen, total = given.targets or names, 0
-    for name in chosen:
-        each = max(given.seconds // len(chosen), 1) if given.seconds else 0
-        done, failed, slowest, most = _run(name, given.out, given.runs, each)
-        total += failed
-        show(f"{name}, {done} inputs, slowest {slowest} s, {most} MiB", f"{failed} other", "0")
+    each = max(given.seconds * given.jobs // len(chosen), 1) if given.seconds else 0
+    with ThreadPoolExecutor(given.jobs) as pool:
+        all_done = pool.map(lambda name: _run(name, given.out, given.runs, each), chosen)
+        for name, (done, failed, slowest, most) in zip(chosen, all_done, strict=True):
+            total += failed
+            told = f"{name}, {done} inputs, slowest {slowest} s, {most} MiB"
+            show(told, f"{failed} other", "0")
     return total
 
 
