@@ -163,7 +163,7 @@ def fit_many(
         for grade, count in table["verdict"].value_counts().items():
             print(f"  {grade}: {count}")
     for row in failed.head(10).itertuples():
-        print(f"  {row.error}")
+        print(f"  {typed(str(row.error))}")
     return 0 if len(failed) < len(table) else 1
 
 

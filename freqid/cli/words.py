@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 
 # arguments that are options of a command, by other names or the same
 _OPTIONS = {"inputs": "input", "outputs": "output"} | {
@@ -13,23 +14,28 @@ _OPTIONS = {"inputs": "input", "outputs": "output"} | {
         "initial_state", "conditions", "start", "segment", "method",
     )
 }  # fmt: skip
-# ``dt=``, ``dt=0.01`` or ``inputs=None``, and no part of a name, a call or an option
+# ``dt=``, ``resample=True`` or ``inputs=None``: one with a value of its own may be what was typed
 _ARGUMENT = re.compile(
-    rf"(?:^|(?<=\s)|(?<=\s\())({'|'.join(_OPTIONS)})=(None\b|True\b|(?=[\s:;,.)]|$))?"
+    rf"(?:^|(?<=\s)|(?<=\s\())({'|'.join(_OPTIONS)})=(None\b|True\b|(?=[\s:;,.)]|$))"
 )
-_PAIR = re.compile(r"--(units|conditions|start) \{'([^']*)': '?([^'}]*)'?\}")
+# what stands within the brackets of a call
+_CALL = re.compile(r"\w\([^()]*$")
+_UNITS = re.compile(r"units=\{(['\"])(.+?)\1: '([^']*)'\}")
 
 
 def typed(sentence: str) -> str:
     """A sentence in which arguments are options of the command line.
 
-    >>> typed("inputs=None, outputs=None: name them; or give dt=0.01, or resample=True")
-    'no --input, no --output: name them; or give --dt 0.01, or --resample'
+    >>> typed("inputs=None, outputs=None: name them; sep= parts cells, resample=True fills gaps")
+    'no --input, no --output: name them; --sep parts cells, --resample fills gaps'
     """
 
     def option(found: re.Match[str]) -> str:
-        name = f"--{_OPTIONS[found[1]]}"
-        return f"no {name}" if found[2] == "None" else name if found[2] is not None else f"{name} "
+        if _CALL.search(sentence, 0, found.start()):
+            return found[0]
+        return f"{'no ' if found[2] == 'None' else ''}--{_OPTIONS[found[1]]}"
 
-    told = _ARGUMENT.sub(option, sentence)
-    return _PAIR.sub(r"--\1 \2=\3", told)
+    def units(found: re.Match[str]) -> str:
+        return f"--units {shlex.quote(f'{found[2]}={found[3]}')}"
+
+    return _UNITS.sub(units, _ARGUMENT.sub(option, sentence))

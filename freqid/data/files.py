@@ -12,7 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
-from freqid.checks import InputError, an, flag, listed, path_of, unknown
+import numpy as np
+
+from freqid.checks import InputError, an, finite, flag, listed, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
@@ -118,9 +120,11 @@ def read(
         frame, said = with_time(frame, time, told, dt)
         # which is in s now
         told.pop("time", None)
+        # what is cut off may be damaged
         if stop is not None and "time" in frame.columns:
-            # what is cut off may be damaged
             frame = frame[~(frame["time"] > frame["time"].iloc[0] + stop)]
+        if start is not None and "time" in frame.columns:
+            frame, start = _begun(frame, finite("start", start))
         record = Record.from_frame(
             frame, _known(inputs, frame), _known(outputs, frame), dt, hold,
             _known(reference, frame), units=told, resample=resample,
@@ -130,8 +134,22 @@ def read(
     except ResponseFile:
         raise
     except InputError as error:
-        text = str(error).replace(_REPAIR, "stop= cuts the file before, resample=True fills gaps")
+        text = str(error).replace(
+            _REPAIR, "start= and stop= cut the file, resample=True fills gaps"
+        )
         raise InputError(f"{path}: {text} (found {found})") from None
+
+
+def _begun(frame: pd.DataFrame, start: float) -> tuple[pd.DataFrame, float]:
+    """The rows from the last one on that lacks nothing and is none after ``start`` (s), and what is
+    left of that: a slower output begins with one.
+    """
+    t = frame["time"].to_numpy(dtype=float)
+    if len(t) == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+        return frame, start
+    usable = np.flatnonzero(frame.notna().all(axis=1).to_numpy() & (t <= t[0] + start))
+    first = int(usable[-1]) if len(usable) else 0
+    return frame.iloc[first:], max(start - (t[first] - t[0]), 0.0)
 
 
 def _no_table(path: Path, given: Mapping[str, object]) -> None:

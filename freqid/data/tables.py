@@ -59,8 +59,15 @@ def frame_of(
         frame.attrs["units"] = {name: unit for name, unit in told if unit}
         frame.attrs.pop("notes", None)
     if "units" not in frame.attrs:
-        frame.attrs["units"] = {n: u for n, u in map(named, map(str, frame.columns)) if u}
-        frame.columns = [named(str(c))[0] for c in frame.columns]
+        given = [str(c) for c in frame.columns]
+        told = [named(c) for c in given]
+        names = [name for name, _ in told]
+        if twice := [c for c, n in zip(given, names, strict=True) if names.count(n) > 1]:
+            raise InputError(
+                f"{path}: columns {twice} have one name but for their units; columns= renames them"
+            )
+        frame.attrs["units"] = {name: unit for name, unit in told if unit}
+        frame.columns = names
     return frame
 
 

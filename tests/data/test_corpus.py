@@ -153,6 +153,37 @@ def test_a_workbook_that_begins_with_the_time_alone(tmp_path):
     record = fq.read(tmp_path / "log.xlsx", "torque", "speed", resample=True)
     assert record.units["torque"] == "N m"
     np.testing.assert_allclose(record.y[3:], Y[3:])
+    with pytest.raises(ValueError, match="start= and stop= cut the file"):
+        fq.read(tmp_path / "log.xlsx", "torque", "speed")
+    whole = fq.read(tmp_path / "log.xlsx", "torque", "speed", start=T[3] - T[0])
+    np.testing.assert_allclose(whole.y, Y[3:])
+    # the same with dates for the time
+    stamps = pd.Timestamp("2024-01-01") + pd.to_timedelta(np.arange(len(T)), unit="s")
+    frame.assign(time=stamps).to_excel(tmp_path / "dates.xlsx", index=False)
+    dated = fq.read(tmp_path / "dates.xlsx", "torque", "speed", start=3)
+    np.testing.assert_allclose(dated.y, Y[3:])
+    assert dated.dt == pytest.approx(1)
+
+
+@pytest.mark.parametrize("opened", [fq.read, fq.open])
+def test_columns_of_one_name_but_for_their_units(opened, tmp_path):
+    pytest.importorskip("pyarrow")
+    frame = pd.DataFrame({"time": T, "u [V]": U, "u [mV]": 1e3 * U, "y": Y})
+    frame.to_parquet(tmp_path / "log.parquet")
+    with pytest.raises(ValueError, match=r"\['u \[V\]', 'u \[mV\]'\] have one name but for"):
+        opened(tmp_path / "log.parquet", "u", "y")
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1, 0.105, 0.33])
+def test_where_a_file_is_begun_is_where_its_record_is(start, tmp_path):
+    """Of a slower output, whose column is blank between its samples, too."""
+    record = fq.Record(U, Y, 0.01)
+    for r in (record, record.decimate(5, keep_input=True)):
+        fq.write(r, tmp_path / "log.csv", overwrite=True)
+        begun, cut = fq.read(tmp_path / "log.csv", start=start), r.slice(start)
+        np.testing.assert_array_equal(begun.y, cut.y)
+        np.testing.assert_array_equal(begun.u, cut.u)
+        assert (begun.dt, begun.input_dt, begun.hold) == (cut.dt, cut.input_dt, cut.hold)
 
 
 def test_matlab(tmp_path):
@@ -271,7 +302,7 @@ def test_what_is_cut_off_may_be_damaged(tmp_path):
     frame = pd.DataFrame({"time": t, "u": np.sin(9 * t), "y": np.cos(9 * t)})
     frame.loc[60, "y"] = np.nan
     frame.to_csv(tmp_path / "r.csv", index=False)
-    with pytest.raises(ValueError, match="stop= cuts the file before, resample=True fills"):
+    with pytest.raises(ValueError, match="start= and stop= cut the file, resample=True fills"):
         fq.read(tmp_path / "r.csv")
     assert fq.read(tmp_path / "r.csv", stop=0.5).n_samples == 50
 

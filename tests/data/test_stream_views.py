@@ -369,3 +369,17 @@ def test_units_stay_with_their_channels(kind, tmp_path):
     assert fq.h1(stream, 200).unit() == fq.h1(record, 200).unit() == "(rad/s)/(N m)"
     assert fq.fit(fq.first_order(), stream, band=(2, 20)).data[0].units == record.units
     assert stream.select("u", "y").slice(0, 1).decimate(2).load().units == record.units
+
+
+def test_units_of_older_programs(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, x, unit in zip("uy", (RECORD.u, RECORD.y[:, 0]), (b"\xb5V", "°C"), strict=True):
+            file[name] = x
+            file[name].attrs["units"] = unit
+    units = {"u": "µV", "y": "°C"}
+    record = fq.read(tmp_path / "log.h5", "u", "y", dt=DT)
+    stream = fq.open(tmp_path / "log.h5", "u", "y", dt=DT)
+    assert record.units == units == dict(stream.units)
+    fq.h1(stream, 500).to_frame().to_csv(tmp_path / "frf.csv")
+    assert fq.read_response(tmp_path / "frf.csv").units == units

@@ -1,6 +1,7 @@
 """Periodic data with noise on both ends: means, their covariance, and the fit to them."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -214,6 +215,29 @@ def test_error_bars_of_several_outputs_hold():
         est = fq.fit(plant, fq.periodic(fq.Record(u, y, DT, hold="bl"), 1.0, skip=1), n_starts=1)
         score.append((est.values - list(true.values())) / est.parameters["std"])
     assert np.sqrt(np.mean(np.square(score))) == pytest.approx(1, abs=0.06)
+
+
+def test_error_bars_do_not_depend_on_the_order_of_the_outputs():
+    gains, names = {"p": 100.0, "q": 40.0, "r": 70.0}, ["p", "q", "r"]
+
+    def plant(order):
+        return fq.GreyBox(
+            lambda a, g: ([[-a]], [[1.0]], [[gains[n] * g] for n in order], np.zeros((3, 1))),
+            [fq.Parameter("a", 60.0), fq.Parameter("g", 1.0)], outputs=order,
+        )  # fmt: skip
+
+    clean = fq.simulate(plant(names), np.tile(PERIOD, 5), DT, hold="bl")
+    rng = np.random.default_rng(1)
+    mixed = rng.standard_normal(clean.y.shape) @ [[1.0, 0.6, 0], [0, 1.0, 0.6], [0, 0, 1.0]]
+    noisy = fq.Record(
+        clean.u, clean.y + 0.1 * clean.y.std(axis=0) * mixed, DT, hold="bl", output_names=names
+    )
+    frf = fq.periodic(noisy, 1.0, skip=1)
+    own = fq.fit(plant(names), frf)
+    for order in itertools.permutations(names):
+        est = fq.fit(plant(list(order)), frf)
+        np.testing.assert_allclose(est.values, own.values, rtol=1e-7)
+        np.testing.assert_allclose(est.parameters["std"], own.parameters["std"], rtol=1e-6)
 
 
 def test_a_slow_output_keeps_its_fast_input():

@@ -34,10 +34,20 @@ def unit_of(attributes: Mapping[str, object]) -> str:
     """The unit that an array's attributes name, ``ms since 2020-01-01`` without its beginning."""
     for name in ("units", "unit", "Units", "Unit"):
         told = attributes.get(name)
-        told = told.decode("utf-8", "replace") if isinstance(told, bytes) else told
-        if isinstance(told, str) and told.strip():
-            return told.split(" since ")[0].strip()
+        # h5py keeps bytes that are no UTF-8 as halves of characters, which nobody can write
+        raw = told.encode("utf-8", "surrogateescape") if isinstance(told, str) else told
+        text = _text(raw) if isinstance(raw, bytes) else ""
+        if text.strip():
+            return text.split(" since ")[0].strip()
     return ""
+
+
+def _text(raw: bytes) -> str:
+    """A text in UTF-8, or else in the Latin letters of older programs, °C or µV."""
+    try:
+        return raw.decode()
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
 
 
 def step_of(numbers: Mapping[str, float]) -> float | None:

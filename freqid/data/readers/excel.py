@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,9 @@ from freqid.data.readers.table import heading
 
 if TYPE_CHECKING:
     import pandas as pd
+
+# cells that are times
+_TIMES = (datetime.date, datetime.time, datetime.timedelta)
 
 
 @reads(".xlsx", ".xls", ".xlsm", ".ods")
@@ -52,7 +56,7 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
         if first is None or second is None:
             continue
         # samples of which some are not there yet, as those of a slower channel are
-        while first and _holds_numbers_alone(rows[first - 1]):
+        while first and _are_samples(rows[first - 1]):
             first -= 1
         width = len(rows[first])
         names, units, _ = heading([[str(c) for c in r] for r in rows[:first]], width)
@@ -73,8 +77,8 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
     return found[0]
 
 
-def _holds_numbers_alone(row: list[Any]) -> bool:
-    return all(c in ("", None) or _is_number(c) for c in row)
+def _are_samples(row: list[Any]) -> bool:
+    return all(c in ("", None) or _is_number(c) or isinstance(c, _TIMES) for c in row)
 
 
 def _is_number(cell: Any) -> bool:

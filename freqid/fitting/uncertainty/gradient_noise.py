@@ -126,11 +126,13 @@ def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
         return None
     parts = [e.at(realisation) for e in periodic]
     J = np.concatenate([part.jacobian(None) for part in parts], axis=1)
-    rest = 1 - leverage(J, np.zeros((0, J.shape[1])))[::2]
+    taken = leverage(J, np.zeros((0, J.shape[1])))[::2]
     total, at = np.zeros((len(x), len(x))), 0
     for e, part in zip(periodic, parts, strict=True):
         p, n = len(e.data.response), part.residual.size // 2
-        error = part.residual.view(complex) / rest[at : at + n]
+        # how the errors of a line are turned into independent ones depends on the outputs' order
+        rest = 1 - taken[at : at + n].reshape(-1, p).mean(axis=1)
+        error = part.residual.view(complex) / np.repeat(rest, p)
         seen = J[:, 2 * at : 2 * (at + n)].copy().view(complex).conj() * error
         score = seen.reshape(len(x), -1, p).sum(axis=-1)
         total += (score @ score.conj().T).real / 2
