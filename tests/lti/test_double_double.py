@@ -3,12 +3,14 @@
 import mpmath
 import numpy as np
 import pytest
+import scipy.linalg
 
 import freqid as fq
 from freqid.lti import StateSpace, basis_of, points
 from freqid.lti.double_double import Doubled
 from freqid.lti.eigenvectors import eigenvectors, refined
 from freqid.lti.exponential import doubled_exponential
+from freqid.lti.holds.units import Units
 from freqid.lti.responses import transfer
 
 
@@ -179,3 +181,43 @@ def test_the_slowest_rate_is_known_to_its_own_last_digits():
     found = sorted(eigen[0], key=abs)
     for ours, theirs in zip(found, exact, strict=True):
         assert abs(mpmath.mpc(ours) / theirs - 1) < 1e-13
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 0.1, 1.0, 1e9])
+@pytest.mark.parametrize("hold", [fq.ZeroOrderHold, fq.FirstOrderHold])
+def test_digits_do_not_depend_on_the_unit_of_time(hold, scale):
+    """Rates nine decades apart: what is fast is so beside the period, whatever the seconds are."""
+    V = np.array([[1.0, 0.4], [0.3, 1.0]])
+    A = V @ np.diag([-1e-6, -1e3]) @ np.linalg.inv(V)
+    B, dA = np.array([[1.0], [2.0]]), np.array([[[0.0, 1.0], [0.5, 0.0]]])
+    h, dB = 1.0, np.zeros((1, 2, 1))
+    found, slope = hold(h / scale).sampled_derivatives(A * scale, B * scale, dA * scale, dB)
+    phi = mpmath.expm(exactly(A) * h)
+    step = mpmath.mpf(10) ** -20
+    moved = (mpmath.expm(exactly(A) + step * exactly(dA[0])) - phi) / step
+    assert apart(found.phi, phi) < 1e-13
+    assert apart(slope.phi[0], moved) < 1e-12
+    same = hold(h / scale).sampled(A * scale, B * scale)
+    for ours, theirs in zip(found, same, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-14 * np.abs(theirs).max())
+
+
+def test_states_in_units_far_apart_keep_their_digits():
+    """Balanced, an entry may be next to nothing that is the largest in the user's units."""
+    rng, hidden = np.random.default_rng(0), 0
+    for _ in range(400):
+        n = int(rng.integers(2, 6))
+        V = rng.standard_normal((n, n))
+        A = V @ np.diag(-(10 ** rng.uniform(-1, 1.3, n))) @ np.linalg.inv(V)
+        units = 10.0 ** rng.integers(-9, 9, n)
+        A = A * units / units[:, None]
+        if rng.random() < 0.5:
+            A *= rng.random((n, n)) < 0.7
+        B, h = rng.standard_normal((n, 1)), 0.3
+        within = Units.of(A, B, h)
+        if not within.hide(scipy.linalg.expm(within.into(A, B)[0] * h)):
+            continue
+        hidden += 1
+        found = fq.ZeroOrderHold(h).sampled(A, B)
+        assert apart(found.phi, mpmath.expm(exactly(A) * mpmath.mpf(h))) < 1e-14
+    assert hidden
