@@ -34,16 +34,19 @@ def unit_of(attributes: Mapping[str, object]) -> str:
     """The unit that an array's attributes name, ``ms since 2020-01-01`` without its beginning."""
     for name in ("units", "unit", "Units", "Unit"):
         told = attributes.get(name)
-        # h5py keeps bytes that are no UTF-8 as halves of characters, which nobody can write
-        raw = told.encode("utf-8", "surrogateescape") if isinstance(told, str) else told
-        text = _text(raw) if isinstance(raw, bytes) else ""
+        text = _text(told) if isinstance(told, (str, bytes)) else ""
         if text.strip():
             return text.split(" since ")[0].strip()
     return ""
 
 
-def _text(raw: bytes) -> str:
-    """A text in UTF-8, or else in the Latin letters of older programs, °C or µV."""
+def _text(told: str | bytes) -> str:
+    """A text that can be written: in UTF-8, or else in the Latin letters of older programs."""
+    try:
+        # h5py keeps bytes that are no UTF-8 as halves of characters
+        raw = told.encode("utf-8", "surrogateescape") if isinstance(told, str) else told
+    except UnicodeEncodeError:
+        raw = told.encode("utf-8", "replace") if isinstance(told, str) else told
     try:
         return raw.decode()
     except UnicodeDecodeError:
