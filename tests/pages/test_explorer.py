@@ -29,6 +29,8 @@ from freqid.pages.explorer.words import believed, sentence
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
 SHOTS = Path(__file__).parents[2] / "artefacts"
+# seconds, of a machine that does other things as well
+PATIENCE = 60
 
 
 @pytest.fixture(scope="module")
@@ -92,13 +94,13 @@ def errors(browser):
 
 
 def until(browser, condition, what):
-    for _ in range(150):
+    for _ in range(10 * PATIENCE):
         with contextlib.suppress(Exception):
             found = browser.execute_script(condition)
             if found:
                 return found
         time.sleep(0.1)
-    raise AssertionError(f"waited 15 s for {what}")
+    raise AssertionError(f"waited {PATIENCE} s for {what}")
 
 
 VERDICT = "return document.getElementById('verdict').textContent"
@@ -116,12 +118,12 @@ def notch(curve):
 
 def eventually(browser, condition, what):
     """The curves once they meet a condition: the figure follows the sentence by a moment."""
-    for _ in range(150):
+    for _ in range(10 * PATIENCE):
         curves = {c[0]: c for c in browser.execute_script(CURVE)}
         if "estimate" in curves and condition(curves):
             return
         time.sleep(0.1)
-    raise AssertionError(f"waited 15 s for {what}")
+    raise AssertionError(f"waited {PATIENCE} s for {what}")
 
 
 def left_notch(curves):
