@@ -107,6 +107,10 @@ def test_a_period_must_be_positive(bad):
 def test_matrices_must_agree_in_shape():
     with pytest.raises(ValueError, match=r"A has shape \(2, 3\)"):
         fq.ZeroOrderHold(1).sampled(np.ones((2, 3)), np.ones((2, 1)))
+    for A, B in ((np.ones((2, 2, 2)), np.ones((2, 1))), (np.eye(2), np.ones(2)),
+                 (np.eye(2), np.ones((3, 1)))):  # fmt: skip
+        with pytest.raises(ValueError, match=r"expected \(n, n\) and \(n, inputs\)"):
+            fq.ZeroOrderHold(1).sampled(A, B)
 
 
 def test_an_unknown_hold_is_named(slow, plant):
