@@ -157,7 +157,10 @@ def products(a: ComplexArray, b: ComplexArray) -> ComplexArray:
                 power = np.einsum("sk,sk->k", parts, parts)
                 found[:, i, j] = power[::2] + power[1::2]
             else:
-                found[:, i, j] = np.einsum("sk,sk->k", x, y.conj())
+                # a third quicker than an einsum of complex numbers
+                both = y.conj()
+                both *= x
+                found[:, i, j] = both.sum(axis=0)
     return found
 
 
