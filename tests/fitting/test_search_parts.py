@@ -1,0 +1,79 @@
+"""Parts of the search beside what they are said to be: scattered starts, what an end leaves."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from freqid.fitting.search.descent import INTERRUPTED, best_so_far
+from freqid.fitting.search.scatter import around, promising
+
+
+def structure(start, reach=3.0, lower=-1e9, upper=1e9):
+    """Unknowns within bounds, whose span is a factor about the start, or as far on both sides."""
+    start = np.asarray(start, float)
+    return SimpleNamespace(
+        lower=np.full(len(start), lower),
+        upper=np.full(len(start), upper),
+        span=lambda x: (
+            np.where(x != 0, np.minimum(x / reach, x * reach), -reach),
+            np.where(x != 0, np.maximum(x / reach, x * reach), reach),
+        ),
+    )
+
+
+def test_half_of_the_starts_lie_half_way_on_a_logarithm():
+    start = np.array([2.0, -50.0])
+    points = around(structure(start), start, 64, seed=1)
+    far = np.abs(np.log(points / start))
+    # of a span of ln 3 on both sides the near half takes the inner half, the others all of it
+    assert far[:32].max() <= np.log(3) / 2 * (1 + 1e-12)
+    assert far[:32].max() > 0.9 * np.log(3) / 2
+    assert far[32:].max() > 0.9 * np.log(3)
+    assert abs(np.log(points / start)[32:].mean(axis=0)).max() < 0.1
+
+
+def test_where_signs_differ_half_way_is_the_mean():
+    start = np.zeros(1)
+    points = around(structure(start), start, 64, seed=2)[:, 0]
+    assert np.abs(points[:32]).max() <= 1.5
+    assert np.abs(points[32:]).max() > 2.7
+    assert (points < 0).any()
+    assert (points > 0).any()
+
+
+def test_scattered_starts_keep_within_bounds():
+    start = np.array([2.0, 3.0])
+    points = around(structure(start, lower=1.5, upper=4.0), start, 50, seed=3)
+    assert ((points >= 1.5) & (points <= 4.0)).all()
+
+
+def test_the_most_promising_come_first_and_what_has_no_cost_last():
+    def point(x):
+        return None if x[0] > 4 else SimpleNamespace(cost=(x[0] - 3) ** 2)
+
+    start = np.array([2.0])
+    cost = SimpleNamespace(structure=structure(start), point=point)
+    first = promising(cost, start, 5, seed=0)[:, 0]
+    assert (np.diff((first - 3) ** 2) >= 0).all()
+    assert abs(first[0] - 3) < 0.1
+    assert (promising(cost, start, 64, seed=0)[-1] > 4).all()
+
+
+def test_an_interrupted_search_tells_the_first_cost_at_the_best_point():
+    def cost(least, off):
+        return SimpleNamespace(least=least, point=lambda x: (off, float(x[0])))
+
+    start = np.array([1.0])
+    known = cost((np.array([7.0]), 0.1), "fit"), cost((np.array([9.0]), 0.2), "few lines")
+    for objectives, point in (
+        (known, ("fit", 7.0)),
+        ((cost(None, "fit"), known[1]), ("fit", 9.0)),
+        ((cost(None, "fit"), cost(None, "few lines")), ("fit", 1.0)),
+    ):
+        found = best_so_far(objectives, start)
+        assert found.point == point
+        assert found.x == pytest.approx(point[1])
+        assert (found.converged, found.message) == (False, INTERRUPTED)
+    lost = SimpleNamespace(least=None, point=lambda x: None)
+    assert best_so_far([lost], start) is None
