@@ -12,6 +12,7 @@ five seconds, or more than 256 MiB at once, has.
 """
 
 import argparse
+import contextlib
 import re
 import subprocess
 import sys
@@ -28,6 +29,8 @@ SLOW, MOST = 5, 256
 # what earlier runs have found, which the tests try once more
 CORPUS = Path(__file__).resolve().parents[1] / "tests" / "reliability" / "corpus"
 TEXTS = ("ties", "links")
+# other programs' files that are read in this process
+FOREIGN = ("response.mat", "response.s2p")
 # failures after which a target is given up
 _GIVEN_UP = 5
 
@@ -40,11 +43,10 @@ def _child(name, options):
         import freqid as fq
         from freqid.checks import InputError
         from freqid.pages.explorer.state import State
-    import fuzz
 
     plant = fq.two_mass()
     folder = Path(tempfile.mkdtemp())
-    paths = fuzz.corpus(folder)
+    paths = _files(folder)
     read = next((r for p, r in paths.items() if p.name == name), None)
     path = folder / f"tried{Path(name).suffix}"
 
@@ -71,13 +73,25 @@ def _child(name, options):
     atheris.Fuzz()
 
 
-def _begun(name, kept):
-    """Files, or texts, to begin from."""
+def _files(folder):
+    """Files, and what reads them."""
+    import foreign_files
     import fuzz
 
+    found = fuzz.corpus(folder)
+    for name in FOREIGN:
+        write, read = foreign_files.FILES[name]
+        with contextlib.suppress(ImportError):
+            write(folder / name)
+            found[folder / name] = read
+    return found
+
+
+def _begun(name, kept):
+    """Files, or texts, to begin from."""
     kept.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        for path in fuzz.corpus(Path(folder)):
+        for path in _files(Path(folder)):
             if path.name == name:
                 (kept / "first").write_bytes(path.read_bytes())
     known = CORPUS / f"{name}.zip"
@@ -120,11 +134,10 @@ def _run(name, out, runs, seconds):
 
 
 def main():
-    import fuzz
     from table import show
 
     with tempfile.TemporaryDirectory() as folder:
-        names = [*(p.name for p in fuzz.corpus(Path(folder))), *TEXTS]
+        names = [*(p.name for p in _files(Path(folder))), *TEXTS]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("targets", nargs="*", choices=[*names, []], default=[])
     parser.add_argument("--runs", type=int, default=1_000_000)
