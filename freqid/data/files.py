@@ -124,7 +124,8 @@ def read(
         if stop is not None and "time" in frame.columns:
             frame = frame[~(frame["time"] > frame["time"].iloc[0] + stop)]
         if start is not None and "time" in frame.columns:
-            frame, start = _begun(frame, finite("start", start))
+            frame, gone = _begun(frame, finite("start", start))
+            start, stop = max(start - gone, 0.0), None if stop is None else stop - gone
         record = Record.from_frame(
             frame, _known(inputs, frame), _known(outputs, frame), dt, hold,
             _known(reference, frame), units=told, resample=resample,
@@ -141,15 +142,15 @@ def read(
 
 
 def _begun(frame: pd.DataFrame, start: float) -> tuple[pd.DataFrame, float]:
-    """The rows from the last one on that lacks nothing and is none after ``start`` (s), and what is
-    left of that: a slower output begins with one.
+    """The rows from the last one on that lacks nothing and is none after ``start`` (s), and how
+    much later (s) that is: a slower output begins with such a row.
     """
     t = frame["time"].to_numpy(dtype=float)
     if len(t) == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
-        return frame, start
+        return frame, 0.0
     usable = np.flatnonzero(frame.notna().all(axis=1).to_numpy() & (t <= t[0] + start))
     first = int(usable[-1]) if len(usable) else 0
-    return frame.iloc[first:], max(start - (t[first] - t[0]), 0.0)
+    return frame.iloc[first:], float(t[first] - t[0])
 
 
 def _no_table(path: Path, given: Mapping[str, object]) -> None:

@@ -111,7 +111,7 @@ def test_show(day, capsys):
         (["--model", "my_plant.py:number"], "expected a GreyBox"),
         (["--model", "two-mas"], "did you mean 'two-mass'"),
         (["--model", "my_plant.py:plant", "--start", "k"], "is not NAME=VALUE"),
-        (["--model", "my_plant.py:plant", "--start", "q=3"], "--start 'q'"),
+        (["--model", "my_plant.py:plant", "--start", "q=3"], "start='q'"),
         (["--model", "my_plant.py:plant", "--fix", "stiffness"], "'stiffness'"),
         (["--model", "output-error", "--fix", "k"], "need a plant"),
         (["--model", "two-mass", "--out", "train.csv"], "never overwritten"),

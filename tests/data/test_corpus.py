@@ -183,6 +183,8 @@ def test_where_a_file_is_begun_is_where_its_record_is(start, tmp_path):
         begun, cut = fq.read(tmp_path / "log.csv", start=start), r.slice(start)
         np.testing.assert_array_equal(begun.y, cut.y)
         np.testing.assert_array_equal(begun.u, cut.u)
+        both = fq.read(tmp_path / "log.csv", start=start, stop=0.45)
+        np.testing.assert_array_equal(both.y, r.slice(start, 0.45).y)
         assert (begun.dt, begun.input_dt, begun.hold) == (cut.dt, cut.input_dt, cut.hold)
 
 
