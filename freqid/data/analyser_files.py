@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import InputError, real
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.kinds import damaged, existing, missing
 from freqid.data.readers.mat import loaded
@@ -112,7 +112,10 @@ def of_matlab(
             f"holds {', '.join(arrays)}; expected frequencies f (Hz) or w (rad/s) and one complex "
             "array"
         )
-    f = arrays[axes[0]].astype(float) * in_hertz(axes[0], "")
+    f = np.asarray(real(axes[0], arrays[axes[0]]))
+    if f.dtype.kind not in "fiu":
+        raise InputError(f"{axes[0]!r} holds {f.dtype}; expected frequencies, numbers")
+    f = f.astype(float) * in_hertz(axes[0], "")
     G = arrays[found[0]]
     if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
         G = np.moveaxis(G, 0, -1)

@@ -78,3 +78,15 @@ def test_files_of_matlab_without_one_response(tmp_path, arrays):
     scipy.io.savemat(tmp_path / "a.mat", arrays)
     with pytest.raises(ValueError, match=r"a\.mat.*expected frequencies f \(Hz\) or w"):
         fq.read_response(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize(
+    ("f", "words"),
+    [(F + 0.1j, "'?f'? is complex; expected real numbers"), ("a" * 8, "holds .*; expected freq")],
+    ids=["complex", "words"],
+)
+def test_frequencies_of_matlab_are_real_numbers(f, words, tmp_path):
+    """The imaginary parts were lost, with a warning of numpy's."""
+    scipy.io.savemat(tmp_path / "a.mat", {"f": f, "H": G} if isinstance(f, str) else {"f": f})
+    with pytest.raises(ValueError, match=rf"a\.mat.*{words}"):
+        fq.read_response(tmp_path / "a.mat")
