@@ -115,7 +115,9 @@ def of_matlab(
     f = np.asarray(real(axes[0], arrays[axes[0]]))
     if f.dtype.kind not in "fiu":
         raise InputError(f"{axes[0]!r} holds {f.dtype}; expected frequencies, numbers")
-    f = f.astype(float) * in_hertz(axes[0], "")
+    # what is beyond numbers is told below
+    with np.errstate(all="ignore"):
+        f = f.astype(float) * in_hertz(axes[0], "")
     G = arrays[found[0]]
     if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
         G = np.moveaxis(G, 0, -1)

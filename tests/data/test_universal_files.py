@@ -90,3 +90,12 @@ def test_frequencies_of_matlab_are_real_numbers(f, words, tmp_path):
     scipy.io.savemat(tmp_path / "a.mat", {"f": f, "H": G} if isinstance(f, str) else {"f": f})
     with pytest.raises(ValueError, match=rf"a\.mat.*{words}"):
         fq.read_response(tmp_path / "a.mat")
+
+
+def test_frequencies_of_matlab_that_are_no_numbers_warn_of_nothing(tmp_path):
+    """One of them was a NaN that signals, which numpy warned of."""
+    odd = F.view("u8").copy()
+    odd[3] = 0x7FF0000000000001
+    scipy.io.savemat(tmp_path / "a.mat", {"w": odd.view(float), "H": G})
+    with pytest.raises(ValueError, match=r"a\.mat: frequency must be finite"):
+        fq.read_response(tmp_path / "a.mat")
