@@ -120,16 +120,24 @@ def read(
         frame, said = with_time(frame, time, told, dt)
         # which is in s now
         told.pop("time", None)
-        # what is cut off may be damaged
-        if stop is not None and "time" in frame.columns:
-            frame = frame[~(frame["time"] > frame["time"].iloc[0] + stop)]
-        if start is not None and "time" in frame.columns:
-            frame, gone = _begun(frame, finite("start", start))
-            start, stop = max(start - gone, 0.0), None if stop is None else stop - gone
-        record = Record.from_frame(
-            frame, _known(inputs, frame), _known(outputs, frame), dt, hold,
-            _known(reference, frame), units=told, resample=resample,
-        )  # fmt: skip
+
+        def made(rows: pd.DataFrame) -> Record:
+            return Record.from_frame(
+                rows, _known(inputs, rows), _known(outputs, rows), dt, hold,
+                _known(reference, rows), units=told, resample=resample,
+            )  # fmt: skip
+
+        try:
+            # all rows tell the sample time better than some
+            record = made(frame)
+        except InputError:
+            if (start is None and stop is None) or "time" not in frame.columns:
+                raise
+            # what is cut off may be damaged
+            rows, gone = _cut_rows(frame, start, stop)
+            record = made(rows)
+            start = None if start is None else max(start - gone, 0.0)
+            stop = None if stop is None else stop - gone
         notes = dict.fromkeys((*frame.attrs.get("notes", ()), *said, *record.notes))
         return _cut(dataclasses.replace(record, notes=tuple(notes)), start, stop, detrend)
     except ResponseFile:
@@ -141,14 +149,19 @@ def read(
         raise InputError(f"{path}: {text} (found {found})") from None
 
 
-def _begun(frame: pd.DataFrame, start: float) -> tuple[pd.DataFrame, float]:
-    """The rows from the last one on that lacks nothing and is none after ``start`` (s), and how
-    much later (s) that is: a slower output begins with such a row.
+def _cut_rows(
+    frame: pd.DataFrame, start: float | None, stop: float | None
+) -> tuple[pd.DataFrame, float]:
+    """The rows up to ``stop`` (s), from the last one on that lacks nothing and is none after
+    ``start`` (s), and how much later (s) that is: a slower output begins with such a row.
     """
+    if stop is not None:
+        frame = frame[~(frame["time"] > frame["time"].iloc[0] + finite("stop", stop))]
     t = frame["time"].to_numpy(dtype=float)
-    if len(t) == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
+    if start is None or len(t) == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         return frame, 0.0
-    usable = np.flatnonzero(frame.notna().all(axis=1).to_numpy() & (t <= t[0] + start))
+    whole = frame.notna().all(axis=1).to_numpy()
+    usable = np.flatnonzero(whole & (t <= t[0] + finite("start", start)))
     first = int(usable[-1]) if len(usable) else 0
     return frame.iloc[first:], float(t[first] - t[0])
 

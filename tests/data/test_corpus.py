@@ -174,6 +174,24 @@ def test_columns_of_one_name_but_for_their_units(opened, tmp_path):
         opened(tmp_path / "log.parquet", "u", "y")
 
 
+@pytest.mark.parametrize("kind", ["rounded to ms", "jitter", "five digits"])
+@pytest.mark.parametrize("part", [0.0, 0.9, 0.98])
+def test_a_part_of_a_file_has_the_sample_time_of_all_of_it(kind, part, tmp_path):
+    """Few rows tell it worse, or not at all where times are rounded."""
+    n, rng = 3000, np.random.default_rng(0)
+    even = np.arange(n) / 287.3
+    t = {"rounded to ms": even.round(3), "five digits": even.round(5)}.get(
+        kind, even + 0.004 / 287.3 * rng.random(n)
+    )
+    frame = pd.DataFrame({"time": t, "u": rng.standard_normal(n), "y": rng.standard_normal(n)})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    whole = fq.read(tmp_path / "log.csv")
+    for ends in ({"start": part * t[-1]}, {"stop": (1 - part) * t[-1]}):
+        some = fq.read(tmp_path / "log.csv", **ends)
+        assert some.dt == whole.dt
+        np.testing.assert_array_equal(some.y, whole.slice(**{"start": 0.0} | ends).y)
+
+
 @pytest.mark.parametrize("start", [0.0, 0.1, 0.105, 0.33])
 def test_where_a_file_is_begun_is_where_its_record_is(start, tmp_path):
     """Of a slower output, whose column is blank between its samples, too."""
