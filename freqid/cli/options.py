@@ -30,6 +30,8 @@ Hold = Annotated[
 Force = Annotated[
     bool, Option(help="overwrite files that are there already; never those that are read")
 ]
+# options by their name as arguments, where that is another
+RENAMED = {"input": "inputs", "output": "outputs"}
 Limits = list[tuple[str, float, float]] | None
 
 
@@ -69,8 +71,7 @@ class Reading:
         """What was asked for, as arguments of ``freqid.read``."""
         asked = {f.name: getattr(self, f.name) for f in fields(self)}
         asked["units"] = texts("--units", self.units) or None
-        renamed = {"input": "inputs", "output": "outputs"}
-        return {renamed.get(k, k): v for k, v in asked.items() if v is not None and v is not False}
+        return {RENAMED.get(k, k): v for k, v in asked.items() if v is not None and v is not False}
 
     def record(self, path: Path) -> fq.Record:
         """The record of a file."""

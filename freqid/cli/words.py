@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import re
 import shlex
+from dataclasses import fields
 
-# arguments that are options of a command, by other names or the same
-_OPTIONS = {"inputs": "input", "outputs": "output"} | {
-    name: name.replace("_", "-")
-    for name in (
-        "reference", "dt", "time", "sep", "decimal", "columns", "group", "units", "resample",
-        "hold", "band", "weights", "offset", "loss", "n_starts", "keep_input", "domain",
-        "initial_state", "conditions", "start", "segment", "method",
-    )
-}  # fmt: skip
+from freqid.cli.options import RENAMED, Reading, Search
+
+# what arguments are called on the command line, and which of them are switches there
+_NAMES = (
+    *(f.name for group in (Reading, Search) for f in fields(group)),
+    "keep_input", "domain", "initial_state", "conditions", "start", "segment",
+)  # fmt: skip
+_OPTIONS = {RENAMED.get(name, name): name.replace("_", "-") for name in _NAMES}
+_SWITCHES = "resample|keep_input"
 # ``dt=``, ``resample=True`` or ``inputs=None``: one with a value of its own may be what was typed
 _ARGUMENT = re.compile(
-    rf"(?:^|(?<=\s)|(?<=\s\())({'|'.join(_OPTIONS)})=(None\b|True\b|(?=[\s:;,.)]|$))"
+    rf"(?:^|(?<=\s)|(?<=\s\())(?:({_SWITCHES})=True\b|"
+    rf"({'|'.join(_OPTIONS)})=(None\b|(?=[\s:;,.)]|$)))"
 )
 # what stands within the brackets of a call
 _CALL = re.compile(r"\w\([^()]*$")
@@ -33,7 +35,7 @@ def typed(sentence: str) -> str:
     def option(found: re.Match[str]) -> str:
         if _CALL.search(sentence, 0, found.start()):
             return found[0]
-        return f"{'no ' if found[2] == 'None' else ''}--{_OPTIONS[found[1]]}"
+        return f"{'no ' if found[3] == 'None' else ''}--{_OPTIONS[found[1] or found[2]]}"
 
     def units(found: re.Match[str]) -> str:
         return f"--units {shlex.quote(f'{found[2]}={found[3]}')}"

@@ -100,8 +100,6 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     time = time_named(every)
     columns = [n for n in every if n != time and not is_kept(n)]
     names = [named(n)[0] for n in columns]
-    if twice := [c for c, n in zip(columns, names, strict=True) if names.count(n) > 1]:
-        raise InputError(f"{path}: columns {twice} have one name but for their units; rename them")
     count, dt = file.metadata.num_rows, None
     kept = [n for n in every if n != time and is_kept(n)]
     told = None

@@ -75,6 +75,8 @@ def open(
         raise InputError(
             f"source={type(source).__name__} cannot be opened; expected a path, an array or blocks"
         )
+    if twice := sorted({n for n in found.names if found.names.count(n) > 1}):
+        raise InputError(f"{found.origin}: {twice} are the names of two channels each; rename one")
     step = found.dt if dt is None else positive("dt", dt, "s")
     if step is None:
         raise InputError(f"dt=None and {found.origin} says no sample time; give dt in s")

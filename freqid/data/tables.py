@@ -59,12 +59,11 @@ def frame_of(
         frame.attrs["units"] = {name: unit for name, unit in told if unit}
         frame.attrs.pop("notes", None)
     if "units" not in frame.attrs:
-        given = [str(c) for c in frame.columns]
-        told = [named(c) for c in given]
+        told = [named(str(c)) for c in frame.columns]
         names = [name for name, _ in told]
-        if twice := [c for c, n in zip(given, names, strict=True) if names.count(n) > 1]:
+        if twice := sorted({n for n in names if names.count(n) > 1}):
             raise InputError(
-                f"{path}: columns {twice} have one name but for their units; columns= renames them"
+                f"{path}: {twice} are the names of two columns each; columns= renames them"
             )
         frame.attrs["units"] = {name: unit for name, unit in told if unit}
         frame.columns = names

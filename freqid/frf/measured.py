@@ -40,5 +40,5 @@ def measured(
 
 def units_of(record: Record | Stream) -> dict[str, str]:
     """Units of its channels."""
-    own = record.units
-    return {n: unit for n, unit in own.items() if n in (*record.input_names, *record.output_names)}
+    names = (*record.input_names, *record.output_names)
+    return {n: unit for n, unit in record.units.items() if n in names}

@@ -383,3 +383,12 @@ def test_units_of_older_programs(tmp_path):
     assert record.units == units == dict(stream.units)
     fq.h1(stream, 500).to_frame().to_csv(tmp_path / "frf.csv")
     assert fq.read_response(tmp_path / "frf.csv").units == units
+
+
+def test_a_column_of_a_matrix_and_a_channel_of_its_name(tmp_path):
+    """The second column of x is called as another channel is, whose samples were never taken."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file["x"], file["x1"] = X[:, :2], X[:, 2]
+    with pytest.raises(ValueError, match=r"log\.h5: \['x1'\] are the names of two channels"):
+        fq.open(tmp_path / "log.h5", "x1", "x2", dt=DT)

@@ -19,7 +19,7 @@ def lines(*rows):
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("time,u,y\n", {}, "names but no samples|no samples"),
+        ("time,u,y\n", {}, "no samples"),
         (lines("time,t,u,y", *(f"{k},{k},1,2" for k in range(4))), {"time": "t"},
          "time='t': the column 'time' is another"),
         (lines("t,u,y", *(f"{k},1,2" for k in range(4))), {"time": "clock"}, "time='clock'.*'t'"),
