@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 
 from freqid.checks import InputError, real
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.readers.columns import text_of
 from freqid.data.readers.kinds import damaged, existing, missing
 from freqid.data.readers.mat import loaded
 from freqid.data.readers.uff import data_sets
@@ -46,9 +48,13 @@ def of_touchstone(path: Path) -> FrequencyResponse:
         import skrf
     except ImportError:
         raise missing("Touchstone", "scikit-rf", "rf") from None
-    existing(path)
+    content = io.StringIO(text_of(existing(path).read_bytes()).lstrip("\ufeff"))
+    # by its name scikit-rf would unpickle the file before it takes it for text; the name tells how
+    # many ports there are
+    content.name = str(path)
+    network = skrf.Network()
     try:
-        network = skrf.Network(str(path))
+        network.read_touchstone(content)
     except Exception as error:
         # scikit-rf has errors of many kinds for a file that is not what it says
         raise damaged("Touchstone", error) from None

@@ -12,7 +12,8 @@ from freqid.checks import InputError
 from freqid.pages.explorer.state import State
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.zip"))
-READERS = {"response.csv": fq.read_response, "estimate.json": fq.load}
+RESPONSES = ("response.csv", "response.mat", "response.s2p")
+READERS = {"estimate.json": fq.load} | dict.fromkeys(RESPONSES, fq.read_response)
 
 
 @pytest.mark.parametrize("path", CORPUS, ids=lambda p: p.stem)
@@ -51,4 +52,4 @@ def test_inputs_are_read_or_refused_by_name(path, tmp_path, benchmarks):
 def test_there_is_a_corpus_for_every_kind():
     names = {p.stem for p in CORPUS}
     assert {"record.csv", "german.txt", "plain.mat", "packed.mat", "record.npz", "ties"} <= names
-    assert {"stream.npy", "stream.parquet", "stream.h5"} <= names
+    assert {"stream.npy", "stream.parquet", "stream.h5", *RESPONSES} <= names

@@ -3,12 +3,14 @@
 import gzip
 import io
 import os
+import pickle
 import random
 import subprocess
 import sys
 import time
 import warnings
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -335,3 +337,18 @@ def test_a_tree_that_leads_back_to_itself(tmp_path, read):
     path.write_bytes(content)
     with pytest.raises(InputError, match=rf"circle\.h5.*byte {at}: a node of a tree is its own"):
         read(path)
+
+
+@pytest.mark.parametrize("read", [fq.read_response, fq.read])
+def test_a_pickle_called_touchstone_is_not_run(read, tmp_path):
+    """scikit-rf tries first of all to unpickle what it is given the name of."""
+    pytest.importorskip("skrf")
+
+    class Evil:
+        def __reduce__(self):
+            return Path.touch, (tmp_path / "run",)
+
+    (tmp_path / "a.s2p").write_bytes(pickle.dumps(Evil()))
+    with pytest.raises(InputError, match=r"a\.s2p"):
+        read(tmp_path / "a.s2p")
+    assert not (tmp_path / "run").exists()

@@ -34,13 +34,13 @@ def unit_of(attributes: Mapping[str, object]) -> str:
     """The unit that an array's attributes name, ``ms since 2020-01-01`` without its beginning."""
     for name in ("units", "unit", "Units", "Unit"):
         told = attributes.get(name)
-        text = _text(told) if isinstance(told, (str, bytes)) else ""
+        text = text_of(told) if isinstance(told, (str, bytes)) else ""
         if text.strip():
             return text.split(" since ")[0].strip()
     return ""
 
 
-def _text(told: str | bytes) -> str:
+def text_of(told: str | bytes) -> str:
     """A text that can be written: in UTF-8, or else in the Latin letters of older programs."""
     try:
         # h5py keeps bytes that are no UTF-8 as halves of characters
