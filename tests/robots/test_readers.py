@@ -163,3 +163,22 @@ def test_channels_on_the_command_line(tmp_path, capsys):
         main(["channels", str(tmp_path / "r.csv")])
     assert end.value.code == 0
     assert "rate" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("formula", "read"), [("2 * X1 + 1", True), ("print(X1)", False), ("X1.__class__", False)]
+)
+def test_formulas_of_mdf_are_arithmetic_or_refused(formula, read, tmp_path):
+    """Others were run as Python where there is a sympy, and else left the raw values."""
+    asammdf = pytest.importorskip("asammdf")
+    file = asammdf.MDF(version="4.10")
+    counts = np.arange(400, dtype="i2")
+    file.append([asammdf.Signal(counts, FAST, name="u", conversion={"formula": formula})])
+    file.append([asammdf.Signal(TORQUE, FAST, name="y")])
+    path = file.save(tmp_path / "log.mf4")
+    file.close()
+    if read:
+        assert (fq.read(path, "u", "y").u_logged[:, 0] == 2 * counts + 1).all()
+        return
+    with pytest.raises(ValueError, match=r"log\.mf4: .*formula"):
+        fq.read(path, "u", "y")

@@ -21,7 +21,11 @@ def read_mdf(path: Path) -> Log:
 def mdf_channels(path: Path) -> Log:
     """What ``read_mdf`` returns, with whatever errors asammdf has."""
     from asammdf import MDF
+    from asammdf.blocks import v2_v3_blocks, v4_blocks
 
+    # what numexpr does not take would be run as Python, by sympy, or else leave the raw values
+    for blocks in (v2_v3_blocks, v4_blocks):
+        vars(blocks).update(symbols=str, lambdify=_refused)
     found = Log()
     with MDF(path) as file:
         for signal in file.iter_channels(skip_master=True):
@@ -43,3 +47,7 @@ def mdf_channels(path: Path) -> Log:
     if not found:
         raise InputError("holds no numeric channels")
     return found
+
+
+def _refused(_: object, formula: str, **options: object) -> None:
+    raise InputError(f"the formula {formula!r:.60} of a channel is no arithmetic of its values")
