@@ -44,6 +44,8 @@ def corpus(folder):
     arrays = {"time": t, "u": record.u, "y": record.y, "s": {"a": t, "b": "text"}}
     scipy.io.savemat(folder / "plain.mat", arrays)
     scipy.io.savemat(folder / "packed.mat", arrays, do_compression=True)
+    for name, fields in logged_structures(t, record.u, record.y).items():
+        scipy.io.savemat(folder / f"{name}.mat", {"log": fields})
     try:
         import h5py
     except ImportError:
@@ -63,6 +65,17 @@ def corpus(folder):
         path: readers.get(path.name, usual.get(path.stem, fq.read))
         for path in sorted(folder.iterdir())
     }
+
+
+def logged_structures(t, u, y):
+    """As a block of Simulink and a recorder of dSPACE write them."""
+    signals = np.zeros(2, dtype=[("values", "O"), ("dimensions", "O"), ("label", "O")])
+    signals[:] = [(u, 1, "u"), (y, 1, "y")]
+    axes = np.zeros(1, dtype=[("Name", "O"), ("Data", "O")])
+    axes[:] = [("time", t)]
+    channels = np.zeros(2, dtype=[("Name", "O"), ("Data", "O"), ("Unit", "O"), ("XIndex", "O")])
+    channels[:] = [("u", u, "Nm", 1), ("y", y, "rad", 1)]
+    return {"block": {"time": t, "signals": signals}, "recorder": {"X": axes, "Y": channels}}
 
 
 def passed(path):

@@ -31,7 +31,7 @@ _NAMES = {
     "time", "t", "zeit", "temps", "tid", "timestamp", "timestamps", "time stamp", "date time",
     "datetime", "date", "elapsed", "elapsed time", "seconds", "sec", "t_s", "time_s", "time_ms",
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
-    "x_value", "ms", "us", "µs", "ns",
+    "x_value", "tout", "ms", "us", "µs", "ns",
 }  # fmt: skip
 # a count since 1970 that means a day between 2001 and 2100 is of nanoseconds, microseconds, …
 EPOCHS = ((1e18, 4.1e18, 1e-9, "ns"), (1e15, 4.1e15, 1e-6, "µs"), (1e12, 4.1e12, 1e-3, "ms"))

@@ -59,6 +59,7 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
         # h5py has errors of many kinds for a file that is not what it says
         raise damaged("HDF5", error) from None
     frame = columns_of(of_one_group(found, group, "group"))
-    told = of_one_group(units, group, "group")
-    frame.attrs["units"] = {n: str(u) for n, u in told.items() if u and n in frame.columns}
+    asked = units.values() if group is None else [units[group.strip("/")]]
+    told = {n: unit for each in asked for n, unit in each.items() if unit}
+    frame.attrs["units"] = {n: unit for n, unit in told.items() if n in frame.columns}
     return frame

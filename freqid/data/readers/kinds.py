@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
+import numpy as np
+
 from freqid.checks import FloatArray, InputError, unknown
 
 if TYPE_CHECKING:
@@ -77,7 +79,8 @@ def existing(path: Path) -> Path:
 def of_one_group(
     found: Mapping[str, Mapping[str, object]], group: str | None, what: str
 ) -> Mapping[str, object]:
-    """Arrays by name of the group that is asked for, or of all where none says what another does.
+    """Arrays by name of the group that is asked for, or of all where none says what another does;
+    what several have alike, as channels have their time, is one.
 
     ``found`` are the arrays of each group, "" of none. Raises ValueError where a group must be
     named.
@@ -86,11 +89,22 @@ def of_one_group(
         if group.strip("/") not in found:
             raise InputError(unknown("group", group, [g for g in found if g]))
         return found[group.strip("/")]
-    names = [n for arrays in found.values() for n in arrays]
-    if len(set(names)) < len(names):
-        groups = ", ".join(g or "its top" for g in found)
-        raise InputError(f"holds several {what}s of the same names, {groups}; name one, group=...")
-    return {n: a for arrays in found.values() for n, a in arrays.items()}
+    together: dict[str, object] = {}
+    for arrays in found.values():
+        for name, array in arrays.items():
+            if name in together and not _alike(together[name], array):
+                groups = ", ".join(g or "its top" for g in found)
+                raise InputError(
+                    f"holds several {what}s of the same names, {groups}; name one, group=..."
+                )
+            together[name] = array
+    return together
+
+
+def _alike(a: object, b: object) -> bool:
+    """Whether two arrays hold the same numbers or text; objects are never alike."""
+    x, y = np.asarray(a), np.asarray(b)
+    return "O" not in (x.dtype.kind, y.dtype.kind) and np.array_equal(x, y)
 
 
 class ResponseFile(InputError):

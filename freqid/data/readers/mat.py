@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from freqid.checks import InputError
 from freqid.data.readers.columns import columns_of
 from freqid.data.readers.kinds import READERS, damaged, of_one_group, reads
+from freqid.data.readers.mat_forms import Group, group_of, inner_groups, structure_of
 from freqid.data.readers.mat_structure import check_structure
 
 if TYPE_CHECKING:
@@ -19,23 +22,58 @@ if TYPE_CHECKING:
 def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
     """The variables of a MAT file, or the fields of a structure in it, as columns.
 
-    Raises ValueError for a damaged file, or several structures with the same fields.
+    Raises ValueError for a damaged file, several structures with the same fields, or objects alone.
     """
     try:
         content = loaded(path)
     except NotImplementedError:
         # version 7.3 is HDF5
         return READERS[".h5"](path, group=group)
-    found: dict[str, dict[str, Any]] = {}
+    found: dict[str, Group] = {}
+    inner: dict[str, Group] = {}
+    objects = _objects(content)
     for name, value in content.items():
-        if name.startswith("__"):
+        if name.startswith("__") or name in objects:
             continue
-        fields = getattr(getattr(value, "dtype", None), "names", None)
-        if fields and np.ndim(value) == 0:
-            found[name] = {field: value[field].item() for field in fields}
+        if (fields := structure_of(value)) is not None:
+            found[name] = group_of(name, fields)
+            inner |= inner_groups(name, fields)
         else:
-            found.setdefault("", {})[name] = value
-    return columns_of(of_one_group(found, group, "structure"))
+            found.setdefault("", Group()).arrays[name] = value
+    if not any(each.has_samples for each in found.values()):
+        # what lies deeper tells something only where nothing does above
+        found = {name: each for name, each in inner.items() if each.has_samples} or found
+    told = ", ".join(sorted(objects.values()))
+    if objects and not any(each.has_samples for each in found.values()):
+        raise InputError(
+            f"holds objects that MATLAB alone opens ({told}); save their numbers there, as in "
+            "t = x.Time; y = x.Data"
+        )
+    frame = columns_of(of_one_group({n: g.arrays for n, g in found.items()}, group, "structure"))
+    units = {name: unit for each in found.values() for name, unit in each.units.items()}
+    frame.attrs["units"] = {name: unit for name, unit in units.items() if name in frame.columns}
+    if objects:
+        frame.attrs["notes"] += [f"objects that MATLAB alone opens are left out: {told}"]
+    return frame
+
+
+def _objects(content: Mapping[str, Any]) -> dict[str, str]:
+    """Objects among the variables, by key, each with its name and class: ``out (timeseries)``."""
+    from scipy.io.matlab import MatlabObject, MatlabOpaque
+
+    found: dict[str, str] = {}
+    for name, value in content.items():
+        if isinstance(value, MatlabObject):
+            found[name] = f"{name} ({value.classname})"
+        elif isinstance(value, MatlabOpaque) and not name.startswith("__"):
+            # its name and its class stand within
+            own, _, kind = (_text(np.ravel(value)[0][part]) for part in ("s0", "s1", "s2"))
+            found[name] = f"{own} ({kind})"
+    return found
+
+
+def _text(told: Any) -> str:
+    return told.decode("latin-1") if isinstance(told, bytes) else str(told)
 
 
 def loaded(path: Path) -> dict[str, Any]:

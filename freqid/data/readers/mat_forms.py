@@ -1,0 +1,142 @@
+"""Structures that MATLAB's tools log in: blocks of Simulink, recorders of dSPACE, series in time.
+
+Formats: Simulink, "To Workspace", structure with time (time, signals.values, signals.label);
+dSPACE ControlDesk, recordings as MAT files (X and Y, each with Name, Data and Unit).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from freqid.checks import Array, InputError
+
+# what a series in time calls its samples, where they are all that it holds
+_SAMPLES = ("data", "values", "value")
+
+
+@dataclass(eq=False)
+class Group:
+    """Arrays of one structure by name, and their units."""
+
+    arrays: dict[str, Any] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def has_samples(self) -> bool:
+        """Whether any of the arrays may be a channel."""
+        return any(np.size(x) > 1 and _is_numeric(x) for x in self.arrays.values())
+
+
+def structure_of(value: object) -> dict[str, Any] | None:
+    """The fields of a structure; None for anything else, several structures in an array too."""
+    names = getattr(getattr(value, "dtype", None), "names", None)
+    if not names or np.ndim(value) != 0:  # type: ignore[arg-type]
+        return None
+    record = np.asarray(value)
+    return {name: record[name].item() for name in names}
+
+
+def group_of(name: str, fields: Mapping[str, Any]) -> Group:
+    """What the structure called ``name`` holds, whichever tool has written it."""
+    if "signals" in fields and _entries(fields["signals"], "values"):
+        return _simulink(name, fields)
+    if _entries(fields.get("Y"), "Data") and _entries(fields.get("X"), "Data"):
+        return _dspace(name, fields)
+    arrays = dict(fields)
+    long = [n for n, x in arrays.items() if np.size(x) > 1 and _is_numeric(x)]
+    others = [n for n in long if n.lower() != "time"]
+    if len(others) == 1 < len(long) and others[0].lower() in _SAMPLES:
+        # a series has the name of the structure, its samples that of every series
+        arrays = {name.rpartition("/")[2] if n == others[0] else n: arrays[n] for n in long}
+    return Group({n.lower() if n.lower() == "time" else n: x for n, x in arrays.items()})
+
+
+def inner_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Group]]:
+    """Structures within a structure, by their paths."""
+    for inner, value in fields.items():
+        path = f"{name}/{inner}"
+        if (deeper := structure_of(value)) is not None:
+            yield path, group_of(path, deeper)
+            yield from inner_groups(path, deeper)
+
+
+def _simulink(name: str, fields: Mapping[str, Any]) -> Group:
+    """Signals of a block, by their labels or else by the structure's name and their number."""
+    group = Group()
+    signals = _entries(fields["signals"], "values")
+    if np.size(fields.get("time", ())):
+        group.arrays["time"] = fields["time"]
+    for i, signal in enumerate(signals, start=1):
+        values = np.asarray(signal["values"])
+        # matrices stand behind each other
+        values = values.reshape(-1, values.shape[-1]).T if values.ndim == 3 else values
+        labels = [str(label).strip() for label in np.ravel(signal.get("label", ""))]
+        if values.ndim == 2 and 1 < len(labels) == min(values.shape):
+            rows = values if values.shape[0] == len(labels) else values.T
+            for label, row in zip(labels, rows, strict=True):
+                _add(group, label or f"{name}{i}", row)
+            continue
+        alone = name if len(signals) == 1 else f"{name}{i}_" if values.ndim == 2 else f"{name}{i}"
+        _add(group, (labels[0] if len(labels) == 1 else "") or alone, values)
+    return group
+
+
+def _dspace(name: str, fields: Mapping[str, Any]) -> Group:
+    """Signals of a recording, by their names, with their units and their time."""
+    group = Group()
+    axes, signals = _entries(fields["X"], "Data"), _entries(fields["Y"], "Data")
+    times = [np.ravel(axes[_number(signal, len(axes)) - 1]["Data"]) for signal in signals]
+    if not all(_is_numeric(t) and np.array_equal(t, times[0]) for t in times):
+        raise InputError(
+            f"recording {name!r} holds signals of several rasters; export those of one"
+        )
+    group.arrays["time"] = times[0]
+    for i, signal in enumerate(signals, start=1):
+        label = str(signal.get("Name", "")).replace('"', "").strip() or f"{name}{i}"
+        unit = str(signal.get("Unit", "")).strip()
+        added = _add(group, label, signal["Data"])
+        # as ControlDesk writes that there is none
+        if unit and unit not in ("-", "[]"):
+            group.units[added] = unit
+    return group
+
+
+def _number(signal: Mapping[str, Any], most: int) -> int:
+    """Which of the axes is a signal's own, the first where that is not told."""
+    told = np.ravel(signal.get("XIndex", 1))
+    number = told[0] if told.size and _is_numeric(told) else 1
+    return int(number) if 1 <= number <= most else 1
+
+
+def _add(group: Group, label: str, values: Array) -> str:
+    """The name under which values are kept: the label, numbered where it came before."""
+    known, name = 1, label
+    while name in group.arrays:
+        known += 1
+        name = f"{label}_{known}"
+    group.arrays[name] = values
+    return name
+
+
+def _entries(value: object, needed: str) -> list[dict[str, Any]]:
+    """The structures of an array of them, or the only one; none unless all have such a field."""
+    names = getattr(getattr(value, "dtype", None), "names", None)
+    if not names or needed not in names:
+        return []
+    entries = np.atleast_1d(np.asarray(value)).ravel()
+    return [{n: _bare(entry[n]) for n in names} for entry in entries]
+
+
+def _bare(value: Any) -> Any:
+    """What an array of one object holds; anything else as it is."""
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 0:
+        return value.item()
+    return value
+
+
+def _is_numeric(value: object) -> bool:
+    return np.asarray(value).dtype.kind in "fiubc"
