@@ -34,7 +34,7 @@ class _Arrays:
 
     def add(self, name: str, array: Source) -> None:
         """Note an array: one of samples, or a number."""
-        if array.dtype.kind not in "fiu":
+        if array.dtype.kind not in "fiub":
             return
         # a chunk is unpacked as a whole, however little of it is asked for
         size, limit = math.prod(array.chunks or (1,)) * array.dtype.itemsize, limit_of(self.path)

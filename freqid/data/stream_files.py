@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError, unknown
 from freqid.data.readers.kinds import damaged, existing, missing, refusing
+from freqid.data.readers.parquet import field_units
 from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_conditions, kept_hold
@@ -100,14 +101,14 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     time = time_named(every)
     columns = [n for n in every if n != time and not is_kept(n)]
     names = [named(n)[0] for n in columns]
-    count, dt = file.metadata.num_rows, None
+    count, dt, told_units = file.metadata.num_rows, None, field_units(file.schema_arrow)
     kept = [n for n in every if n != time and is_kept(n)]
     told = None
     with refusing(path, "Parquet"):
         if kept and count:
             told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
         if time is not None and count > 1 and given is None:
-            dt = even(str(path), time, *_stamps(file, time))
+            dt = even(str(path), time, *_stamps(file, time), told_units.get(time, ""))
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]
@@ -120,7 +121,8 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
 
     hold = None if told is None else kept_hold(told, names)
     conditions = {} if told is None else kept_conditions(told)
-    return Found(blocks, names, count, dt, str(path), hold, conditions, dict(map(named, columns)))
+    units = {named(n)[0]: told_units.get(n) or named(n)[1] for n in columns}
+    return Found(blocks, names, count, dt, str(path), hold, conditions, units)
 
 
 def _stamps(file: Source, time: str) -> tuple[list[int], Array]:

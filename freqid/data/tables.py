@@ -65,6 +65,11 @@ def frame_of(
             raise InputError(
                 f"{path}: {twice} are the names of two columns each; columns= renames them"
             )
+        beside = frame.attrs.pop("beside", {})
+        told = [
+            (name, str(beside.get(own) or unit))
+            for own, (name, unit) in zip(frame.columns, told, strict=True)
+        ]
         frame.attrs["units"] = {name: unit for name, unit in told if unit}
         frame.columns = names
     return frame

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,7 +59,7 @@ def with_time(
     Raises ValueError for a column that is not there or holds no time.
     """
     frame = _joined(frame) if time is None else frame
-    name = _found(frame, time, dt)
+    name = _found(frame, time, units, dt)
     if name is None:
         return frame, []
     seconds, said = in_seconds(name, frame[name], units.get(name, ""))
@@ -110,7 +110,9 @@ def _joined(frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
-def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | None:
+def _found(
+    frame: pd.DataFrame, time: str | None, units: Mapping[str, str], dt: float | None
+) -> str | None:
     if time is not None:
         if time not in frame.columns:
             raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
@@ -129,9 +131,11 @@ def _found(frame: pd.DataFrame, time: str | None, dt: float | None) -> str | Non
     with np.errstate(over="ignore", invalid="ignore"):
         gaps = np.diff(values)
     even = np.isfinite(values).all() and gaps.min() > 0
-    if even and np.abs(gaps - gaps.mean()).max() <= _EVEN * gaps.mean():
-        return first
-    return None
+    if not even or np.abs(gaps - gaps.mean()).max() > _EVEN * gaps.mean():
+        return None
+    # what counts rows tells nothing of their time, unless somebody says its unit
+    rows = (gaps == 1).all() and values[0] in (0, 1)
+    return None if rows and first not in units else first
 
 
 def _is_stamp(column: Column) -> bool:

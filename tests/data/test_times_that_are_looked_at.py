@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 import freqid as fq
+from freqid.checks import InputError
 
 N = 20_000
 U = np.random.default_rng(0).standard_normal((N, 2))
@@ -132,3 +133,40 @@ def test_dates_and_durations_in_many_groups_of_rows(tmp_path, time, rows):
     frame.to_parquet(tmp_path / "gap.parquet", row_group_size=rows, index=False)
     with pytest.raises(ValueError, match="not even"):
         fq.open(tmp_path / "gap.parquet", "u", "y")
+
+
+@pytest.mark.parametrize(("name", "first"), [("index", 0), ("n", 1), ("", 0)])
+def test_what_counts_rows_is_no_time(tmp_path, name, first):
+    """A second between samples would be a guess; it was taken for one."""
+    n = np.arange(first, first + 50)
+    path = tmp_path / "a.csv"
+    pd.DataFrame({name: n, "u": np.sin(n), "y": np.cos(n)}).to_csv(path, index=False)
+    with pytest.raises(InputError, match="give dt in s"):
+        fq.read(path, "u", "y")
+    assert fq.read(path, "u", "y", dt=0.02).dt == 0.02
+    if name:
+        assert fq.read(path, "u", "y", time=name).dt == 1.0
+        assert fq.read(path, "u", "y", units={name: "ms"}).dt == pytest.approx(1e-3)
+
+
+def test_units_of_parquet_fields_count(tmp_path):
+    pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    t = np.arange(60.0)
+    fields = [
+        pa.field(n, pa.float64(), metadata={k: v})
+        for n, k, v in (("time", "unit", "ms"), ("u", "units", "N m"), ("y", "Unit", "rad"))
+    ]
+    table = pa.table([t, np.sin(t), np.cos(t)], schema=pa.schema(fields))
+    pq.write_table(table, tmp_path / "a.parquet")
+    for record in (fq.read(tmp_path / "a.parquet"), fq.open(tmp_path / "a.parquet").load()):
+        assert record.dt == pytest.approx(1e-3)
+        assert dict(record.units) == {"u": "N m", "y": "rad"}
+
+
+def test_switches_in_hdf5_are_samples(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    t = 0.01 * np.arange(60)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"], file["u"], file["y"] = t, np.sin(9 * t) > 0, np.cos(t)
+    for record in (fq.read(tmp_path / "a.h5"), fq.open(tmp_path / "a.h5").load()):
+        np.testing.assert_array_equal(record.u, np.sin(9 * t) > 0)

@@ -34,7 +34,9 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
 
     def keep(name: str, item: object) -> None:
         nonlocal taken
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not name.startswith("#"):
+        if not isinstance(item, h5py.Dataset) or name.startswith("#"):
+            return
+        if item.dtype.kind in "fiub":
             if item.shape is None:
                 # an empty data set, which has no shape
                 return

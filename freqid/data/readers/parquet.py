@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError
+from freqid.data.readers.columns import text_of, unit_of
 from freqid.data.readers.kinds import damaged, missing, reads, writes
 from freqid.data.readers.limits import check_size
 from freqid.data.readers.parquet_structure import check_pages
@@ -30,6 +31,8 @@ def read_parquet(path: Path) -> pd.DataFrame:
         if not frame.columns.is_unique:
             twice = frame.columns[frame.columns.duplicated()][0]
             raise InputError(f"holds column {twice!r} twice; names must differ")
+        # units that stand beside names, which may have some of their own
+        frame.attrs["beside"] = field_units(pyarrow.parquet.read_schema(path))
         return frame
     except InputError:
         raise
@@ -38,6 +41,15 @@ def read_parquet(path: Path) -> pd.DataFrame:
     except Exception as error:
         # pyarrow has errors of many kinds for a file that is not what it says
         raise damaged("Parquet", error) from None
+
+
+def field_units(schema: Any) -> dict[str, str]:
+    """Units by name that the fields of an Arrow schema tell as ``unit`` or ``units``."""
+    told = {
+        str(field.name): unit_of({text_of(k): v for k, v in (field.metadata or {}).items()})
+        for field in schema
+    }
+    return {name: unit for name, unit in told.items() if unit}
 
 
 @writes(".parquet")
