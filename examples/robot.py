@@ -1,6 +1,6 @@
 """A three-axis robot with flexible joints, from logs at twelve postures to its stiffnesses.
 
-python examples/robot.py [folder for the picture]
+python examples/robot.py [folder for the pictures] [number of postures, 12]
 
 Velocity loops, commands at 1 kHz, sensors at 250 Hz, torques that disturb, Coulomb friction in the
 motors: the axes creep one way, so that friction is a constant torque, outside of the band. Gravity
@@ -125,10 +125,10 @@ def logs(posture, seed):
         yield H * np.arange(len(u)), u, T * np.arange(len(y)), y
 
 
-def read(seed=0):
-    """The logs of all postures as records that know where they were made, three at each."""
+def read(seed=0, postures=POSTURES):
+    """The logs of postures as records that know where they were made, three at each."""
     runs = []
-    for number, (q2, q3) in enumerate(POSTURES):
+    for number, (q2, q3) in enumerate(postures):
         each = (fq.Record.from_logs(*log) for log in logs((q2, q3), 100 * seed + number))
         runs.append([record.with_conditions(q2=q2, q3=q3) for record in each])
     return runs
@@ -164,8 +164,8 @@ def off(est, unit=None):
     return (est.parameters["value"] - pd.Series(TRUE)) / std
 
 
-def main(folder):
-    runs = read()
+def main(folder, count=12):
+    runs = read(postures=POSTURES[:: len(POSTURES) // count])
     frfs = responses(runs)
     est = fq.fit(robot(), frfs, start=start())
     table = est.parameters[["value", "std", "unit"]].assign(true=pd.Series(TRUE))
@@ -173,7 +173,8 @@ def main(folder):
     print(table.to_string(float_format=lambda x: f"{x:.4g}"))
     print(f"verdict: {est.verdict.grade}: {est.verdict.reasons[0]}")
 
-    one = fq.fit(robot(), frfs[4], start=start(), n_starts=1)
+    number = len(frfs) // 3
+    one = fq.fit(robot(), frfs[number], start=start(), n_starts=1)
     wide = one.parameters["std"] / est.parameters["std"]
     print("\none posture only: error bars wider by")
     print(wide.round(1).to_string())
@@ -182,8 +183,9 @@ def main(folder):
 
     some = [record for three in runs[::3] for record in three]
     direct = fq.fit(robot(), some, band=BAND, start=start(), n_starts=1, reference=False)
+    few = len(runs[::3])
     print(
-        "\nthe loop ignored, each record by itself, four postures: off by so many standard errors"
+        f"\nthe loop ignored, each record by itself, {few} postures: off by so many standard errors"
     )
     print(off(direct).round(1).to_string())
     print(f"verdict: {direct.verdict.grade}: {direct.verdict.reasons[0]}")
@@ -192,21 +194,21 @@ def main(folder):
     near = est.parameters["value"].to_dict()
     thin = fq.fit(robot(), thinned[::3], start=near, n_starts=1)
     print(
-        "\nthe decimation ignored (a hold of 4 ms), four postures: off by so many standard errors"
+        f"\nthe decimation ignored (a hold of 4 ms), {few} postures: off by so many standard errors"
     )
     print(off(thin, est).round(1).to_string())
-    draw(est, thin).figure.savefig(folder / "robot.png")
+    draw(est, thin, len(frfs), few).figure.savefig(folder / "robot.png")
     draw_responses(est, frfs).savefig(folder / "robot_responses.png")
 
 
-def draw(est, thin):
+def draw(est, thin, count, few):
     """Parameters with their intervals against truth."""
     ax = plt.subplots(figsize=(8, 4.2), layout="constrained")[1]
     x = np.arange(len(TRUE))
     true = np.array(list(TRUE.values()))
     for shift, one, colour, label in (
         (-0.12, est, "#009E73", "the remembered hold of 1 ms"),
-        (0.12, thin, "#D55E00", "the decimation ignored, four postures"),
+        (0.12, thin, "#D55E00", f"the decimation ignored, {few} postures"),
     ):
         table = one.parameters
         ax.errorbar(
@@ -216,7 +218,7 @@ def draw(est, thin):
     ax.axhline(0, color="0.6", linewidth=1, zorder=0)
     ax.set_yscale("symlog", linthresh=3)
     ax.set_xticks(x, list(TRUE))
-    ax.set(ylabel="deviation from truth / %", title="Twelve postures, three axes")
+    ax.set(ylabel="deviation from truth / %", title=f"{count} postures, three axes")
     ax.legend(frameon=False)
     return ax
 
@@ -233,7 +235,8 @@ def draw_responses(est, frfs):
     figure, grid = plt.subplots(
         3, 3, figsize=(9, 7), sharex=True, sharey=True, layout="constrained"
     )
-    one, number = frfs[4], 4
+    number = len(frfs) // 3
+    one = frfs[number]
     for (i, j), ax in np.ndenumerate(grid):
         each = np.array([m[i, j] for m in models])
         if each.max() > 1e-9:
@@ -249,11 +252,11 @@ def draw_responses(est, frfs):
             ax.set_ylabel(f"motor {i + 1}\nrad/s per N m")
         if i == 2:
             ax.set_xlabel("frequency / Hz")
-    figure.suptitle("Twelve postures: range of the model, and one posture as measured (dots)")
+    figure.suptitle(f"{len(frfs)} postures: range of the model, and one as measured (dots)")
     return figure
 
 
 if __name__ == "__main__":
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     out.mkdir(parents=True, exist_ok=True)
-    main(out)
+    main(out, *(int(n) for n in sys.argv[2:]))

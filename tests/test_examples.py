@@ -16,8 +16,8 @@ def test_example(path, tmp_path, request):
         request.getfixturevalue("measured")
     if path.stem == "description":
         pytest.importorskip("pinocchio")
-    # the other factor has a test of its own
-    more = ["10"] if path.stem == "ruler_robot" else []
+    # the other factor, and all postures, have tests of their own
+    more = {"ruler_robot": ["10"], "robot": ["4"]}.get(path.stem, [])
     result = subprocess.run(
         [sys.executable, str(path), str(tmp_path), *more],
         capture_output=True,

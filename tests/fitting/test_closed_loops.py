@@ -14,7 +14,7 @@ def disturbed(seed, torque, sensor=1e-5):
     rng = np.random.default_rng(seed)
     found = PLANT.sampled(fq.ZeroOrderHold(DT))
     A, B, C = found.phi, found.gamma[:, 0], PLANT.state_space().C[0]
-    r = np.tile(fq.multisine((0.2, 80), period=N * DT / 2, dt=DT, seed=seed), 2)
+    r = np.tile(fq.multisine((0.2, 80), N * DT / 2, DT, crest="random", seed=seed), 2)
     x, seen, slow, u, y = np.zeros(len(A)), 0.0, 0.0, np.zeros(N), np.zeros(N)
     for k in range(N):
         slow = 0.95 * slow + np.sqrt(1 - 0.95**2) * torque * rng.standard_normal()
