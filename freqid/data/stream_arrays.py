@@ -16,7 +16,7 @@ from freqid.data.readers.columns import CLOCKS, step_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
-from freqid.data.stream_found import Asked, Found, Source, even, of_array, places
+from freqid.data.stream_found import Asked, Clock, Found, Source, even, of_array, places
 from freqid.data.time_column import time_named
 
 
@@ -58,12 +58,10 @@ class _Arrays:
             here = self.numbers.setdefault(folder, {})
             here |= {n: float(np.ravel(np.asarray(v))[0]) for n, v in told.items()}
 
-    def _step(self, wanted: Sequence[str], times: Sequence[str], count: int) -> float | None:
-        """The sample time in s by a time of as many samples, one beside the arrays if there is, or
-        by what the file says.
-        """
+    def _clock(self, wanted: Sequence[str], times: Sequence[str], count: int) -> Clock | None:
+        """A time of as many samples, one beside the arrays if there is; None where none is."""
         if not times:
-            return self.step(wanted)
+            return None
         beside = [n for n in times if _folder(n) == _folder(wanted[0])]
         time = (beside or times)[0]
         at = places(count)
@@ -117,7 +115,8 @@ class _Arrays:
             names = list(channel_names("columns", asked.columns, len(names), "channel"))
         wanted = [named[n] for n in asked.channels or () if n in named] or list(named.values())
         times = [n for n in times if self.shapes[n][0] == count]
-        dt = None if asked.dt is not None else self._step(wanted, times, count)
+        clock = None if asked.dt is not None else self._clock(wanted, times, count)
+        dt = None if asked.dt is not None else clock.step if clock else self.step(wanted)
 
         def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
             wanted = [channels[i][1:] for i in which]
@@ -129,7 +128,7 @@ class _Arrays:
                     yield np.column_stack([flat[name][:, i] for name, i in wanted])
 
         units = {n: self.units[full] for n, (_, full, _) in zip(names, channels, strict=True)}
-        return Found(blocks, names, count, dt, str(self.path), units=units)
+        return Found(blocks, names, count, dt, str(self.path), units=units, clock=clock)
 
     def _of_group(self, group: str | None) -> dict[str, tuple[int, ...]]:
         if group is None:

@@ -41,8 +41,16 @@ def of_file(path: Path, asked: Asked) -> Found:
 
 
 def _of_npy(path: Path, block: int, columns: Sequence[str] | None) -> Found:
+    def mapped() -> Found:
+        rows = np.load(path, mmap_mode="r", allow_pickle=False)
+        return of_array(rows, columns, block, str(path))
+
+    def anew(first: int, which: Sequence[int]) -> Iterator[Array]:
+        yield from mapped().blocks(first, which)
+
     try:
-        return of_array(np.load(path, mmap_mode="r", allow_pickle=False), columns, block, str(path))
+        # mapped for as long as it is read: of many files not all are open at once
+        return dataclasses.replace(mapped(), blocks=anew)
     except InputError:
         raise
     except Exception as error:
@@ -101,14 +109,14 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     time = time_named(every)
     columns = [n for n in every if n != time and not is_kept(n)]
     names = [named(n)[0] for n in columns]
-    count, dt, told_units = file.metadata.num_rows, None, field_units(file.schema_arrow)
+    count, clock, told_units = file.metadata.num_rows, None, field_units(file.schema_arrow)
     kept = [n for n in every if n != time and is_kept(n)]
     told = None
     with refusing(path, "Parquet"):
         if kept and count:
             told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
         if time is not None and count > 1 and given is None:
-            dt = even(str(path), time, *_stamps(file, time), told_units.get(time, ""))
+            clock = even(str(path), time, *_stamps(file, time), told_units.get(time, ""))
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]
@@ -122,7 +130,8 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     hold = None if told is None else kept_hold(told, names)
     conditions = {} if told is None else kept_conditions(told)
     units = {named(n)[0]: told_units.get(n) or named(n)[1] for n in columns}
-    return Found(blocks, names, count, dt, str(path), hold, conditions, units)
+    dt = None if clock is None else clock.step
+    return Found(blocks, names, count, dt, str(path), hold, conditions, units, clock)
 
 
 def _stamps(file: Source, time: str) -> tuple[list[int], Array]:

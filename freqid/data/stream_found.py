@@ -36,6 +36,19 @@ class Asked:
 
 
 @dataclass(frozen=True)
+class Clock:
+    """What a time tells: the sample time in s, its ``first`` and ``last`` stamps as they came, its
+    name and its unit.
+    """
+
+    step: float
+    first: object
+    last: object
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
 class Found:
     """Blocks of all channels, their names, and what is known of time and length."""
 
@@ -50,6 +63,8 @@ class Found:
     conditions: Mapping[str, float] = field(default_factory=dict)
     # by channel, where the file says them
     units: Mapping[str, str] = field(default_factory=dict)
+    # where the sample time comes of a time
+    clock: Clock | None = None
 
 
 def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: str) -> Found:
@@ -83,9 +98,9 @@ def places(count: int) -> list[int]:
     return sorted({*ends, *between.tolist()})
 
 
-def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "") -> float:
-    """The sample time in s of a time by its stamps ``at`` some rows, the first two and the last two
-    among them; ValueError where these do not agree, or samples are missing between.
+def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "") -> Clock:
+    """A time by its stamps ``at`` some rows, the first two and the last two among them; ValueError
+    where these do not agree, or samples are missing between.
     """
     import pandas as pd
 
@@ -111,4 +126,13 @@ def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "
             "resample=True, or give dt in s where the samples are even"
         )
     # a time printed with few digits carries their rounding
-    return float(f"{step:.9g}")
+    return Clock(float(f"{step:.9g}"), stamps[0], stamps[-1], plain, told or unit)
+
+
+def seconds_between(before: Clock, after: Clock) -> float:
+    """From the last stamp of a time to the first one of another, in s."""
+    import pandas as pd
+
+    stamps = pd.Series(np.array([before.last, after.first]))
+    t, _ = in_seconds(before.name, stamps, before.unit)
+    return float(t[1] - t[0])

@@ -12,6 +12,7 @@ from freqid.data.conditions import as_conditions
 from freqid.data.replacing import has_read
 from freqid.data.rows import as_rows
 from freqid.data.selection import as_holds
+from freqid.data.stream_chain import chained, files_of
 from freqid.data.stream_files import of_file
 from freqid.data.stream_found import Asked, Found, Source, of_array
 from freqid.data.stream_views import from_the_first
@@ -35,7 +36,8 @@ def open(
 
     Args:
         source: a path (.npy, .h5 with extra ``hdf5``, .parquet with extra ``parquet``, .zarr with
-            extra ``zarr``), an array or a dask array (N, channels), an iterable of blocks
+            extra ``zarr``), several, or a pattern such as ``"logs/*.h5"``, of files that follow one
+            another without a gap, an array or a dask array (N, channels), an iterable of blocks
             (n, channels), or a function that starts such an iterable anew for each pass.
         inputs, outputs: channels by name; of two, the first is the input.
         dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set or
@@ -57,14 +59,10 @@ def open(
     True
     """
     size = whole("block", block)
-    if isinstance(source, (str, Path)):
+    if files := files_of(source):
         both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
-        try:
-            found = of_file(Path(source), Asked(size, dt, columns, group, both))
-        except InputError as error:
-            text = str(error)
-            raise InputError(text if str(source) in text else f"{source}: {text}") from None
-        has_read(source)
+        asked = Asked(size, dt, columns, group, both)
+        found = chained([_of_file(file, asked) for file in files], both)
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
@@ -98,6 +96,16 @@ def open(
         as_conditions(found.conditions),
         {n: found.units[n] for n in (*u_names, *y_names) if found.units.get(n)},
     )  # fmt: skip
+
+
+def _of_file(path: Path, asked: Asked) -> Found:
+    try:
+        found = of_file(path, asked)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if str(path) in text else f"{path}: {text}") from None
+    has_read(path)
+    return found
 
 
 def _of_blocks(source: Source, columns: Sequence[str] | None) -> Found:

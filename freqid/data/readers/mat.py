@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from freqid.checks import InputError
 from freqid.data.readers.columns import columns_of
 from freqid.data.readers.kinds import READERS, damaged, of_one_group, reads
-from freqid.data.readers.mat_forms import Group, group_of, inner_groups, structure_of
+from freqid.data.readers.mat_forms import Fields, Group, group_of, inner_groups, structure_of
 from freqid.data.readers.mat_structure import check_structure
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
     return frame
 
 
-def _objects(content: Mapping[str, Any]) -> dict[str, str]:
+def _objects(content: Fields) -> dict[str, str]:
     """Objects among the variables, by key, each with its name and class: ``out (timeseries)``."""
     from scipy.io.matlab import MatlabObject, MatlabOpaque
 
@@ -72,11 +71,11 @@ def _objects(content: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def _text(told: Any) -> str:
+def _text(told: object) -> str:
     return told.decode("latin-1") if isinstance(told, bytes) else str(told)
 
 
-def loaded(path: Path) -> dict[str, Any]:
+def loaded(path: Path) -> Fields:
     """The variables of a MAT file by name; ValueError for a damaged one.
 
     Raises NotImplementedError for version 7.3.

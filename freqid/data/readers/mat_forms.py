@@ -6,13 +6,16 @@ dSPACE ControlDesk, recordings as MAT files (X and Y, each with Name, Data and U
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from freqid.checks import Array, InputError
+
+# a structure's fields by name, whatever they hold
+Fields: TypeAlias = "dict[str, Any]"
 
 # what a series in time calls its samples, where they are all that it holds
 _SAMPLES = ("data", "values", "value")
@@ -31,7 +34,7 @@ class Group:
         return any(np.size(x) > 1 and _is_numeric(x) for x in self.arrays.values())
 
 
-def structure_of(value: object) -> dict[str, Any] | None:
+def structure_of(value: object) -> Fields | None:
     """The fields of a structure; None for anything else, several structures in an array too."""
     names = getattr(getattr(value, "dtype", None), "names", None)
     if not names or np.ndim(value) != 0:  # type: ignore[arg-type]
@@ -40,7 +43,7 @@ def structure_of(value: object) -> dict[str, Any] | None:
     return {name: record[name].item() for name in names}
 
 
-def group_of(name: str, fields: Mapping[str, Any]) -> Group:
+def group_of(name: str, fields: Fields) -> Group:
     """What the structure called ``name`` holds, whichever tool has written it."""
     if "signals" in fields and _entries(fields["signals"], "values"):
         return _simulink(name, fields)
@@ -55,7 +58,7 @@ def group_of(name: str, fields: Mapping[str, Any]) -> Group:
     return Group({n.lower() if n.lower() == "time" else n: x for n, x in arrays.items()})
 
 
-def inner_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Group]]:
+def inner_groups(name: str, fields: Fields) -> Iterator[tuple[str, Group]]:
     """Structures within a structure, by their paths."""
     for inner, value in fields.items():
         path = f"{name}/{inner}"
@@ -64,7 +67,7 @@ def inner_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Gr
             yield from inner_groups(path, deeper)
 
 
-def _simulink(name: str, fields: Mapping[str, Any]) -> Group:
+def _simulink(name: str, fields: Fields) -> Group:
     """Signals of a block, by their labels or else by the structure's name and their number."""
     group = Group()
     signals = _entries(fields["signals"], "values")
@@ -85,7 +88,7 @@ def _simulink(name: str, fields: Mapping[str, Any]) -> Group:
     return group
 
 
-def _dspace(name: str, fields: Mapping[str, Any]) -> Group:
+def _dspace(name: str, fields: Fields) -> Group:
     """Signals of a recording, by their names, with their units and their time."""
     group = Group()
     axes, signals = _entries(fields["X"], "Data"), _entries(fields["Y"], "Data")
@@ -105,7 +108,7 @@ def _dspace(name: str, fields: Mapping[str, Any]) -> Group:
     return group
 
 
-def _number(signal: Mapping[str, Any], most: int) -> int:
+def _number(signal: Fields, most: int) -> int:
     """Which of the axes is a signal's own, the first where that is not told."""
     told = np.ravel(signal.get("XIndex", 1))
     number = told[0] if told.size and _is_numeric(told) else 1
@@ -122,7 +125,7 @@ def _add(group: Group, label: str, values: Array) -> str:
     return name
 
 
-def _entries(value: object, needed: str) -> list[dict[str, Any]]:
+def _entries(value: object, needed: str) -> list[Fields]:
     """The structures of an array of them, or the only one; none unless all have such a field."""
     names = getattr(getattr(value, "dtype", None), "names", None)
     if not names or needed not in names:
@@ -131,7 +134,7 @@ def _entries(value: object, needed: str) -> list[dict[str, Any]]:
     return [{n: _bare(entry[n]) for n in names} for entry in entries]
 
 
-def _bare(value: Any) -> Any:
+def _bare(value: object) -> object:
     """What an array of one object holds; anything else as it is."""
     if isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 0:
         return value.item()

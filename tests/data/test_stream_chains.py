@@ -1,0 +1,123 @@
+"""Several files as one stream, and what does not follow on."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+from freqid.checks import InputError
+
+DT, N = 2e-3, 6000
+
+
+@pytest.fixture(scope="module")
+def record():
+    return fq.simulate(fq.first_order(), fq.white_noise(N, seed=1), DT).with_noise(0.1, seed=2)
+
+
+def write(folder, record, kind):
+    """Files of one log, one of them with a single sample."""
+    t = pd.to_datetime(np.round(1e9 * DT * np.arange(N)).astype("int64"))
+    cuts = (0, 1700, 1701, 4100, N) if kind != ".h5" else (0, 1700, 4100, N)
+    for i, (a, b) in enumerate(pairwise(cuts)):
+        path = folder / f"log_{8 + i}{kind}"
+        if kind == ".npy":
+            np.save(path, np.column_stack([record.u[a:b], record.y[a:b]]))
+        elif kind == ".parquet":
+            frame = pd.DataFrame({"time": t[a:b], "u [N m]": record.u[a:b], "y": record.y[a:b]})
+            frame.to_parquet(path)
+        else:
+            h5py = pytest.importorskip("h5py")
+            with h5py.File(path, "w") as file:
+                file["time"] = DT * np.arange(a, b)
+                file["u"], file["y"] = record.u[a:b], record.y[a:b]
+
+
+@pytest.mark.parametrize("kind", [".npy", ".parquet", ".h5"])
+def test_files_of_a_pattern_are_one_record(tmp_path, record, kind):
+    """In the order of their numbers: log_8, log_9, log_10."""
+    write(tmp_path, record, kind)
+    given = {"dt": DT} if kind == ".npy" else {}
+    stream = fq.open(str(tmp_path / f"log_*{kind}"), block=700, **given)
+    assert stream.n_samples == N
+    assert stream.dt == pytest.approx(DT, rel=1e-9)
+    whole = stream.load()
+    np.testing.assert_array_equal(whole.u, record.u)
+    np.testing.assert_array_equal(whole.y, record.y)
+    if kind == ".parquet":
+        assert dict(stream.units) == {"u": "N m"}
+    np.testing.assert_allclose(fq.h1(stream, 500).response, fq.h1(record, 500).response, rtol=1e-12)
+    part = stream.slice(3.0, 9.0).decimate(3).load()
+    np.testing.assert_array_equal(part.y, record.y[1500:4500:3])
+    est = fq.fit(fq.first_order(), stream, band=(1, 100))
+    assert est["a"] == pytest.approx(fq.first_order()["a"], rel=0.1)
+
+
+def test_a_list_is_read_in_its_order_and_channels_are_found_by_name(tmp_path, record):
+    for name, columns in (("b", ["u", "y"]), ("a", ["y", "other", "u"])):
+        rows = slice(0, 2500) if name == "b" else slice(2500, N)
+        frame = pd.DataFrame(
+            {"time": DT * np.arange(N), "u": record.u, "y": record.y, "other": 0.0}
+        )
+        frame.iloc[rows][["time", *columns]].to_parquet(tmp_path / f"{name}.parquet")
+    files = [tmp_path / "b.parquet", tmp_path / "a.parquet"]
+    stream = fq.open(files, "u", "y")
+    np.testing.assert_array_equal(stream.load().y, record.y)
+    assert "2 files from" in stream.origin
+    with pytest.raises(InputError, match=r"seconds|missing|twice"):
+        fq.open(files[::-1], "u", "y")
+    with pytest.raises(InputError, match=r"b\.parquet has no channel 'other'"):
+        fq.open(files, "other", "y")
+
+
+def test_what_does_not_follow_is_told(tmp_path, record):
+    def log(name, first, dt=DT, **columns):
+        path = tmp_path / f"{name}.parquet"
+        time = first + dt * np.arange(500)
+        pd.DataFrame(
+            {"time": time, "u": record.u[:500], "y": record.y[:500], **columns}
+        ).to_parquet(path)
+        return path
+
+    one = log("a", 0.0)
+    with pytest.raises(
+        InputError, match=r"between .*a\.parquet and .*b\.parquet 0.2 s are missing"
+    ):
+        fq.open([one, log("b", 1.2)])
+    with pytest.raises(InputError, match="1 s are there twice"):
+        fq.open([one, log("c", 0.0)])
+    # who says the sample time says that they follow on
+    assert fq.open([one, log("c", 0.0)], dt=DT).n_samples == 1000
+    with pytest.raises(InputError, match=r"sample time of 0\.004 s and .* of 0\.002 s"):
+        fq.open([one, log("d", 1.0, 2 * DT)])
+    with pytest.raises(InputError, match="given twice"):
+        fq.open([one, one])
+    with pytest.raises(FileNotFoundError, match=r"e\*\.parquet"):
+        fq.open(str(tmp_path / "e*.parquet"))
+    fq.write(fq.Record(record.u, record.y, DT, hold="foh"), tmp_path / "f.parquet")
+    with pytest.raises(InputError, match="tells other hold"):
+        fq.open([tmp_path / "f.parquet", log("g", N * DT)])
+
+
+def test_averages_go_on_where_a_log_has_a_file_more(tmp_path, record):
+    write(tmp_path, record, ".h5")
+    files = sorted(tmp_path.glob("*.h5"), key=lambda p: int(p.stem[4:]))
+    state = tmp_path / "sums.npz"
+    fq.h1(fq.open(files[:2]), 500, state=state)
+    grown = fq.h1(fq.open(files), 500, state=state)
+    np.testing.assert_allclose(grown.response, fq.h1(record, 500).response, rtol=1e-12)
+
+
+def test_more_files_than_may_be_open_at_once(tmp_path, record):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    for i in range(150):
+        np.save(tmp_path / f"{i}.npy", np.column_stack([record.u, record.y])[40 * i : 40 * i + 40])
+    resource.setrlimit(resource.RLIMIT_NOFILE, (100, before[1]))
+    try:
+        stream = fq.open(str(tmp_path / "*.npy"), dt=DT)
+        np.testing.assert_array_equal(stream.load().y, record.y)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
