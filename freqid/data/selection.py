@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, an, listed, samples, unknown
-from freqid.lti import Hold, InputHolds, as_hold
+from freqid.lti import Hold, InputHolds, PeriodicHold, as_hold
 
 if TYPE_CHECKING:
     from freqid.data.record import Record
     from freqid.data.streams import Stream
+
+# sample times from which a hold is that of another record
+_OUTLASTS = 2.0
 
 
 def channel(record: Record, name: str) -> FloatArray:
@@ -118,3 +121,13 @@ def _names(
 def flat(columns: FloatArray) -> FloatArray:
     """One channel as (N,), several as they are, (N, channels)."""
     return columns[:, 0] if columns.shape[1] == 1 else columns
+
+
+def check_hold(hold: Hold, step: float) -> None:
+    """ValueError for a hold that outlasts samples: what is between its steps is samples, too."""
+    for each in hold.holds if isinstance(hold, InputHolds) else (hold,):
+        if isinstance(each, PeriodicHold) and each.period >= _OUTLASTS * step * (1 - 1e-9):
+            raise InputError(
+                f"hold={each!r} outlasts the input's samples, {step:g} s apart; an input that "
+                f"keeps values for several samples is held for one of them, too: {each.name!r}"
+            )

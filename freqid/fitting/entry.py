@@ -29,7 +29,7 @@ from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.printed import call_of
-from freqid.fitting.reading import Domain, InitialState, Reading, check_period
+from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
 from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
@@ -182,8 +182,7 @@ def fit(
         for i, (d, noise) in enumerate(zip(way.sets, way.noise, strict=True))
     ]
     for r in readings:
-        if isinstance(r.data, Record):
-            check_period(r.hold, r.data.input_dt)
+        r.check_hold()
     if error == "log":
         readings = [_logarithmic(r, model) for r in readings]
     if offset is not None:

@@ -20,6 +20,7 @@ from freqid.data import (
     as_band,
     as_holds,
     channel_counts,
+    check_hold,
     input_dt,
 )
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
@@ -36,24 +37,10 @@ from freqid.fitting.noise_models import (
     ResponseNoise,
 )
 from freqid.frf import spectra
-from freqid.lti import BandLimited, Hold, InputHolds, PeriodicHold, Plane, ZeroOrderHold
+from freqid.lti import BandLimited, Hold, PeriodicHold, Plane, ZeroOrderHold
 
 InitialState = Literal["estimate", "zero", "steady"]
 Domain = Literal["frequency", "time"]
-
-
-# sample times from which a hold is that of another record
-_OUTLASTS = 2.0
-
-
-def check_period(hold: Hold, step: float) -> None:
-    """ValueError for a hold that outlasts samples: what is between its steps is samples, too."""
-    for each in hold.holds if isinstance(hold, InputHolds) else (hold,):
-        if isinstance(each, PeriodicHold) and each.period >= _OUTLASTS * step * (1 - 1e-9):
-            raise InputError(
-                f"hold={each!r} outlasts the input's samples, {step:g} s apart; an input that "
-                f"keeps values for several samples is held for one of them, too: {each.name!r}"
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +99,11 @@ class Reading:
         return cls(
             data, assumed, limits, noise, initial_state, domain, skip_zero, delayed, place=place
         )
+
+    def check_hold(self) -> None:
+        """ValueError for a hold that outlasts a record's samples."""
+        if isinstance(self.data, Record):
+            check_hold(self.hold, self.data.input_dt)
 
     @property
     def in_time(self) -> bool:
@@ -207,8 +199,8 @@ class Reading:
         seen = type(frf)(**{**frf.__dict__, **changed})
         return dataclasses.replace(self, data=seen, hold=hold, band=None)
 
-    def experiment(self, plane: Plane | None = None) -> Experiment:
-        """The data as residuals. With a ``plane`` the model is a sampled one, seen there."""
+    def experiment(self, plane: Plane | None = None, like: Experiment | None = None) -> Experiment:
+        """The data as residuals; with a ``plane`` of a sampled model, which is seen there."""
         if isinstance(self.data, StampedRecord):
             free = self.initial_state == "estimate"
             return StampedExperiment(self.data, self.hold, free, self.place)
@@ -220,12 +212,14 @@ class Reading:
             assert isinstance(self.data, PeriodicResponse)
             data = self.data if self.band is None else self.data.select(self.band)
             return PeriodicExperiment(data, self.hold, plane, self.place)
-        return self.lines(plane)
+        return self.lines(plane, like)
 
     def lines(
-        self, plane: Plane | None = None, like: SpectralExperiment | None = None
+        self, plane: Plane | None = None, like: Experiment | None = None
     ) -> SpectralExperiment:
-        """The lines of the data as residuals, in any domain; with the points of one ``like`` it."""
+        """The lines of the data as residuals, in any domain; what they share with those ``like``
+        them is kept once.
+        """
         # a sampled model of a band-limited input has z at the input's sample time
         hold = self.hold
         if plane is not None and not isinstance(hold, PeriodicHold):
@@ -251,7 +245,8 @@ class Reading:
             s = s.without_zero()
         weights = self.noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
-        made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane, like)
+        other = like if isinstance(like, SpectralExperiment) else None
+        made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane, other)
         made = dataclasses.replace(made, place=self.place)
         whole = self.band is None
         if whole and free and self.noise.to_be_learnt and not self.noise.plain:
@@ -296,4 +291,7 @@ def read_for(
                 f"data have {given[0]} outputs and {given[1]} inputs; the model has {shape[0]} "
                 f"and {shape[1]}"
             )
-    return [r.experiment(plane) for r in readings]
+    made: list[Experiment] = []
+    for r in readings:
+        made.append(r.experiment(plane, made[-1] if made else None))
+    return made

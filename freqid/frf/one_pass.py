@@ -67,6 +67,17 @@ class Stretch(KnownLines):
         lines = dataclasses.replace(self.lines, U=self.lines.U[u], Y=self.lines.Y[y])
         return Stretch.of(part, lines, self.limits)
 
+    def at_lines_of(self, other: Record) -> Stretch:
+        """The same with the frequencies of another stretch, where both have them, kept once."""
+        own, theirs = self.lines, other.lines if isinstance(other, Stretch) else None
+        if own is None or theirs is None or not np.array_equal(own.omega, theirs.omega):
+            return self
+        lines = dataclasses.replace(
+            own, omega=theirs.omega, omega_input=theirs.omega_input,
+            multiplicity=theirs.multiplicity,
+        )  # fmt: skip
+        return Stretch.of(self.plain(), lines, self.limits)
+
     def plain(self) -> Record:
         """The samples that show the lines, as a record of their own."""
         return Record(**{f.name: getattr(self, f.name) for f in dataclasses.fields(Record)})
@@ -101,6 +112,8 @@ def stretches(
     with Bar(progress, known, 0, "samples") as advance:
         for u, y in stream.stretches(length):
             made = _stretch(stream, u, y, limits, every, bool(found))
+            if isinstance(made, Stretch) and found:
+                made = made.at_lines_of(found[-1])
             found += [] if made is None else [made]
             advance(len(u))
     if not found:

@@ -103,12 +103,15 @@ class SpectralExperiment:
         like: SpectralExperiment | None = None,
     ) -> SpectralExperiment:
         """``transient_dt`` is the sample time of the output; None leaves the transient out. An
-        experiment ``like`` this one lends the points that both have.
+        experiment ``like`` this one lends what both have.
         """
         # the free motion is that of the sampled states, whatever drives them
         seen_by = hold.groups[0][0] if isinstance(hold, InputHolds) else hold
-        if like is not None and plane is None and like._at_the_points_of(lines, hold, lift):
-            z = like.points.z
+        lender = (
+            like if plane is None and like and like._at_the_points_of(lines, hold, lift) else None
+        )
+        if lender is not None:
+            z, lines = lender.points.z, lines.lent(lender.lines)
         elif lift > 1 and isinstance(hold, PeriodicHold):
             z = on_circle(hold.period * lift * lines.omega)
         else:
@@ -116,7 +119,10 @@ class SpectralExperiment:
         n_rows = 2 * int(np.count_nonzero(lines.scale)) - n_real
         discrete, transient = plane is not None, None
         if transient_dt is not None:
-            transient = Transient.of(lines, transient_dt, seen_by, z, discrete, lift)
+            if lender is not None and lender._moves_freely_as(lines, transient_dt):
+                transient = lender.transient
+            else:
+                transient = Transient.of(lines, transient_dt, seen_by, z, discrete, lift)
         made = cls(lines, Points(z, lines.U), transient, hold, n_rows, lift, discrete)
         return made if plane is None or plane.a == 0 else made.in_plane(plane)
 
@@ -197,6 +203,11 @@ class SpectralExperiment:
         """Whether the inputs of lines under a hold act where those of this one do."""
         same = not self.discrete and self.hold == hold and self.lift == lift
         return same and np.array_equal(self.lines.omega_input, lines.omega_input)
+
+    def _moves_freely_as(self, lines: Lines, dt: float) -> bool:
+        """Whether the free motion is seen at lines as it is at these."""
+        own = self.transient
+        return own is not None and own.dt == dt and lines.scale is self.lines.scale
 
     @property
     def n_lines(self) -> int:

@@ -49,6 +49,14 @@ class Lines:
             U, Y = U * np.repeat(one, omega_input.size // len(omega)), Y * one
         return cls(omega, omega_input, U, Y, scale, inside)
 
+    def lent(self, like: Lines) -> Lines:
+        """The same with the frequencies, and the weights where they are equal, of other lines."""
+        same = self.scale.shape == like.scale.shape and np.array_equal(self.scale, like.scale)
+        return dataclasses.replace(
+            self, omega=like.omega, omega_input=like.omega_input,
+            scale=like.scale if same else self.scale,
+        )  # fmt: skip
+
     @property
     def aliases(self) -> int:
         """Input frequencies that fold onto each line, M."""

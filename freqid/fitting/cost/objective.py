@@ -18,10 +18,15 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.priors import Prior
-from freqid.lti import Hold, Realisation, eliminate, triangle_of
+from freqid.lti import Hold, Realisation, eliminate, triangle, triangle_of
 
 # squares of what is larger leave the range of numbers
 _HUGE = 1e150
+
+
+# derivatives that are held before they are folded to a triangle: what a fit takes of memory is that
+# of its lines, and of some experiments' derivatives
+_HELD = 1 << 21
 
 
 class Structure(Protocol):
@@ -149,6 +154,8 @@ class Objective:
             self.failure = error
             return None
         blocks, initial, parts = [], [], []
+        folded: list[FloatArray] = []
+        held = 0
         try:
             for experiment in self.experiments:
                 evaluation = experiment.at(realisation)
@@ -160,6 +167,10 @@ class Objective:
                 blocks.append((evaluation.jacobian(delta), r, Q))
                 initial.append(delta)
                 parts.append(float(r @ r))
+                held += blocks[-1][0].size
+                if held > _HELD:
+                    folded.append(triangle_of(blocks))
+                    blocks, held = [], 0
         except (np.linalg.LinAlgError, InputError) as error:
             self.failure = error
             return None
@@ -167,9 +178,19 @@ class Objective:
             known = self.prior.rows(x)
             blocks.append((known[:, :-1].T, known[:, -1], None))
             parts.append(float(known[:, -1] @ known[:, -1]))
-        triangle = triangle_of(blocks)
+        R = _together([*folded, *([triangle_of(blocks)] if blocks else [])])
         # a NaN is not less than anything
-        if not np.abs(triangle).max(initial=0) < _HUGE:
+        if not np.abs(R).max(initial=0) < _HUGE:
             self.failure = ArithmeticError("the response is not finite")
             return None
-        return Point(triangle, initial, parts)
+        return Point(R, initial, parts)
+
+
+def _together(triangles: list[FloatArray]) -> FloatArray:
+    """The triangle of all rows from those of some of them."""
+    if len(triangles) == 1:
+        return triangles[0]
+    stacked = np.concatenate(triangles)
+    if not np.isfinite(stacked).all():
+        return np.full_like(triangles[0], np.nan)
+    return triangle(stacked)
