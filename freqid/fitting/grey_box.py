@@ -23,6 +23,7 @@ from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
 from freqid.fitting.sufficiency import enough_rows
+from freqid.fitting.twins import nearest_to_start
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
 from freqid.lti import Hold, InputHolds, StateSpace, ZeroOrderHold, rounding, sentence
@@ -54,7 +55,8 @@ def fit_grey_box(
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     found = search_grey(structure, objective, readings, options)
-    found = dataclasses.replace(found, solution=_unmirrored(objective, structure, found.solution))
+    solution = _unmirrored(objective, structure, found.solution)
+    found = dataclasses.replace(found, solution=nearest_to_start(objective, structure, solution))
     alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
     minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 from freqid.fitting.findings import Finding, Inquired, between_parts
 from freqid.fitting.grades import Verdict, verdict
 from freqid.fitting.search.verdict import Witness
+from freqid.fitting.twins import exchangeable
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from freqid.fitting.uncertainty.minimum import Minimum
 
 
 class Questioned:
@@ -20,6 +23,7 @@ class Questioned:
     signs: list[Finding]
     testimony: Callable[[], Witness] | None
     inquiry: Inquired | None
+    problem: Minimum | None
 
     @cached_property
     def witness(self) -> Witness:
@@ -40,7 +44,7 @@ class Questioned:
         asked = [] if self.inquiry is None else self.inquiry.findings()
         if self.inquiry is not None and "unsteady" not in [a.kind for a in asked]:
             asked = [*asked, *self.inquiry.between_halves(self)]  # type: ignore[arg-type]
-        return [*asked, *self.signs]
+        return [*asked, *self.signs, *exchangeable(self.problem)]
 
     @cached_property
     def verdict(self) -> Verdict:
