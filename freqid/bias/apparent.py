@@ -20,17 +20,18 @@ from numpy.typing import ArrayLike
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, an, flag, positive, samples
 from freqid.data import FrequencyResponse, fold, low_pass_gain, merged_lines, unfold
 from freqid.excitation import InputSpectrum, power_gain
+from freqid.fitting import GreyStructure
 from freqid.lti import (
     Hold,
     PeriodicHold,
-    StateSpace,
     ZeroOrderHold,
     basis_of,
     known_hold,
     points,
+    sampled_response,
     transfer,
 )
-from freqid.models import Model, ModelLike, as_model
+from freqid.models import GreyBox, Model, ModelLike, as_model
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,17 @@ def true_plant(plant: ModelLike) -> Model:
 Held = Callable[[FloatArray], ComplexArray]
 
 
-def held_response(at: StateSpace, hold: Hold) -> Held:
-    """The plant's response through ``hold`` at signed frequencies (Hz): (outputs, inputs, K)."""
-    plant = basis_of(at).through(hold)
+def held_response(given: ModelLike, hold: Hold) -> Held:
+    """A plant's response through ``hold`` at signed frequencies (Hz): (outputs, inputs, K).
+
+    Raises ValueError for what is no plant in continuous time.
+    """
+    model = true_plant(given)
+    if isinstance(model, GreyBox) and model.delay_sources:
+        late = GreyStructure(model)
+        realisation = late.realise(late.start)
+        return lambda f: sampled_response(realisation, 2 * np.pi * f, hold)[0]
+    plant = basis_of(model.state_space()).through(hold)
     return lambda f: transfer(plant, points(2 * np.pi * f, hold))
 
 
@@ -200,9 +209,8 @@ def apparent_response(
     an("spectrum", spectrum, InputSpectrum)
     if frequency is not None:
         frequency = samples("frequency", frequency)
-    at = true_plant(plant).state_space()
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
-    held = held_response(at, sampling.hold)
+    held = held_response(plant, sampling.hold)
     if frequency is None and len(spectrum.edges(sampling.base_dt)) == 0:
         seen = apparent_lines(held, spectrum, sampling)
     else:
@@ -212,7 +220,7 @@ def apparent_response(
     keep = seen.power > 1e-12 * seen.power.max(initial=0)
     if not keep.any():
         raise InputError("spectrum has no energy at these frequencies; it identifies nothing there")
-    inputs = at.B.shape[1]
+    inputs = seen.response.shape[1]
     return FrequencyResponse(
         seen.frequency[keep],
         seen.response[..., keep],

@@ -13,7 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from freqid.bias.apparent import Sampling, true_plant
+from freqid.bias.apparent import Held, Sampling, held_response
 from freqid.bias.conditions import Conditions, Expected, Responses
 from freqid.checks import Array, FloatArray, InputError, finite, named_values, positive, whole
 from freqid.excitation import InputSpectrum
@@ -33,7 +33,6 @@ from freqid.fitting import (
 )
 from freqid.lti import (
     Hold,
-    StateSpace,
     as_hold,
     points,
     response_and_derivatives,
@@ -102,8 +101,8 @@ def asymptotic_fit(
     if not isinstance(spectrum, InputSpectrum):
         raise InputError(f"spectrum={type(spectrum).__name__} is not a spectrum of an input")
     start = None if start is None else named_values("start", start)
-    at = true_plant(plant).state_space()
     sampling = Sampling.of(dt, true_hold, base_dt, antialias)
+    at = held_response(plant, sampling.hold)
     conditions = Conditions(spectrum, sampling, band, prefilter, noise_model)
     # data without noise may have two minima that are nearly as good: look for both
     auto = isinstance(n_starts, str) and n_starts == "auto"
@@ -134,10 +133,14 @@ def asymptotic_fit(
 
 def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Responses:
     """Response and derivatives of a grey box at x, (rows, K), at frequencies in Hz."""
-    plant = structure.realise(x[: len(structure.names)]).basis.through(hold)
+    realisation = structure.realise(x[: len(structure.names)])
+    plant = realisation.basis.through(hold)
 
     def at(f: FloatArray) -> Array:
-        G, dG = response_and_derivatives(plant, points(2 * np.pi * f, hold))
+        if realisation.delay is None:
+            G, dG = response_and_derivatives(plant, points(2 * np.pi * f, hold))
+        else:
+            G, dG = sampled_response(realisation, 2 * np.pi * f, hold)
         return np.concatenate([G.reshape(-1, len(f)), dG.reshape(-1, len(f))])
 
     return at
@@ -145,7 +148,7 @@ def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Resp
 
 def grey_asymptote(
     model: GreyBox,
-    at: StateSpace,
+    at: Held,
     conditions: Conditions,
     hold: Hold | str | None,
     options: SearchOptions,
@@ -197,7 +200,7 @@ def grey_asymptote(
 def _black(
     spec: object,
     plant: ModelLike,
-    at: StateSpace,
+    at: Held,
     conditions: Conditions,
     hold: Hold,
 ) -> Estimate:
@@ -213,7 +216,7 @@ def _black(
 
 def _refined(
     conditions: Conditions,
-    at: StateSpace,
+    at: Held,
     seen: Callable[[Estimate | None], list[Responses]],
     solve: Callable[[Expected, Estimate | None], Estimate],
 ) -> tuple[Estimate, Estimate, Expected]:

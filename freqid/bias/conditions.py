@@ -17,7 +17,6 @@ from freqid.bias.apparent import (
     Sampling,
     apparent_density,
     apparent_lines,
-    held_response,
     slow_edges,
     weight_of,
 )
@@ -25,7 +24,7 @@ from freqid.checks import Array, ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, as_band
 from freqid.excitation import InputSpectrum
 from freqid.fitting import GivenWeights, Reading
-from freqid.lti import Hold, StateSpace, panel_nodes, resolved
+from freqid.lti import Hold, panel_nodes, resolved
 from freqid.models import ModelLike
 
 Responses = Callable[[FloatArray], Array]
@@ -78,12 +77,13 @@ class Conditions:
     prefilter: Any = None
     noise_model: Any = None
 
-    def expected(self, at: StateSpace, *responses: Responses) -> Expected:
-        """The data, at nodes that resolve them and the ``responses`` (any, K) of frequencies in Hz.
+    def expected(self, held: Held, *responses: Responses) -> Expected:
+        """The data of a plant's response through the hold, at nodes that resolve them and the
+        ``responses`` (any, K) of frequencies in Hz.
 
         Raises ValueError where the spectrum has no energy below the slow Nyquist limit.
         """
-        s, held = self.sampling, held_response(at, self.sampling.hold)
+        s = self.sampling
         nyquist = 0.5 / s.dt
         low, high = as_band(self.band, nyquist) or (0.0, nyquist)
         work = 0

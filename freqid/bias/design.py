@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.bias.apparent import Sampling, true_plant
+from freqid.bias.apparent import Sampling, held_response
 from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
@@ -160,7 +160,7 @@ def _bias_and_scatter(
         return np.full(len(true), np.inf), np.full(len(true), np.inf)
     assumed = as_hold(hold, sampling.dt, sampling.hold)
     seen = model_responses(structure, values / structure.scale, assumed)
-    expected = Conditions(spectrum, sampling).expected(true_plant(plant).state_space(), seen)
+    expected = Conditions(spectrum, sampling).expected(held_response(plant, sampling.hold), seen)
     count = duration / sampling.dt
     x = values / structure.scale
     covariance = error_covariance(x, structure, expected, assumed, noise_std, count)

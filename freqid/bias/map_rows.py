@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.bias.apparent import true_plant
+from freqid.bias.apparent import held_response
 from freqid.bias.asymptotic import grey_asymptote, model_responses
 from freqid.bias.batched_fit import Batch, Problem, solve
 from freqid.bias.conditions import Conditions
@@ -65,7 +65,8 @@ def answer_chunk(model: GreyBox, rows: Sequence[Row], shared: Conditions) -> lis
             answers[i].message = str(error)
     bounded = any(np.isfinite([p.lower, p.upper]).any() for p in model.free_parameters)
     single = list(kept)
-    if kept and not bounded:
+    # the batch knows neither bounds nor delays
+    if kept and not bounded and not model.delay_sources:
         single = _together(model, [rows[i] for i in kept], shared, problems, kept, answers)
     for i in single:
         answers[i] = _alone(model, rows[i], shared)
@@ -84,7 +85,7 @@ def _problem(model: GreyBox, row: Row, shared: Conditions, at: FloatArray | None
     hold = as_hold(row.hold, conditions.sampling.dt, conditions.sampling.hold)
     points = [structure.start] if at is None else [structure.start, at]
     seen = [model_responses(structure, x, hold) for x in points]
-    expected = conditions.expected(true_plant(model).state_space(), *seen)
+    expected = conditions.expected(held_response(model, conditions.sampling.hold), *seen)
     count = 2 * expected.response.size
     if count < len(structure.names):
         raise InputError(
@@ -146,8 +147,9 @@ def _determined(batch: Batch, found: Answers) -> BoolArray:
 
 def _alone(model: GreyBox, row: Row, shared: Conditions) -> Answer:
     try:
-        at = true_plant(model).state_space()
-        est, _ = grey_asymptote(model, at, row.conditions(shared), row.hold, SearchOptions())
+        conditions = row.conditions(shared)
+        at = held_response(model, conditions.sampling.hold)
+        est, _ = grey_asymptote(model, at, conditions, row.hold, SearchOptions())
     except (InputError, ArithmeticError, np.linalg.LinAlgError) as error:
         count = len(model.free_parameters)
         return Answer(np.full(count, np.nan), np.nan, False, str(error))

@@ -49,6 +49,8 @@ _DROWNED = 0.5
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
+_NOTHING_LEFT = "the estimate leaves nothing but the rounding of the data"
+
 
 class Share(InputNoise, Protocol):
     """How much more of what black boxes explain is chance than noise of the output makes."""
@@ -83,6 +85,9 @@ class Testimony:
         """The witness; absent, with the reason, where there is none."""
         structure = self.minimum.structure
         assert isinstance(structure, GreyStructure)
+        if self.minimum.exact:
+            # whatever a black box could say
+            return Witness("complete", _NOTHING_LEFT, 0.0, 0.0, 1.0)
         if structure.unknown:
             return Witness("absent", "the period of the hold is unknown to a black box")
         if any(isinstance(r.data, StampedRecord) for r in self.readings):
@@ -111,8 +116,7 @@ class Testimony:
         placed = isinstance(structure, PlacedStructure)
         order = structure.order if placed else observed_order(structure.model)  # type: ignore[attr-defined]
         if grey.cost <= 1e-18 * self.minimum.objective.energy:
-            sentence = "the estimate leaves nothing but the rounding of the data"
-            return Witness("complete", sentence, 0.0, 0.0, 1.0)
+            return Witness("complete", _NOTHING_LEFT, 0.0, 0.0, 1.0)
         if not self.minimum.solution.converged:
             return Witness("absent", "the descent has not come to a minimum")
         if placed and structure.black_boxes > MOST_UNKNOWNS:  # type: ignore[attr-defined]
