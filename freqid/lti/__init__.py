@@ -4,6 +4,7 @@ It may import ``freqid.checks`` only.
 """
 
 from freqid.lti.bases import Basis, basis_of, eigenbasis_of_many
+from freqid.lti.doubles import in_doubles
 from freqid.lti.eigenvectors import eigenvalues_and_derivatives
 from freqid.lti.exponential import exponential
 from freqid.lti.holds import (

@@ -7,6 +7,7 @@ import scipy
 
 from freqid.checks import Array, BoolArray, ComplexArray, FloatArray
 from freqid.lti.double_double import Doubled
+from freqid.lti.doubles import doubled_where_needed
 from freqid.lti.state_space import StateSpace
 
 # beyond this the eigenbasis loses more digits than the fit can spare
@@ -40,7 +41,7 @@ def eigenvectors(at: StateSpace) -> Eigen | None:
     if not np.abs(inverse).max(initial=0) * n < WORST_CONDITION:
         return None
     eigen = eigenvalues.astype(complex, copy=False), V, inverse
-    if _lost(*eigen) > _LOST:
+    if doubled_where_needed() and _lost(*eigen) > _LOST:
         eigen = refined(A, eigen)
     return eigen[0], eigen[1] * scale[:, None], eigen[2] / scale
 

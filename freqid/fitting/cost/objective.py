@@ -147,6 +147,10 @@ class Objective:
                 self.least = x.copy(), found.cost
         return self._points[key]
 
+    def forget(self) -> None:
+        """Compute the points that are remembered anew, if they are asked for."""
+        self._points.clear()
+
     def _compute(self, x: FloatArray) -> Point | None:
         try:
             realisation = self.structure.realise(x)

@@ -21,6 +21,7 @@ from freqid.fitting.search.log_stage import LogStructure
 from freqid.fitting.search.rounds import HOPELESS, LIMIT, ROUGH, Rounds, Visit
 from freqid.fitting.search.scatter import promising
 from freqid.fitting.search.stopping import BUDGET, Found, StopRule
+from freqid.lti import in_doubles
 
 _LOG = logging.getLogger(__name__)
 
@@ -32,6 +33,8 @@ _DEEPENED = 3
 _LAST_LIMIT = 400
 # part of the cost below which nothing is left to gain
 _EXACT = 1e-14
+# relative cost by which a point that was met in doubles differs from what it is
+_DIGITS = 1e-10
 # relative gain of the cost that ends a first stage
 _FIRST_GAIN = 1e-3
 
@@ -95,7 +98,8 @@ class Search:
                 ends = rounds.visits(start, seed)
             else:
                 ends = self._one_by_one(start, rule, seed)
-        for count, visits, solution, ended in ends:
+        while (visit := _in_doubles(ends)) is not None:
+            count, visits, solution, ended = visit
             tried += count
             found = dataclasses.replace(
                 found, n_starts=tried, n_stale=found.n_stale + max(count, visits)
@@ -117,6 +121,8 @@ class Search:
                 break
         # where unknowns are left open more lines settle nothing
         doubted = rule.doubts(found) and rule.determined(found)
+        if tried > 1:
+            found = dataclasses.replace(found, solution=self._anew(found.solution))
         return dataclasses.replace(self._finished(found), sure=not doubted)
 
     def _done(self, found: Found, rule: StopRule) -> bool:
@@ -202,6 +208,16 @@ class Search:
         self._best_log_cost = min(walked.cost, self._best_log_cost)
         return structure.value(walked.x)
 
+    def _anew(self, solution: Solution) -> Solution:
+        """A minimum that was met in doubles, with all the digits that its plant needs."""
+        self.objective.forget()
+        point = self.objective.point(solution.x)
+        if point is None:
+            return solution
+        if abs(point.cost - solution.cost) <= _DIGITS * solution.cost + self.objective.rounding:
+            return dataclasses.replace(solution, point=point)
+        return polish(self.objective, solution.x, limit=_LAST_LIMIT)
+
     def _finished(self, found: Found) -> Found:
         """The best minimum, run to its end where its start was cut short or ended roughly."""
         point = found.solution.point
@@ -212,3 +228,12 @@ class Search:
         if again.cost > found.solution.cost:
             return found
         return dataclasses.replace(found, solution=again)
+
+
+def _in_doubles(ends: Iterator[Visit]) -> Visit | None:
+    """The next end of a scattered start; None where there is none left.
+
+    Most of what these meet on their way is no plant that was ever built.
+    """
+    with in_doubles():
+        return next(ends, None)

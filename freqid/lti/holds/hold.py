@@ -20,6 +20,7 @@ import scipy
 
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, numbers, positive
 from freqid.lti.double_double import Doubled
+from freqid.lti.doubles import doubled_where_needed
 from freqid.lti.exponential import doubled_exponential, exponential
 from freqid.lti.holds.pulse import Pulse
 from freqid.lti.holds.units import Units, near_one
@@ -121,7 +122,7 @@ class PeriodicHold(Hold):
         units = Units.of(A, B, self.period)
         within = units.into(A, B)
         found = self._sampled(*within)
-        if units.hide(found.phi):
+        if doubled_where_needed() and units.hide(found.phi):
             found = self._sampled(*within, exact=True)
         return Sampled(*units.back(*found))
 
@@ -155,7 +156,7 @@ class PeriodicHold(Hold):
         lengths = near_one(h * np.abs(np.concatenate([dA, dB], axis=-1)).max(axis=(1, 2)))
         dA, dB = lengths[:, None, None] * dA, lengths[:, None, None] * dB
         value, change = self._differentiated(A, B, dA, dB)
-        if units.hide(value.phi):
+        if doubled_where_needed() and units.hide(value.phi):
             value, change = self._differentiated(A, B, dA, dB, exact=True)
         back = units.back(*(M / lengths[:, None, None] for M in change))
         return Sampled(*units.back(*value)), Sampled(*back)
@@ -213,8 +214,10 @@ class PeriodicHold(Hold):
 
 
 def _fast(step: FloatArray) -> bool:
-    """Whether motions are so fast within a period that doubles leave too little of slow ones."""
-    return float(np.linalg.norm(step, 1)) > _LARGE
+    """Whether motions are so fast within a period that doubles leave too little of slow ones, where
+    that is wanted better.
+    """
+    return doubled_where_needed() and float(np.linalg.norm(step, 1)) > _LARGE
 
 
 def _checked(A: FloatArray, B: FloatArray) -> tuple[FloatArray, FloatArray]:
