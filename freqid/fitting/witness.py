@@ -49,6 +49,10 @@ _DROWNED = 0.5
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
+_LACKS = (
+    "a better minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
+    "the right hold"
+)
 _NOTHING_LEFT = "the estimate leaves nothing but the rounding of the data"
 
 
@@ -127,6 +131,9 @@ class Testimony:
             )
         boxes = [_beside(structure, readings, grey, g) for g in _groups(structure, readings)]
         cost = sum(b.cost for b in boxes)
+        if cost <= 1e-18 * self.minimum.objective.energy:
+            sentence = f"a black box of order {order} leaves nothing but the rounding of the data"
+            return Witness("lacking", f"{sentence}: {_LACKS}", cost, np.inf, 0.0)
         free = len(self.minimum.x) - int(self.minimum.determined.loose.sum())
         top = sum(b.unknowns for b in boxes) - free
         bottom = sum(b.objective.n_rows - b.solution.point.n_initial - b.unknowns for b in boxes)
@@ -168,9 +175,7 @@ class Testimony:
     def _verdict(self, order: int, numbers: str, p: float, gap: float) -> tuple[Verdict, str]:
         if p < _LEVEL:
             return "lacking", (
-                f"a black box of order {order} explains the data better ({numbers}): a better "
-                "minimum was missed, or the model lacks something: a delay, a mode, a feedthrough, "
-                "the right hold"
+                f"a black box of order {order} explains the data better ({numbers}): {_LACKS}"
             )
         told = self.n_agreed >= _WANTED and p >= _RARE
         drowned = self.minimum.cost > _DROWNED * self.minimum.objective.energy

@@ -184,3 +184,17 @@ def test_noise_that_outweighs_the_signal_leaves_no_witness_to_rely_on(seed):
     lobes = [e for e in ends if least * (1 + 1e-3) < e.cost < least * (1 + 1e-2)]
     assert lobes
     assert all(e.witness.verdict != "complete" for e in lobes)
+
+
+def test_a_black_box_without_a_residual_speaks_against_a_model_that_leaves_one():
+    """Noise-free data of a plant with a way past it that the model lacks: a division by zero."""
+    plant = fq.GreyBox(
+        lambda J, c, k: ([[0, 1], [-k / J, -c / J]], [[0], [1 / J]], [[1, 0]], None),
+        [fq.Parameter("J", 2e-3), fq.Parameter("c", 0.02), fq.Parameter("k", 5.0)],
+    )
+    clean = fq.simulate(plant, fq.white_noise(4000, seed=0), 2e-3, hold="foh")
+    for past in (0.003, 0.01, 0.03):
+        est = fq.fit(plant, fq.Record(clean.u, clean.y + past * clean.u, 2e-3, hold="foh"))
+        assert est.witness.verdict == "lacking"
+        assert est.verdict.grade != "trust"
+        assert "lacking" in repr(est)

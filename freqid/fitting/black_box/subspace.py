@@ -38,16 +38,26 @@ def observed(
     experiments: Sequence[SpectralExperiment], order: int
 ) -> tuple[FloatArray, FloatArray]:
     """Φ̃ and C, which the outputs' span alone tells; ValueError where the lines are too few."""
-    p, m = experiments[0].n_channels
     columns = [_columns(e, i, experiments) for i, e in enumerate(experiments)]
     w = np.concatenate([c[0] for c in columns])
     Y = np.concatenate([c[1] for c in columns], axis=1)
     V = np.concatenate([c[2] for c in columns], axis=1)
+    return spanned(w, Y, V, order)
+
+
+def spanned(
+    w: ComplexArray, Y: ComplexArray, V: ComplexArray, order: int, rows: int = 2
+) -> tuple[FloatArray, FloatArray]:
+    """Φ̃ and C from points w (K,), outputs Y (p, K) and all that drives them, V (inputs, K), by
+    ``rows`` blocks of rows for each order and two more.
+    """
+    p = len(Y)
     # twice as many block rows as the order: enough to see it, few enough to stay conditioned
-    q = min(2 * order + 2, (2 * len(w)) // (p + len(V)) - 2)
+    q = min(rows * order + 2, (2 * len(w)) // (p + len(V)) - 2)
     if q * p <= order:
         raise InputError(
-            f"data hold {len(w)} lines; order {order} with {m} inputs needs more: widen the band"
+            f"data hold {len(w)} lines; order {order} with {len(V)} inputs, transients counted, "
+            "needs more: widen the band"
         )
     powers = w ** np.arange(q + 1)[:, None]
     Yq = (powers[:q, None] * Y).reshape(q * p, -1)
@@ -85,6 +95,13 @@ def inputs_of(
     experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
 ) -> StateSpace:
     """Γ and D (and the transients, which are dropped) by linear least squares."""
+    return inputs_and_cost(experiments, A, C, feedthrough)[0]
+
+
+def inputs_and_cost(
+    experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
+) -> tuple[StateSpace, float]:
+    """The same, and the sum of squares that they leave."""
     n, m, p = len(A), experiments[0].n_channels[1], len(C)
     rows, right = [], []
     for index, e in enumerate(experiments):
@@ -117,7 +134,8 @@ def inputs_of(
     D = np.zeros((p, m))
     if feedthrough:
         D = solution[n * m : n * m + p * m].reshape(m, p).T
-    return StateSpace(A, B, C, D)
+    left = R[:, -1] - R[:, :-1] @ solution
+    return StateSpace(A, B, C, D), float(left @ left)
 
 
 def _output_rows(A: FloatArray, C: FloatArray, w: ComplexArray) -> ComplexArray:

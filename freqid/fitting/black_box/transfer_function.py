@@ -10,12 +10,12 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
+from freqid.fitting.black_box.folded_subspace import identify
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.response_poles import folded, poles_of_responses, unheld
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.black_box.subspace import identify
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.nuisance import Delay
