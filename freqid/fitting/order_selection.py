@@ -44,14 +44,16 @@ def select_order(
 
     Columns: order, feedthrough, delay, parameters, cost, fit_percent, aic, mdl, cross_validation,
     converged and error, one row for each order. AIC = n ln(V/n) + 2k, MDL = n ln(V/n) + k ln n
-    with n real values and k parameters and initial states (Ljung, 1999, section 16.4);
-    cross-validation is the cost per real value on each quarter of the lines of the model and the
-    initial state fitted to the other three. ``feedthrough=None`` tries both; ``delays`` are whole
-    samples by which the inputs may come late. An order that cannot be fitted has its reason in
-    ``error``. ``attrs["best"]`` is the order with the least ``criterion``: ``"aic"``, ``"mdl"`` or
-    ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]`` go with it. ``n_jobs``
-    is a number of processes, None this one, as in ``bootstrap``; with ``progress`` the screen shows
-    how many orders are done. Other arguments as in ``fit``. Raises
+    with n real values and k parameters and initial states (Ljung, 1999, section 16.4), of responses
+    as many as have noise of their own: what leaks into ``etfe`` and ``h1``, and what a polynomial
+    misses, is no noise and asks for more orders than the plant has; take the record, or
+    ``local_rational``. Cross-validation is the cost per real value on each quarter of the lines of
+    the model and the initial state fitted to the other three. ``feedthrough=None`` tries both;
+    ``delays`` are whole samples by which the inputs may come late. An order that cannot be fitted
+    has its reason in ``error``. ``attrs["best"]`` is the order with the least ``criterion``:
+    ``"aic"``, ``"mdl"`` or ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]``
+    go with it. ``n_jobs`` is a number of processes, None this one, as in ``bootstrap``; with
+    ``progress`` the screen shows how many orders are done. Other arguments as in ``fit``. Raises
     ValueError for no orders, or one that is not a whole number, or where none can be fitted.
 
     >>> import freqid as fq
@@ -121,17 +123,27 @@ def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:
         return {**row, "error": str(error)}
     n, parameters = est.n_rows, len(est.values)
     k = parameters + est.minimum.solution.point.n_initial
-    misfit = n * np.log(max(est.cost, 1e-300) / n)
+    alone = n / _together(reading.data)
+    misfit = alone * np.log(max(est.cost, 1e-300) / n)
     return {
         **row,
         "parameters": parameters,
         "cost": est.cost,
         "fit_percent": est.fit_percent,
         "aic": misfit + 2 * k,
-        "mdl": misfit + k * np.log(n),
+        "mdl": misfit + k * np.log(alone),
         "cross_validation": held_out / n,
         "converged": est.converged,
     }
+
+
+def _together(data: object) -> float:
+    """How many lines stand for one whose noise is its own: Σρ² over neighbours that share a window,
+    of which the part that they share falls to nothing within its reach.
+    """
+    reach = data.reach if isinstance(data, FrequencyResponse) else 0
+    shared = 1 - np.arange(1, reach + 1) / (reach + 1)
+    return float(1 + 2 * (shared**2).sum())
 
 
 def _cross_validation(est: Estimate, reading: Reading) -> float:

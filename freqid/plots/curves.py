@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 UNITS = {"rad/s": 2 * np.pi, "Hz": 1.0}
 # so small a part of what stands beside it is nothing
 _ROUNDING = 1e-12
+# standard errors from which on a phase is no chance
+_SURE = 3.0
 # part of the input's largest power below which a line tells nothing
 _DRIVEN = 1e-6
 # points around each mode's circle
@@ -265,7 +267,7 @@ def heard(curve: BodeCurve, frf: FrequencyResponse, pair: tuple[int, int]) -> Bo
 def _next_to(
     beside: FrequencyResponse | None, frf: FrequencyResponse, pair: tuple[int, ...], scattered: bool
 ) -> FloatArray:
-    f, phase = frf.frequency, frf.phase[pair]
+    f, (phase, sure) = frf.frequency, _unwrapped(frf, pair)
     low, high = told_range(frf)
     away, both = phase, (f >= low) & (f <= high)
     if beside is not None:
@@ -273,5 +275,21 @@ def _next_to(
         both &= (f >= low) & (f <= high)
         if (np.array(pair) >= beside.response.shape[:2]).any() or not both.any():
             return phase
-        away = phase - np.interp(f, beside.frequency, beside.phase[pair])
-    return phase - 360 * np.round((away if scattered else np.median(away[both])) / 360)
+        away = phase - np.interp(f, beside.frequency, _unwrapped(beside, pair)[0])
+    told = both & sure if (both & sure).any() else both
+    return phase - 360 * np.round((away if scattered else np.median(away[told])) / 360)
+
+
+def _unwrapped(frf: FrequencyResponse, pair: tuple[int, ...]) -> tuple[FloatArray, BoolArray]:
+    """Phase in degrees, and where it is sure: turns are counted along points that stand out of
+    their noise, next to which the others are put.
+    """
+    phase, sure = frf.phase[pair], np.ones(len(frf.frequency), bool)
+    if frf.variance is None:
+        return phase, sure
+    sure = frf.magnitude[pair] > _SURE * np.sqrt(frf.variance[pair])
+    if sure.all() or not sure.any():
+        return phase, sure
+    along = np.unwrap(phase[sure], period=360)
+    between = np.interp(frf.frequency, frf.frequency[sure], along)
+    return phase + 360 * np.round((between - phase) / 360), sure

@@ -197,3 +197,16 @@ def test_a_fit_that_may_grow_explains_no_less_than_one_that_may_not():
     for order in range(2, 9):
         free, stable = (fq.fit(fq.OutputError(order, stable=s), record) for s in (False, True))
         assert free.cost <= stable.cost * (1 + 1e-3), order
+
+
+def test_lines_that_share_their_noise_are_counted_once():
+    """Of a local response every line was taken for a measurement of its own: order 6 or 7 of 7."""
+    b, a = np.array([-2.0, 40]), np.polymul([1, 5], [1, 2, 100.0])
+    plant = scipy.signal.cont2discrete(scipy.signal.tf2ss(b, a), 0.01)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal(4000)
+        y = scipy.signal.dlsim((*plant[:4], 0.01), u)[1][:, 0]
+        noisy = fq.Record(u, y + 0.05 * y.std() * rng.standard_normal(4000), 0.01)
+        table = fq.select_order(fq.local_rational(noisy), range(2, 8))
+        assert table.attrs["best"] == 3

@@ -3,6 +3,7 @@
 import control
 import numpy as np
 import pytest
+import scipy.signal
 
 import freqid as fq
 from freqid.plots.curves import Shown, bode_curve, response_of
@@ -43,3 +44,23 @@ def test_control_systems_without_matrices_have_a_response():
     assert response_of(two, OMEGA).response.shape == (1, 2, 50)
     # one sample a second: nothing is drawn beyond π rad/s
     assert response_of(control.tf([1], [1, 0.5], 1), OMEGA).omega[-1] <= np.pi
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_measured_curves_that_agree_are_drawn_side_by_side(seed):
+    """Turns were counted along noise: responses that agree within three degrees lay up to three
+    turns apart.
+    """
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal(6000)
+    y = scipy.signal.lfilter([0.1], [1, -0.9], u) + 0.1 * rng.standard_normal(6000)
+    record = fq.Record(u, y, 0.01)
+    axes = fq.bode(fq.h1(record, 400), fq.local_polynomial(record), unit="Hz")
+    middle = []
+    for line in axes[1].lines:
+        f, phase = line.get_xdata(), line.get_ydata()
+        if ((f > 0.5) & (f < 10)).any():
+            middle.append(np.median(phase[(f > 0.5) & (f < 10)]))
+            assert np.abs(phase[f < 10] + 45).max() < 180
+    assert len(middle) == 2
+    assert np.abs(np.array(middle) + 60).max() < 6
