@@ -55,7 +55,9 @@ def positive(name: str, value: object, unit: str = "") -> float:
 def finite(name: str, value: object) -> float:
     """Return ``value`` as a float; ValueError unless it is a finite real number."""
     try:
-        if isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value):
+        # numpy takes a duration for a whole number
+        other = isinstance(value, (bool, np.timedelta64))
+        if isinstance(value, Real) and not other and math.isfinite(value):
             return float(value)
     except OverflowError:
         raise InputError(f"{name} is beyond the numbers that a computer has, 1.8e308") from None

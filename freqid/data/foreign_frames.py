@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
 from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
@@ -36,7 +37,7 @@ def as_pandas(frame: object) -> Table:
     import pandas as pd
 
     if isinstance(frame, pd.DataFrame):
-        return Table(frame, {})
+        return Table(_with_dates(frame), {})
     # no library is imported for the question whether an object is one of its own
     home = type(frame).__module__.partition(".")[0]
     if home == "xarray":
@@ -100,3 +101,15 @@ def _of_data_set(found: object) -> Table:
     step = found.sampling_time  # type: ignore[attr-defined]
     dt = float(step) if isinstance(step, Real) else None
     return Table(pd.DataFrame(columns), {}, dt, [n for n in columns if n.startswith("u")])
+
+
+def _with_dates(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame with an index of Python's dates, or of periods, as one of dates."""
+    import pandas as pd
+
+    index = frame.index
+    if isinstance(index, pd.PeriodIndex):
+        return frame.set_axis(index.to_timestamp())
+    if index.dtype == object and len(index) and isinstance(index[0], datetime.datetime):
+        return frame.set_axis(pd.DatetimeIndex(index))
+    return frame

@@ -106,7 +106,7 @@ def _with_its_time(
             frame = frame.reset_index()
         elif _times(frame) is not None:
             return frame, []
-    elif (units or {}).get("time") is None and not _counts(frame):
+    elif (units or {}).get("time") is None and not _counts(frame) and not _is_text(frame):
         return frame, []
     plain = {str(c): named(str(c)) for c in frame.columns}
     own = time_named(list(plain))
@@ -124,6 +124,12 @@ def _with_its_time(
 
 def _is_time(name: object) -> bool:
     return str(name) != "time" and time_named([str(name)]) is not None
+
+
+def _is_text(frame: pd.DataFrame) -> bool:
+    """Whether the times are words."""
+    column = frame["time"]
+    return column.dtype.kind not in "fiubcmM" and isinstance(column.iloc[0], str)
 
 
 def _counts(frame: pd.DataFrame) -> bool:

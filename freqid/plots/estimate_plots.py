@@ -121,7 +121,7 @@ def plot_spectrogram(
     """Power of a channel over time and frequency, in dB; the first output where none is named.
 
     ``segment`` is the length of the pieces in samples, by default a fiftieth of the record. Raises
-    ValueError for an unknown channel.
+    ValueError for an unknown channel, or a segment that is longer than it.
     """
     import scipy.signal
 
@@ -134,6 +134,10 @@ def plot_spectrogram(
     else:
         x, dt = record.outputs[:, list(record.output_names).index(name)], record.dt
     length = max(len(x) // 50, 16) if segment is None else whole("segment", segment, least=2)
+    if length > len(x):
+        raise InputError(
+            f"segment={length} is longer than the {len(x)} samples of {name!r}; take a shorter one"
+        )
     f, t, power = scipy.signal.spectrogram(x, 1 / dt, nperseg=length, noverlap=length // 2)
     level = 10 * np.log10(np.maximum(power, power.max() * 1e-12))
     with drawing(ax) as ax:

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import freqid as fq
+from freqid.checks import InputError
 
 T = np.arange(40) * 5e-3
 U, Y = np.sin(T * 100), np.cos(T * 70)
@@ -86,3 +87,33 @@ def test_a_response_in_polars():
 def test_what_is_no_table_is_named(frame, says):
     with pytest.raises(ValueError, match=says):
         fq.Record.from_frame(frame)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        pytest.param(lambda t: {"time": t.strftime("%Y-%m-%d %H:%M:%S.%f").to_list()}, id="text"),
+        pytest.param(
+            lambda t: {"time": pd.array(t.strftime("%H:%M:%S.%f"), "string")}, id="string"
+        ),
+        pytest.param(lambda t: {"time": list(t.to_pydatetime())}, id="objects"),
+        pytest.param(lambda t: pd.Index(list(t.to_pydatetime()), dtype=object), id="index"),
+        pytest.param(lambda t: t.to_period("10ms"), id="periods"),
+    ],
+)
+def test_times_in_memory_are_looked_at_as_those_of_files(made):
+    stamps = pd.date_range("2024-01-01", periods=200, freq="10ms")
+    time = made(stamps)
+    columns = {"u": np.sin(np.arange(200.0)), "y": np.cos(np.arange(200.0))}
+    if isinstance(time, dict):
+        frame = pd.DataFrame({**time, **columns})
+    else:
+        frame = pd.DataFrame(columns, index=time)
+    record = fq.Record.from_frame(frame, "u", "y")
+    assert record.dt == pytest.approx(0.01, rel=1e-9)
+    np.testing.assert_array_equal(record.u, columns["u"])
+
+
+def test_a_duration_is_no_sample_time():
+    with pytest.raises(InputError, match="finite real number"):
+        fq.Record([0.0, 1.0], [0.0, 1.0], np.timedelta64(10, "ms"))

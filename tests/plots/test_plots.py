@@ -210,3 +210,9 @@ def test_tables_of_an_estimate_are_the_readers_own(plant, slow):
 def test_a_hold_that_outlasts_samples_is_refused_in_words(plant, slow):
     with pytest.raises(ValueError, match="outlasts"):
         fq.fit(plant, slow.with_hold(fq.ZeroOrderHold(2 * slow.dt)), band=(10, 80))
+
+
+def test_a_record_too_short_for_a_spectrogram_is_told():
+    short = fq.Record(np.arange(8.0) % 3, np.arange(8.0) % 2, 0.1)
+    with pytest.raises(ValueError, match="segment=16 is longer than the 8 samples"):
+        fq.plot_spectrogram(short)
