@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from freqid.checks import InputError, an, choice, flag, listed, processes, whole
+from freqid.checks import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    an,
+    choice,
+    flag,
+    listed,
+    processes,
+    whole,
+)
 from freqid.data import Bar, FrequencyResponse, Record, as_data_sets, channel_counts, in_turn
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
@@ -23,6 +33,8 @@ if TYPE_CHECKING:
 
 # every so-manyth line is held out in turn
 _FOLDS = 4
+# by so much less MDL a model that grows is no whim of noise
+_CERTAIN = 30.0
 
 
 @in_one_blas_thread
@@ -52,9 +64,11 @@ def select_order(
     ``delays`` are whole samples by which the inputs may come late. An order that cannot be fitted
     has its reason in ``error``. ``attrs["best"]`` is the order with the least ``criterion``:
     ``"aic"``, ``"mdl"`` or ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]``
-    go with it. ``n_jobs`` is a number of processes, None this one, as in ``bootstrap``; with
-    ``progress`` the screen shows how many orders are done. Other arguments as in ``fit``. Raises
-    ValueError for no orders, or one that is not a whole number, or where none can be fitted.
+    go with it. Models whose motions certainly grow are not chosen where others explain the data
+    about as well; ``attrs["growing"]`` are their rows. ``n_jobs`` is a number of processes, None
+    this one, as in ``bootstrap``; with ``progress`` the screen shows how many orders are done.
+    Other arguments as in ``fit``. Raises ValueError for no orders, or one that is not a whole
+    number, or where none can be fitted.
 
     >>> import freqid as fq
     >>> record = fq.simulate(fq.first_order(), fq.chirp(2, 40, 2, 1e-3), 1e-3).with_noise(0.01)
@@ -90,11 +104,25 @@ def select_order(
     scores = table[criterion].to_numpy()
     if np.isnan(scores).all():
         raise InputError(f"no order can be fitted: {table['error'].iloc[0]}")
-    best = table.iloc[int(np.nanargmin(scores))]
+    growing = table.pop("growing").to_numpy(dtype=bool)
+    best = table.iloc[_chosen(scores, table["mdl"].to_numpy(), growing)]
     table.attrs["best"] = int(best["order"])
     table.attrs["feedthrough"], table.attrs["delay"] = bool(best["feedthrough"]), int(best["delay"])
     table.attrs["criterion"] = criterion
+    table.attrs["growing"] = np.flatnonzero(growing).tolist()
     return table
+
+
+def _chosen(scores: FloatArray, mdl: FloatArray, growing: BoolArray) -> int:
+    """The row with the least score; one that grows where nothing else comes near it, as noise draws
+    poles far out of the circle, where they stand for a delay that is too long.
+    """
+    best = int(np.nanargmin(scores))
+    tame = np.where(growing, np.nan, scores)
+    if not growing[best] or np.isnan(tame).all():
+        return best
+    other = int(np.nanargmin(tame))
+    return other if mdl[other] - mdl[best] < _CERTAIN else best
 
 
 @in_one_blas_thread
@@ -114,7 +142,7 @@ def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:
     row: dict[str, object] = {
         "order": spec.order, "feedthrough": spec.feedthrough, "delay": delay, "parameters": 0,
         "cost": np.nan, "fit_percent": np.nan, "aic": np.nan, "mdl": np.nan,
-        "cross_validation": np.nan, "converged": False, "error": "",
+        "cross_validation": np.nan, "converged": False, "error": "", "growing": False,
     }  # fmt: skip
     try:
         est = fit_output_error(spec, [reading])
@@ -134,6 +162,7 @@ def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:
         "mdl": misfit + k * np.log(alone),
         "cross_validation": held_out / n,
         "converged": est.converged,
+        "growing": any(w.kind == "unstable" and w.severity == "serious" for w in est.signs),
     }
 
 

@@ -210,3 +210,31 @@ def test_lines_that_share_their_noise_are_counted_once():
         noisy = fq.Record(u, y + 0.05 * y.std() * rng.standard_normal(4000), 0.01)
         table = fq.select_order(fq.local_rational(noisy), range(2, 8))
         assert table.attrs["best"] == 3
+
+
+def test_a_delay_one_too_long_is_not_chosen_for_a_pole_that_grows():
+    """b/(s + a) 4.3 samples late: behind five samples order 2 has a pole at −340, an advance."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal(3000)
+        late = np.r_[np.zeros(43), np.repeat(u, 10)][: 10 * len(u)]
+        one = np.ones((1, 1))
+        fine = scipy.signal.cont2discrete((-100 * one, 100 * one, one, 0 * one), 1e-4)
+        y = scipy.signal.dlsim((*fine[:4], 1e-4), late)[1][::10, 0]
+        record = fq.Record(u, y + 0.02 * rng.standard_normal(len(u)), 1e-3)
+        found = fq.select_order(record, [1, 2], delays=range(7)).attrs
+        assert (found["best"], found["delay"]) == (2, 4)
+
+
+def test_a_plant_that_does_grow_is_chosen_all_the_same():
+    """y⁺ = 1.01 y + u, kept small by u = r − 0.2 y."""
+    rng = np.random.default_rng(0)
+    r, e = rng.standard_normal((2, 1500))
+    u, y = np.zeros(1500), np.zeros(1500)
+    for k in range(1499):
+        u[k] = r[k] - 0.2 * y[k]
+        y[k + 1] = 1.01 * y[k] + u[k]
+    record = fq.Record(u, y + 0.01 * e, 1e-2)
+    table = fq.select_order(record, [1, 2])
+    assert table.attrs["best"] == 1
+    assert 0 in table.attrs["growing"]
