@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -29,6 +28,7 @@ from freqid.fitting.questioned import Questioned
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.shown import Shown
 from freqid.fitting.tied import with_tied
+from freqid.fitting.uncertainty.coefficient_variance import with_coefficient_variance
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.profiles import profile_intervals
@@ -221,9 +221,8 @@ class Estimate(Questioned, Shown):
             omega = np.geomspace(1e-3, 1, 200) * np.pi / self.dt
         frf: FrequencyResponse = self.model.frequency_response(omega, hold)
         if self.problem is None and not isinstance(self.model, GreyBox):
-            return frf
-        variance = response_variance(*self._unknowns, frf.omega, hold)
-        return dataclasses.replace(frf, variance=variance)
+            return with_coefficient_variance(frf, self.model, self.covariance_matrix, hold)
+        return replace(frf, variance=response_variance(*self._unknowns, frf.omega, hold))
 
     def derived(self, function: Callable[[GreyBox], ArrayLike]) -> tuple[FloatArray, FloatArray]:
         """Value and standard error of ``function(model)``, a number or an array, to first order.

@@ -161,3 +161,36 @@ def test_intervals_inside_bounds_are_kept(tmp_path):
     pd.testing.assert_frame_equal(kept, est.parameters)
     kept.loc["fm", "value"] = 1.0
     assert fq.load(tmp_path / "a.json").parameters.loc["fm", "value"] != 1.0
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        fq.OutputError(1),
+        fq.OutputError(2, feedthrough=True),
+        fq.TransferFunction(0, 1),
+        fq.TransferFunction(0, 1, delay="estimate"),
+    ],
+)
+def test_a_loaded_black_box_has_its_band(spec, tmp_path):
+    """J Σ Jᴴ by its coefficients is what the chart of the fit had said."""
+    record = fq.simulate(fq.first_order(), fq.white_noise(3000, seed=1), 2e-3).with_noise(0.05)
+    est = fq.fit(spec, record)
+    est.save(tmp_path / "box.json")
+    omega = np.geomspace(1, 300, 20)
+    kept = fq.load(tmp_path / "box.json").frequency_response(omega).variance
+    np.testing.assert_allclose(kept, est.frequency_response(omega).variance, rtol=1e-4)
+
+
+def test_the_band_of_a_loaded_black_box_of_several_channels(tmp_path):
+    rng = np.random.default_rng(0)
+    u = rng.standard_normal((3000, 2))
+    y = np.zeros((3000, 2))
+    for k in range(2, 3000):
+        y[k] = 0.9 * y[k - 1] - 0.5 * y[k - 2] + u[k - 1] @ [[0.5, 0.1], [0.2, 0.4]]
+    record = fq.Record(u, y + 0.1 * rng.standard_normal(y.shape), 1e-2)
+    est = fq.fit(fq.OutputError(2), record)
+    est.save(tmp_path / "box.json")
+    omega = np.geomspace(1, 300, 20)
+    kept = fq.load(tmp_path / "box.json").frequency_response(omega).variance
+    np.testing.assert_allclose(kept, est.frequency_response(omega).variance, rtol=1e-4)
