@@ -23,6 +23,8 @@ from freqid.models import GreyBox
 
 # responses, and costs, that agree to this are equal but for rounding
 _EQUAL, _COST = 1e-8, 1e-9
+# nepers by which another answer has to be nearer to the start to be worth a look
+_NEARER = 0.05
 # a start that is nearer to one answer by a factor of two, over all parameters, tells which is meant
 _TOLD = float(np.log(2))
 # standard errors by which values differ
@@ -38,7 +40,7 @@ def nearest_to_start(
     for exchange in _exchanges(structure):
         x = solution.x
         other = _exchanged(structure, x, exchange)
-        if other is None or _distance(structure, other) >= _distance(structure, x) * (1 - 1e-9):
+        if other is None or _distance(structure, other) > _distance(structure, x) - _NEARER:
             continue
         if _alike(structure, x, other):
             point = objective.point(other)
