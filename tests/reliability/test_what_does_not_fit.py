@@ -120,7 +120,7 @@ REFUSALS = {
     ),
     "times that are texts": (
         lambda: fq.Record.from_frame(FRAME.assign(time="x"), "u", "y"),
-        "values that are not numbers of seconds",
+        "holds 'x', which is neither a number nor a time",
     ),
     "two rows on a grid": (
         lambda: fq.Record.from_frame(FRAME[:2], "u", "y", resample=True),
