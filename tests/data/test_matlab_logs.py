@@ -123,6 +123,9 @@ def test_objects_are_named_and_what_is_beside_them_is_read(tmp_path):
     record = fq.read(beside)
     np.testing.assert_array_equal(record.u, U)
     assert any("log (timetable)" in note for note in record.notes)
+    # several, which older scipy calls by one name
+    beside.write_bytes(content + object_of(b"one", b"timetable") + object_of(b"log", b"timetable"))
+    assert any("log (timetable)" in note for note in fq.read(beside).notes)
 
 
 def test_groups_of_hdf5_that_share_their_time_are_read_together(tmp_path):

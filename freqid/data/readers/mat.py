@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,8 +66,12 @@ def _objects(content: Fields) -> dict[str, str]:
         if isinstance(value, MatlabObject):
             found[name] = f"{name} ({value.classname})"
         elif isinstance(value, MatlabOpaque) and not name.startswith("__"):
-            # its name and its class stand within
-            own, _, kind = (_text(np.ravel(value)[0][part]) for part in ("s0", "s1", "s2"))
+            entry, parts = np.ravel(value)[0], value.dtype.names or ()
+            # its class stands within, and before scipy 1.18 its name as well
+            own = _text(entry["s0"]) if "s0" in parts else name
+            kind = next(
+                (_text(entry[part]) for part in ("_Class", "s2") if part in parts), "object"
+            )
             found[name] = f"{own} ({kind})"
     return found
 
@@ -84,7 +89,10 @@ def loaded(path: Path) -> Fields:
 
     check_structure(path)
     try:
-        return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True)
+        with warnings.catch_warnings():
+            # before scipy 1.18 all objects have one name
+            warnings.filterwarnings("ignore", 'Duplicate variable name "None"')
+            return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True)
     except NotImplementedError:
         raise
     except Exception as error:
