@@ -165,7 +165,8 @@ def off(est, unit=None):
 
 
 def main(folder, count=12):
-    runs = read(postures=POSTURES[:: len(POSTURES) // count])
+    chosen = np.linspace(0, len(POSTURES) - 1, count).round().astype(int)
+    runs = read(postures=[POSTURES[i] for i in chosen])
     frfs = responses(runs)
     est = fq.fit(robot(), frfs, start=start())
     table = est.parameters[["value", "std", "unit"]].assign(true=pd.Series(TRUE))

@@ -20,7 +20,6 @@ from numpy.typing import ArrayLike
 from freqid.checks import Array, ComplexArray, FloatArray, InputError, an, flag, positive, samples
 from freqid.data import FrequencyResponse, fold, low_pass_gain, merged_lines, unfold
 from freqid.excitation import InputSpectrum, power_gain
-from freqid.fitting import GreyStructure
 from freqid.lti import (
     Hold,
     PeriodicHold,
@@ -31,7 +30,7 @@ from freqid.lti import (
     sampled_response,
     transfer,
 )
-from freqid.models import GreyBox, Model, ModelLike, as_model
+from freqid.models import Model, ModelLike, as_model
 
 
 @dataclass(frozen=True)
@@ -115,10 +114,9 @@ def held_response(given: ModelLike, hold: Hold) -> Held:
     Raises ValueError for what is no plant in continuous time.
     """
     model = true_plant(given)
-    if isinstance(model, GreyBox) and model.delay_sources:
-        late = GreyStructure(model)
-        realisation = late.realise(late.start)
-        return lambda f: sampled_response(realisation, 2 * np.pi * f, hold)[0]
+    if model.late:
+        still = model.still()
+        return lambda f: sampled_response(still, 2 * np.pi * f, hold)[0]
     plant = basis_of(model.state_space()).through(hold)
     return lambda f: transfer(plant, points(2 * np.pi * f, hold))
 

@@ -129,7 +129,7 @@ def _is_time(name: object) -> bool:
 def _is_text(frame: pd.DataFrame) -> bool:
     """Whether the times are words."""
     column = frame["time"]
-    return column.dtype.kind not in "fiubcmM" and isinstance(column.iloc[0], str)
+    return column.dtype.kind not in "fiubcmM" and isinstance(next(iter(column), None), str)
 
 
 def _counts(frame: pd.DataFrame) -> bool:

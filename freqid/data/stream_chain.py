@@ -8,7 +8,7 @@ from glob import glob
 from itertools import pairwise
 from pathlib import Path
 
-from freqid.checks import Array, InputError
+from freqid.checks import Array, InputError, unknown
 from freqid.data.stream_found import Found, Source, seconds_between
 
 # part of a sample time that a file may begin too early or too late
@@ -47,8 +47,11 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None) -> Found:
     first = each[0]
     if len(each) == 1:
         return first
-    names = first.names if wanted is None else list(wanted)
-    for other in each:
+    names = first.names if wanted is None else list(dict.fromkeys(wanted))
+    for name in names:
+        if name not in first.names:
+            raise InputError(f"{first.origin}: {unknown('channel', name, first.names)}")
+    for other in each[1:]:
         _check_channels(other, names, first)
     for before, after in pairwise(each):
         _check_follows(before, after)

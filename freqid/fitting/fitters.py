@@ -21,7 +21,7 @@ class SearchOptions:
 
     ``estimated_hold`` makes the period of a zero-order hold one more unknown, ``separate`` those
     parameters that each experiment has for itself. A ``refit`` begins
-    next to its minimum: it walks there on the cost itself.
+    next to its minimum: it walks there on the cost itself, and ``meant`` is where the user began.
     """
 
     n_starts: int | None = None
@@ -30,6 +30,7 @@ class SearchOptions:
     estimated_hold: bool = False
     separate: Sequence[str] = ()
     refit: bool = False
+    meant: Mapping[str, float] | None = None
 
 
 Fitter = Callable[[Any, Sequence[Reading], SearchOptions], Estimate]

@@ -50,6 +50,7 @@ def fit_grey_box(
         structure = GreyStructure(model, checked_start(model, options.start), hold)
     if not structure.physical_names:
         raise InputError("model has no free parameter; free one with model.free(name)")
+    structure.meant |= options.meant or {}
     _possible_delays(structure, readings)
     experiments = read_for((model.n_outputs, model.n_inputs), readings)
     enough_rows(experiments, len(structure.names))

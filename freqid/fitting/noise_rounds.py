@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import FrequencyResponse
+from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.met import met_by
@@ -66,7 +67,9 @@ def again(est: Estimate, options: SearchOptions) -> SearchOptions:
     # values of all experiments, and those that each has for itself
     near = {n: est[n] for n in getattr(est.model, "values", {})}
     near |= {n: est[n] for n in est.names if "[" in n} if near else {}
-    return dataclasses.replace(options, n_starts=1, start=near or None, refit=True)
+    structure = None if est.problem is None else est.problem.structure
+    meant = structure.meant if isinstance(structure, GreyStructure) else None
+    return dataclasses.replace(options, n_starts=1, start=near or None, refit=True, meant=meant)
 
 
 def relative_to_model(est: Estimate, reading: Reading) -> Reading:

@@ -56,6 +56,9 @@ def exchangeable(minimum: Minimum | None) -> list[Finding]:
     structure = None if minimum is None else minimum.structure
     if minimum is None or not isinstance(structure, GreyStructure) or structure.unknown:
         return []
+    if not structure.names:
+        # the unknowns of a black box mean nothing
+        return []
     x, found = minimum.x, []
     near = _distance(structure, x)
     std = np.sqrt(np.diag(Spread(np.ones(len(x)), minimum).covariance))
@@ -124,9 +127,9 @@ def _exchanged(structure: GreyStructure, x: FloatArray, exchange: Exchange) -> F
 
 def _distance(structure: GreyStructure, x: FloatArray) -> float:
     """How far the parameters are from the start, in nepers; signs apart are farther than any."""
-    start, count = structure.start[: structure.count], structure.count
+    start = np.array([structure.meant[name] for name in structure.physical_names])
     with np.errstate(all="ignore"):
-        ratio = x[:count] / start
+        ratio = (x * structure.scale)[: structure.count] / start
         nepers = np.where(ratio > 0, np.abs(np.log(np.abs(ratio))), 1e3)
     return float(np.nansum(np.where(start == 0, 0.0, nepers)))
 

@@ -68,3 +68,28 @@ def test_what_is_explained_to_rounding_is_settled_behind_a_delay_as_well():
     est = fq.fit(plant(), record, start={"Td": 3.2e-3, "a": 80.0})
     assert est.witness.verdict == "complete"
     assert est.verdict.grade == "trust"
+
+
+def test_a_delay_that_a_black_box_has_found_is_the_plants():
+    """A ContinuousModel knows its delay as well, which went the same way."""
+    record = fq.simulate(plant(), fq.white_noise(3000, seed=1), DT)
+    found = fq.fit(fq.TransferFunction(0, 1, delay="estimate"), record).model
+    seen = fq.apparent_response(found, fq.WhiteSpectrum(), DT)
+    exact = fq.apparent_response(plant(), fq.WhiteSpectrum(), DT)
+    np.testing.assert_allclose(seen.response, exact.response, atol=1e-9)
+
+
+def test_integrators_and_known_delays():
+    """b/(s (s + a)), 4 ms late by a number, and band-limited by a parameter."""
+    parameters = [fq.Parameter("b", 100.0), fq.Parameter("a", 100.0)]
+    integrating = fq.GreyBox(
+        lambda b, a: ([[0, 1], [0, -a]], [[0], [b]], [[1.0, 0]], None), parameters, input_delay=4e-3
+    )
+    est = fq.asymptotic_fit(
+        integrating, fq.ChirpSpectrum(1, 100), DT, "zoh", start={"a": 70.0, "b": 140.0}
+    )
+    assert est.values == pytest.approx([100, 100], rel=1e-6)
+    between = fq.BandLimited()
+    seen = fq.apparent_response(plant(), fq.WhiteSpectrum(), DT, between, base_dt=DT)
+    s = 1j * seen.omega
+    np.testing.assert_allclose(seen.response[0, 0], 100 / (s + 100) * np.exp(-4e-3 * s), atol=1e-12)

@@ -117,3 +117,9 @@ def test_times_in_memory_are_looked_at_as_those_of_files(made):
 def test_a_duration_is_no_sample_time():
     with pytest.raises(InputError, match="finite real number"):
         fq.Record([0.0, 1.0], [0.0, 1.0], np.timedelta64(10, "ms"))
+
+
+def test_an_empty_frame_is_told():
+    empty = pd.DataFrame({"time": np.array([], object), "u": [], "y": []})
+    with pytest.raises(InputError, match="0 rows"):
+        fq.Record.from_frame(empty, "u", "y")

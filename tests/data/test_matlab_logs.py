@@ -142,3 +142,12 @@ def test_groups_of_hdf5_that_share_their_time_are_read_together(tmp_path):
         file["y/time"][...] = 2 * T
     with pytest.raises(InputError, match="several groups of the same names"):
         fq.read(path)
+
+
+def test_one_structure_keeps_the_names_of_its_fields(tmp_path):
+    """Only samples that several series call alike are told apart by their structures."""
+    path = saved(tmp_path / "a.mat", run={"time": T, "values": np.c_[U, Y]})
+    record = fq.read(path, "values1", "values2")
+    np.testing.assert_array_equal(record.y, Y)
+    path = saved(tmp_path / "b.mat", run={"Time": T, "u": U, "y": Y})
+    np.testing.assert_array_equal(fq.read(path, "u", "y", time="Time").u, U)

@@ -68,8 +68,10 @@ def test_a_list_is_read_in_its_order_and_channels_are_found_by_name(tmp_path, re
     assert "2 files from" in stream.origin
     with pytest.raises(InputError, match=r"seconds|missing|twice"):
         fq.open(files[::-1], "u", "y")
-    with pytest.raises(InputError, match=r"b\.parquet has no channel 'other'"):
+    with pytest.raises(InputError, match=r"b\.parquet: channel='other' is not one of"):
         fq.open(files, "other", "y")
+    with pytest.raises(InputError, match=r"b\.parquet has no channel 'other', as .*a\.parquet has"):
+        fq.open(files[::-1], "other", "y", dt=DT)
 
 
 def test_what_does_not_follow_is_told(tmp_path, record):

@@ -95,3 +95,15 @@ def test_the_order_is_chosen():
     num, den = PLANTS["resonance"]
     data, _ = record(num, den, np.random.default_rng(0).standard_normal(N), 5, 0.01, 1)
     assert fq.select_order(data, range(1, 6)).attrs["best"] == 2
+
+
+@pytest.mark.parametrize("factor", [2, 5])
+def test_several_records(factor):
+    num, den = PLANTS["order 3, zero on the right"]
+    made = [
+        record(num, den, np.random.default_rng(seed).standard_normal(N), factor, 0.01, seed + 5)
+        for seed in range(3)
+    ]
+    est = fq.fit(fq.OutputError(3), [data for data, _ in made])
+    assert est.cost < 1.2 * sum(left for _, left in made)
+    assert est.verdict.grade == "trust"

@@ -11,7 +11,14 @@ import numpy as np
 from freqid.checks import InputError
 from freqid.data.readers.columns import columns_of
 from freqid.data.readers.kinds import READERS, damaged, of_one_group, reads
-from freqid.data.readers.mat_forms import Fields, Group, group_of, inner_groups, structure_of
+from freqid.data.readers.mat_forms import (
+    Fields,
+    Group,
+    group_of,
+    inner_groups,
+    structure_of,
+    told_apart,
+)
 from freqid.data.readers.mat_structure import check_structure
 
 if TYPE_CHECKING:
@@ -43,6 +50,7 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
     if not any(each.has_samples for each in found.values()):
         # what lies deeper tells something only where nothing does above
         found = {name: each for name, each in inner.items() if each.has_samples} or found
+    found = told_apart(found)
     told = ", ".join(sorted(objects.values()))
     if objects and not any(each.has_samples for each in found.values()):
         raise InputError(

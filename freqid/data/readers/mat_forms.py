@@ -6,7 +6,7 @@ dSPACE ControlDesk, recordings as MAT files (X and Y, each with Name, Data and U
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -23,15 +23,18 @@ _SAMPLES = ("data", "values", "value")
 
 @dataclass(eq=False)
 class Group:
-    """Arrays of one structure by name, and their units."""
+    """Arrays of one structure by name, and their units; of a series in time the name of its
+    ``samples``.
+    """
 
     arrays: dict[str, Any] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    samples: str | None = None
 
     @property
     def has_samples(self) -> bool:
         """Whether any of the arrays may be a channel."""
-        return any(np.size(x) > 1 and _is_numeric(x) for x in self.arrays.values())
+        return bool(_long(self.arrays))
 
 
 def structure_of(value: object) -> Fields | None:
@@ -49,13 +52,29 @@ def group_of(name: str, fields: Fields) -> Group:
         return _simulink(name, fields)
     if _entries(fields.get("Y"), "Data") and _entries(fields.get("X"), "Data"):
         return _dspace(name, fields)
-    arrays = dict(fields)
-    long = [n for n, x in arrays.items() if np.size(x) > 1 and _is_numeric(x)]
-    others = [n for n in long if n.lower() != "time"]
-    if len(others) == 1 < len(long) and others[0].lower() in _SAMPLES:
-        # a series has the name of the structure, its samples that of every series
-        arrays = {name.rpartition("/")[2] if n == others[0] else n: arrays[n] for n in long}
-    return Group({n.lower() if n.lower() == "time" else n: x for n, x in arrays.items()})
+    others = [n for n in _long(fields) if n.lower() != "time"]
+    alone = len(others) == 1 < len(_long(fields)) and others[0].lower() in _SAMPLES
+    return Group(dict(fields), samples=others[0] if alone else None)
+
+
+def told_apart(groups: Mapping[str, Group]) -> dict[str, Group]:
+    """Several series in time, whose samples are all called alike, by the names of their structures;
+    other groups, and one series, as they are.
+    """
+    series = [name for name, group in groups.items() if group.samples]
+    if len(series) < 2:
+        return dict(groups)
+    found = dict(groups)
+    for name in series:
+        own, arrays = groups[name].samples, groups[name].arrays
+        leaf = name.rpartition("/")[2]
+        found[name] = Group({leaf if n == own else n: arrays[n] for n in _long(arrays)})
+    return found
+
+
+def _long(arrays: Mapping[str, object]) -> list[str]:
+    """Names of what may be a channel."""
+    return [n for n, x in arrays.items() if np.asarray(x).size > 1 and _is_numeric(x)]
 
 
 def inner_groups(name: str, fields: Fields) -> Iterator[tuple[str, Group]]:

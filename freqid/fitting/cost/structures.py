@@ -43,7 +43,8 @@ class GreyStructure:
 
     ``known`` nuisances stay at their start. ``start`` gives values to begin from; one next to zero
     keeps the size of the model's own. The unknowns of an ``anonymous`` one mean nothing to a user.
-    ``parameters`` are those that a fit moves, those of the model where not given.
+    ``parameters`` are those that a fit moves, those of the model where not given. ``meant`` are the
+    values that a user began from, which a refit does not.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class GreyStructure:
         self.count = len(self.parameters)
         begin = {} if start is None else start
         values = [float(begin.get(p.name, p.value)) for p in self.parameters]
+        self.meant = dict(zip(self.physical_names, values, strict=True))
         sizes = zip(values, self.parameters, strict=True)
         scale = [max(abs(v), 1e-3 * abs(p.value)) or 1.0 for v, p in sizes]
         everything: list[Parameter | Nuisance] = [*self.parameters, *self.unknown]
