@@ -42,6 +42,7 @@ from freqid.lti import (
 from freqid.models import GreyBox, Model, ModelLike
 
 # times that the nodes are chosen anew for the estimate that they led to
+_EDGE = "edge of a bound"
 _ROUNDS = 6
 # starts of n_starts="auto"
 _STARTS = 49
@@ -181,12 +182,13 @@ def grey_asymptote(
     structure = cast(GreyStructure, minimum.structure)
     values = x * structure.scale
     # what is left of the cost is no noise: no parameter is unphysical by chance
-    kept = [w for w in est.signs if w.kind not in ("not physical", "edge of a bound")]
+    kept = [w for w in est.signs if w.kind not in ("not physical", _EDGE)]
     certain = Evidence(plain.parameters, values[: plain.count], np.zeros(plain.count))
     settled_there = dataclasses.replace(
         est,
         values=values,
-        signs=kept + findings(certain),
+        # where nothing is left nothing pushes against a bound
+        signs=kept + [w for w in findings(certain) if not (minimum.exact and w.kind == _EDGE)],
         model=structure.at(x),
         problem=minimum,
         uncertainty=Spread(structure.scale, minimum),

@@ -59,11 +59,23 @@ class _Arrays:
             here |= {n: float(np.ravel(np.asarray(v))[0]) for n, v in told.items()}
 
     def _clock(self, wanted: Sequence[str], times: Sequence[str], count: int) -> Clock | None:
-        """A time of as many samples, one beside the arrays if there is; None where none is."""
-        if not times:
-            return None
-        beside = [n for n in times if _folder(n) == _folder(wanted[0])]
-        time = (beside or times)[0]
+        """A time of as many samples, one beside the arrays if there is; None where none is.
+
+        Raises ValueError for arrays beside times that differ.
+        """
+        own = {_folder(n): n for n in reversed(times)}
+        beside = [own[f] for f in dict.fromkeys(map(_folder, wanted)) if f in own] or times[:1]
+        clocks = [self._read_clock(name, count) for name in beside]
+        for name, other in zip(beside[1:], clocks[1:], strict=True):
+            first = clocks[0]
+            if (other.step, other.first, other.last) != (first.step, first.first, first.last):
+                raise InputError(
+                    f"{self.path}: {name!r} tells other times than {beside[0]!r}; take one group, "
+                    "or give dt in s where the arrays go in step"
+                )
+        return clocks[0] if clocks else None
+
+    def _read_clock(self, time: str, count: int) -> Clock:
         at = places(count)
         with self.opened() as file:
             stored = file[time]

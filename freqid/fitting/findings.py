@@ -174,7 +174,8 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
     """A parameter at a bound of its search."""
     for p, value, error in zip(e.parameters, e.values, e.std, strict=True):
         for bound in (p.lower, p.upper):
-            size = max(abs(bound), abs(value), error if np.isfinite(error) else 0.0)
+            known = error if np.isfinite(error) else 0.0
+            size = max(abs(bound), abs(value), abs(p.value), known)
             if np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * size:
                 sentence = (
                     f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"

@@ -93,3 +93,23 @@ def test_integrators_and_known_delays():
     seen = fq.apparent_response(plant(), fq.WhiteSpectrum(), DT, between, base_dt=DT)
     s = 1j * seen.omega
     np.testing.assert_allclose(seen.response[0, 0], 100 / (s + 100) * np.exp(-4e-3 * s), atol=1e-12)
+
+
+def test_a_delay_that_ends_at_nothing_is_at_its_bound():
+    """Two late inputs under a slow hold: without noise no error bar gives what is left a scale."""
+    parameters = [
+        fq.Parameter(n, v)
+        for n, v in (("b1", 50.0), ("b2", 30.0), ("a", 20.0), ("T1", 3.7e-3), ("T2", 1.2e-3))
+    ]
+    two = fq.GreyBox(
+        lambda b1, b2, a: ([[-a]], [[b1, b2]], [[1.0]], None), parameters, input_delay=["T1", "T2"]
+    )
+    est = fq.asymptotic_fit(two, fq.ChirpSpectrum(1, 40), 5 * DT, "zoh", fq.ZeroOrderHold(DT))
+    assert est["T2"] == pytest.approx(0, abs=1e-9)
+    assert "edge of a bound" in [w.kind for w in est.warnings]
+
+
+def test_a_delay_of_nothing_is_no_bound_that_the_data_push_against():
+    est = fq.asymptotic_fit(plant(0.0), fq.ChirpSpectrum(1, 100), DT, "zoh", start={"a": 80.0})
+    assert est["Td"] == pytest.approx(0, abs=1e-9)
+    assert not est.warnings

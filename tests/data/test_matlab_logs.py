@@ -52,6 +52,11 @@ def saved(path, **variables):
                       "y": {"Time": T, "Data": Y, "Name": "out"}}, id="series"),
         pytest.param({"log": {"u": {"Time": T, "Data": U}, "y": {"Time": T, "Data": Y}}},
                      id="series in a structure"),
+        pytest.param(
+            {"tout": T, "log": {"u": {"Time": T, "Data": U}, "y": {"Time": T, "Data": Y}}},
+            id="series in a structure beside a time"),
+        pytest.param({"log": {"tout": T, "u": block(U), "y": block(Y)}}, id="blocks within one"),
+        pytest.param({"tout": T, "a": {"b": {"u": block(U), "y": block(Y)}}}, id="deeper"),
         pytest.param({"day": {"in": {"time": T, "u": U}, "out": {"y": Y}}}, id="nested"),
     ],
 )  # fmt: skip
@@ -137,11 +142,16 @@ def test_groups_of_hdf5_that_share_their_time_are_read_together(tmp_path):
             file[f"{name}/{name}"].attrs["units"] = "Nm"
     record = fq.read(path)
     np.testing.assert_array_equal(record.y, Y)
+    np.testing.assert_array_equal(fq.open(path, "u", "y").load().y, Y)
     assert record.units == {"u": "Nm", "y": "Nm"}
     with h5py.File(path, "a") as file:
         file["y/time"][...] = 2 * T
     with pytest.raises(InputError, match="several groups of the same names"):
         fq.read(path)
+    # a stream took the first for both
+    with pytest.raises(InputError, match="'y/time' tells other times than 'u/time'"):
+        fq.open(path, "u", "y")
+    assert fq.open(path, "u", "y", dt=1e-3).n_samples == N
 
 
 def test_one_structure_keeps_the_names_of_its_fields(tmp_path):

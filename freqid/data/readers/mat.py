@@ -18,6 +18,7 @@ from freqid.data.readers.mat_forms import (
     inner_groups,
     structure_of,
     told_apart,
+    with_one_time,
 )
 from freqid.data.readers.mat_structure import check_structure
 
@@ -47,9 +48,9 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
             inner |= inner_groups(name, fields)
         else:
             found.setdefault("", Group()).arrays[name] = value
-    if not any(each.has_samples for each in found.values()):
-        # what lies deeper tells something only where nothing does above
-        found = {name: each for name, each in inner.items() if each.has_samples} or found
+    if not any(each.has_channels for each in found.values()):
+        # what lies deeper tells something only where nothing but a time does above
+        found = {n: g.samples_alone() for n, g in (found | inner).items() if g.has_samples} or found
     found = told_apart(found)
     told = ", ".join(sorted(objects.values()))
     if objects and not any(each.has_samples for each in found.values()):
@@ -57,7 +58,8 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
             f"holds objects that MATLAB alone opens ({told}); save their numbers there, as in "
             "t = x.Time; y = x.Data"
         )
-    frame = columns_of(of_one_group({n: g.arrays for n, g in found.items()}, group, "structure"))
+    arrays = of_one_group({n: g.arrays for n, g in found.items()}, group, "structure")
+    frame = columns_of(with_one_time(arrays))
     units = {name: unit for each in found.values() for name, unit in each.units.items()}
     frame.attrs["units"] = {name: unit for name, unit in units.items() if name in frame.columns}
     if objects:

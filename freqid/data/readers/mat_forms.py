@@ -6,13 +6,15 @@ dSPACE ControlDesk, recordings as MAT files (X and Y, each with Name, Data and U
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from freqid.checks import Array, InputError
+from freqid.data.time_column import time_named
 
 # a structure's fields by name, whatever they hold
 Fields: TypeAlias = "dict[str, Any]"
@@ -36,6 +38,16 @@ class Group:
         """Whether any of the arrays may be a channel."""
         return bool(_long(self.arrays))
 
+    def samples_alone(self) -> Group:
+        """The same without what is no channel, structures within for one."""
+        arrays = {name: self.arrays[name] for name in _long(self.arrays)}
+        return dataclasses.replace(self, arrays=arrays)
+
+    @property
+    def has_channels(self) -> bool:
+        """Whether any of them is more than a time."""
+        return any(time_named([name]) is None for name in _long(self.arrays))
+
 
 def structure_of(value: object) -> Fields | None:
     """The fields of a structure; None for anything else, several structures in an array too."""
@@ -48,13 +60,20 @@ def structure_of(value: object) -> Fields | None:
 
 def group_of(name: str, fields: Fields) -> Group:
     """What the structure called ``name`` holds, whichever tool has written it."""
-    if "signals" in fields and _entries(fields["signals"], "values"):
-        return _simulink(name, fields)
-    if _entries(fields.get("Y"), "Data") and _entries(fields.get("X"), "Data"):
-        return _dspace(name, fields)
+    if read := _tool_of(fields):
+        return read(name.rpartition("/")[2], fields)
     others = [n for n in _long(fields) if n.lower() != "time"]
     alone = len(others) == 1 < len(_long(fields)) and others[0].lower() in _SAMPLES
     return Group(dict(fields), samples=others[0] if alone else None)
+
+
+def _tool_of(fields: Fields) -> Callable[[str, Fields], Group] | None:
+    """What reads a structure that a tool has written, all of it; None for any other."""
+    if _entries(fields.get("signals"), "values"):
+        return _simulink
+    if _entries(fields.get("Y"), "Data") and _entries(fields.get("X"), "Data"):
+        return _dspace
+    return None
 
 
 def told_apart(groups: Mapping[str, Group]) -> dict[str, Group]:
@@ -72,6 +91,21 @@ def told_apart(groups: Mapping[str, Group]) -> dict[str, Group]:
     return found
 
 
+def with_one_time(arrays: Mapping[str, object]) -> dict[str, object]:
+    """The same without times that are another one once more, as ``tout`` may be."""
+    kept: dict[str, object] = {}
+    times: list[Array] = []
+    long = _long(arrays)
+    for name, values in arrays.items():
+        if name in long and time_named([name]) is not None:
+            own = np.ravel(np.asarray(values))
+            if any(np.array_equal(own, other) for other in times):
+                continue
+            times.append(own)
+        kept[name] = values
+    return kept
+
+
 def _long(arrays: Mapping[str, object]) -> list[str]:
     """Names of what may be a channel."""
     return [n for n, x in arrays.items() if np.asarray(x).size > 1 and _is_numeric(x)]
@@ -79,6 +113,8 @@ def _long(arrays: Mapping[str, object]) -> list[str]:
 
 def inner_groups(name: str, fields: Fields) -> Iterator[tuple[str, Group]]:
     """Structures within a structure, by their paths."""
+    if _tool_of(fields):
+        return
     for inner, value in fields.items():
         path = f"{name}/{inner}"
         if (deeper := structure_of(value)) is not None:
