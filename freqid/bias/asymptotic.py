@@ -41,8 +41,9 @@ from freqid.lti import (
 )
 from freqid.models import GreyBox, Model, ModelLike
 
-# times that the nodes are chosen anew for the estimate that they led to
+# a warning that has another meaning without noise
 _EDGE = "edge of a bound"
+# times that the nodes are chosen anew for the estimate that they led to
 _ROUNDS = 6
 # starts of n_starts="auto"
 _STARTS = 49
