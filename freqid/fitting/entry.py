@@ -129,7 +129,7 @@ def fit(
     """
     choice("domain", domain, ("frequency", "time"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
-    asked_model, near = model, isinstance(start, Near)
+    asked_model, near, meant = model, isinstance(start, Near), getattr(start, "meant", None)
     start = None if start is None else named_values("start", start)
     auto = isinstance(n_starts, str) and n_starts == "auto"
     count = None if auto else whole("n_starts", n_starts, most=_STARTS)
@@ -187,7 +187,7 @@ def fit(
         readings = [_logarithmic(r, model) for r in readings]
     if offset is not None:
         readings = [with_offset(r) for r in readings]
-    options = SearchOptions(count, seed, start, estimated, own, near)
+    options = SearchOptions(count, seed, start, estimated, own, near, meant)
     with _shown(progress):
         est, readings = _fitted(model, readings, options, loss)
     what, said = type(model).__name__, est.message.rstrip(".")

@@ -12,7 +12,11 @@ from freqid.fitting.reading import Reading
 
 
 class Near(dict[str, float]):
-    """Start values next to a minimum, by name: a fit walks there on the cost itself."""
+    """Start values next to a minimum, by name: a fit walks there on the cost itself. ``meant`` is
+    where the user began, if that is another.
+    """
+
+    meant: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ def bootstrap(
     rng = np.random.default_rng(whole("seed", seed, least=0))
     whole_fit = fit(model, sets, **options)
     uninterrupted(whole_fit.message)
-    if "start" not in options and hasattr(whole_fit.model, "values"):
+    if hasattr(whole_fit.model, "values"):
         free = [p.name for p in whole_fit.model.free_parameters]
         options = {**options, "start": Near({k: whole_fit[k] for k in free}), "n_starts": 1}
     processes(n_jobs)

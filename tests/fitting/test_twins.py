@@ -104,3 +104,19 @@ def test_several_records_at_places_of_their_own():
     assert "exchangeable" not in kinds(
         fq.fit(plant(), two, separate="K", start={"t1": 12, "t2": 30}, weights="noise")
     )
+
+
+def test_fleets_and_resamples():
+    """A row of a batch began at the values of others; resamples began where the user did, and were
+    some of one answer, some of the other.
+    """
+    many = [record(seed) for seed in range(10)]
+    table = fq.fit_many(plant(), many, n_jobs=1, progress=False)
+    assert (table["verdict"] == "doubt").all()
+    assert table["warnings"].str.contains("exchangeable").all()
+    told = {"t1": 30.0, "t2": 12.0}
+    table = fq.fit_many(plant(), many, n_jobs=1, progress=False, start=told)
+    assert (table["verdict"] == "trust").all()
+    assert (table["t1"] > table["t2"]).all()
+    drawn = fq.bootstrap(plant(), many[:5], n=12, start={"t1": 20.0, "t2": 20.0})
+    assert len({bool(order) for order in drawn["t1"] > drawn["t2"]}) == 1

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -97,6 +97,14 @@ def lost_rows(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
     return rows
 
 
+def _meant(model: object, options: Mapping[str, object]) -> dict[str, float] | None:
+    """Where every record was to begin."""
+    if not isinstance(model, GreyBox):
+        return None
+    begun = dict(cast("Mapping[str, float]", options.get("start") or {}))
+    return {p.name: begun.get(p.name, p.value) for p in model.free_parameters}
+
+
 def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
     """What is said of one record; an error is a row, too."""
     if done is not None and not task.verdicts:
@@ -104,7 +112,9 @@ def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
     try:
         options = dict(task.options)
         if done is not None:
-            options["start"] = Near(done.values)
+            near = Near(done.values)
+            near.meant = _meant(task.model, options)
+            options["start"] = near
         est = fit(task.model, data, **options)  # type: ignore[arg-type]
         uninterrupted(est.message)
         std = np.sqrt(np.diag(est.covariance_matrix)).tolist()
