@@ -39,10 +39,11 @@ def files_of(source: Source) -> list[Path]:
     return files
 
 
-def chained(each: Sequence[Found], wanted: Sequence[str] | None) -> Found:
+def chained(each: Sequence[Found], wanted: Sequence[str] | None, held: bool) -> Found:
     """Files that follow one another as one; ValueError where they do not.
 
-    ``wanted`` are the channels that all have to have, those of the first where that is not said.
+    ``wanted`` are the channels that all have to have, those of the first where that is not said;
+    ``held`` says that the hold is given, whatever they remember.
     """
     first = each[0]
     if len(each) == 1:
@@ -52,7 +53,7 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None) -> Found:
         if name not in first.names:
             raise InputError(f"{first.origin}: {unknown('channel', name, first.names)}")
     for other in each[1:]:
-        _check_channels(other, names, first)
+        _check_channels(other, names, first, held)
     for before, after in pairwise(each):
         _check_follows(before, after)
     lengths = [found.n_samples or 0 for found in each]
@@ -70,7 +71,7 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None) -> Found:
     return Found(blocks, names, sum(lengths), first.dt, origin, first.hold, first.conditions, units)
 
 
-def _check_channels(found: Found, names: Sequence[str], first: Found) -> None:
+def _check_channels(found: Found, names: Sequence[str], first: Found, held: bool) -> None:
     missing = [name for name in names if name not in found.names]
     if missing:
         raise InputError(
@@ -78,7 +79,7 @@ def _check_channels(found: Found, names: Sequence[str], first: Found) -> None:
             f"outputs that all have (it has {', '.join(found.names)})"
         )
     told: list[tuple[str, object, object]] = [
-        ("hold", found.hold, first.hold),
+        ("hold", None if held else found.hold, None if held else first.hold),
         ("conditions", dict(found.conditions), dict(first.conditions)),
         ("units", _known(found.units, names), _known(first.units, names)),
     ]

@@ -62,7 +62,7 @@ def open(
     if files := files_of(source):
         both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
         asked = Asked(size, dt, columns, group, both)
-        found = chained([_of_file(file, asked) for file in files], both)
+        found = chained([_of_file(file, asked) for file in files], both, hold is not None)
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):

@@ -82,8 +82,9 @@ def written(est: Estimate) -> Written:
 def load(path: str | Path, model: GreyBox | None = None) -> Estimate:
     """An estimate that ``est.save`` wrote: it simulates, draws and converts as before.
 
-    What needs the data (profiles, bootstrap, suspects) is not kept; verdict, witness and warnings
-    are those that were saved.
+    A black box has the variance of its response where its coefficients tell it: from order three on
+    they may go together to all digits. What needs the data (profiles, bootstrap, suspects) is not
+    kept; verdict, witness and warnings are those that were saved.
 
     Args:
         path: a .json file.

@@ -151,6 +151,8 @@ def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:
         return {**row, "error": str(error)}
     n, parameters = est.n_rows, len(est.values)
     k = parameters + est.minimum.solution.point.n_initial
+    if k >= n:
+        return {**row, "error": f"{k} unknowns, initial states counted, take up {n} real values"}
     alone = n / _together(reading.data)
     misfit = alone * np.log(max(est.cost, 1e-300) / n)
     return {

@@ -37,16 +37,25 @@ def nearest_to_start(
     objective: Objective, structure: GreyStructure, solution: Solution
 ) -> Solution:
     """Of a minimum and its twins the one whose values are nearest to the start."""
+    nearer = _nearer(objective, structure, solution)
+    # of three that may be exchanged one exchange leads to the next
+    while nearer is not None:
+        solution, nearer = nearer, _nearer(objective, structure, nearer)
+    return solution
+
+
+def _nearer(objective: Objective, structure: GreyStructure, solution: Solution) -> Solution | None:
+    """A twin that is nearer to the start; None where there is none."""
+    x = solution.x
     for exchange in _exchanges(structure):
-        x = solution.x
         other = _exchanged(structure, x, exchange)
         if other is None or _distance(structure, other) > _distance(structure, x) - _NEARER:
             continue
         if _alike(structure, x, other):
             point = objective.point(other)
             if point is not None and _same_cost(objective, solution.cost, point.cost):
-                solution = dataclasses.replace(solution, x=other, point=point)
-    return solution
+                return dataclasses.replace(solution, x=other, point=point)
+    return None
 
 
 def exchangeable(minimum: Minimum | None) -> list[Finding]:

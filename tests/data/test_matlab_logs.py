@@ -90,6 +90,13 @@ def test_a_recording_of_dspace_keeps_names_and_units(tmp_path):
     assert record.dt == pytest.approx(1e-3, rel=1e-12)
 
 
+def test_the_unit_of_a_recordings_time_counts(tmp_path):
+    axis = several([("Name", "O"), ("Data", "O"), ("Unit", "O")], ("", 1e3 * T, "ms"))
+    signals = several(CHANNEL, ("u", U, "", 1), ("y", Y, "", 1))
+    path = saved(tmp_path / "a.mat", rec={"X": axis, "Y": signals})
+    assert fq.read(path).dt == pytest.approx(1e-3, rel=1e-12)
+
+
 def test_rasters_that_differ_are_refused(tmp_path):
     axis = several([("Name", "O"), ("Data", "O"), ("Unit", "O")], ("", T, "s"), ("", 2 * T, "s"))
     signals = several(CHANNEL, ("u", U, "", 1), ("y", Y, "", 2))
@@ -101,7 +108,9 @@ def test_rasters_that_differ_are_refused(tmp_path):
 def test_blocks_with_times_of_their_own_are_not_mixed(tmp_path):
     late = block(Y) | {"time": 2 * T[:, None]}
     path = saved(tmp_path / "a.mat", u=block(U), y=late)
-    with pytest.raises(InputError, match="several structures of the same names, u, y"):
+    with pytest.raises(
+        InputError, match="several structures of the same names, u, y, which differ in 'time'"
+    ):
         fq.read(path)
 
 

@@ -101,6 +101,9 @@ def test_what_does_not_follow_is_told(tmp_path, record):
     fq.write(fq.Record(record.u, record.y, DT, hold="foh"), tmp_path / "f.parquet")
     with pytest.raises(InputError, match="tells other hold"):
         fq.open([tmp_path / "f.parquet", log("g", N * DT)])
+    # as of one file, a hold that is given overrides what is remembered
+    both = fq.open([tmp_path / "f.parquet", log("g", N * DT)], hold="zoh")
+    assert both.hold == fq.ZeroOrderHold(DT)
 
 
 def test_averages_go_on_where_a_log_has_a_file_more(tmp_path, record):

@@ -107,3 +107,31 @@ def test_several_records(factor):
     est = fq.fit(fq.OutputError(3), [data for data, _ in made])
     assert est.cost < 1.2 * sum(left for _, left in made)
     assert est.verdict.grade == "trust"
+
+
+@pytest.mark.parametrize("factor", [2, 5, 12])
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_integrators(factor, noise, capfd):
+    """A start whose pole a line meets had no response: three of eight were lost without noise."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal(200 * factor)
+        y = np.concatenate([[0], np.cumsum(u)[:-1]]) * DT
+        size = noise * y.std()
+        slow = fq.Record(u, y + size * rng.standard_normal(len(u)), DT).decimate(
+            factor, keep_input=True
+        )
+        est = fq.fit(fq.OutputError(1), slow)
+        assert est.cost < 1.3 * size**2 * 200 + 1e-9 * (slow.y**2).sum()
+    assert "DLASCL" not in "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize(("factor", "slow"), [(20, 60), (25, 60), (25, 100)])
+def test_few_lines_for_many_inputs(factor, slow):
+    """The lifted plant of 20 and 25 inputs cannot be told from 30 lines: 1 to 3 of 12 were lost."""
+    for rate in (5.0, 20.0, 60.0):
+        for seed in range(4):
+            u = np.random.default_rng(seed).standard_normal(factor * slow)
+            data, left = record([rate], [1, rate], u, factor, 0.01, seed + 3)
+            est = fq.fit(fq.OutputError(1), data)
+            assert est.cost < 2 * left, (rate, seed, est.cost / left)

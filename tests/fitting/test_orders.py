@@ -238,3 +238,13 @@ def test_a_plant_that_does_grow_is_chosen_all_the_same():
     table = fq.select_order(record, [1, 2])
     assert table.attrs["best"] == 1
     assert 0 in table.attrs["growing"]
+
+
+def test_as_many_unknowns_as_values_are_no_order():
+    """Ten samples: an order that interpolates them has no residual, and so was the best."""
+    record = fq.simulate(fq.first_order(), fq.white_noise(10, seed=1), 1e-2).with_noise(0.01)
+    table = fq.select_order(record, range(1, 5), feedthrough=None)
+    row = table[(table["order"] == 3) & table["feedthrough"]].iloc[0]
+    assert "take up 10 real values" in row["error"]
+    assert np.isnan(row["mdl"])
+    assert (table.attrs["best"], table.attrs["feedthrough"]) != (3, True)

@@ -120,3 +120,20 @@ def test_fleets_and_resamples():
     assert (table["t1"] > table["t2"]).all()
     drawn = fq.bootstrap(plant(), many[:5], n=12, start={"t1": 20.0, "t2": 20.0})
     assert len({bool(order) for order in drawn["t1"] > drawn["t2"]}) == 1
+
+
+def test_three_that_may_be_exchanged_end_nearest_to_the_start():
+    """One exchange after the other: (5, 60, 20) from a start in the order (60, 20, 5)."""
+
+    def three(t1, t2, t3):
+        A = [[-1 / t1, 0, 0], [1 / t2, -1 / t2, 0], [0, 1 / t3, -1 / t3]]
+        return A, [[1 / t1], [0], [0]], [[0, 0, 1]], None
+
+    true = {"t1": 60.0, "t2": 20.0, "t3": 5.0}
+    model = fq.GreyBox(three, [fq.Parameter(n, v, "s") for n, v in true.items()])
+    u = 10 * np.sign(np.random.default_rng(2).standard_normal(60)).repeat(20)
+    data = fq.simulate(model, u, 1.0).with_noise(0.01, seed=1)
+    for begin in ((40, 25, 8), (8, 40, 25), (25, 8, 40)):
+        est = fq.fit(model, data, start=dict(zip(true, begin, strict=True)), n_starts=15)
+        assert np.argsort(est.values).tolist() == np.argsort(begin).tolist()
+        assert sorted(est.values) == pytest.approx(sorted(true.values()), rel=0.1)

@@ -95,7 +95,8 @@ def of_one_group(
             if name in together and not _alike(together[name], array):
                 groups = ", ".join(g or "its top" for g in found)
                 raise InputError(
-                    f"holds several {what}s of the same names, {groups}; name one, group=..."
+                    f"holds several {what}s of the same names, {groups}, which differ in {name!r}; "
+                    "name one, group=..."
                 )
             together[name] = array
     return together

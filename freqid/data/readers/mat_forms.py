@@ -153,6 +153,8 @@ def _dspace(name: str, fields: Fields) -> Group:
             f"recording {name!r} holds signals of several rasters; export those of one"
         )
     group.arrays["time"] = times[0]
+    if unit := str(axes[_number(signals[0], len(axes)) - 1].get("Unit", "")).strip():
+        group.units["time"] = unit
     for i, signal in enumerate(signals, start=1):
         label = str(signal.get("Name", "")).replace('"', "").strip() or f"{name}{i}"
         unit = str(signal.get("Unit", "")).strip()

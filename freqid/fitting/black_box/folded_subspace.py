@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.rational_lines import with_poles
 from freqid.fitting.black_box.subspace import (
     identify as identify_at_points,
     inputs_and_cost,
@@ -29,6 +30,10 @@ _LINES, _ROOTS, _ROUNDS = 400, 64, 2
 
 # blocks of rows for each order; so small a part is no imaginary one
 _ROWS, _REAL = (2, 4), 1e-12
+# lines below which the lifted plant is badly told, and sets of poles that are tried then
+_ENOUGH, _SETS = 300, 60
+# how far from the unit circle a pole of a start is kept
+_EDGE = 1e-7
 Cost = Callable[[ComplexArray], float]
 
 
@@ -36,17 +41,51 @@ def identify(
     experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
 ) -> StateSpace:
     """Φ̃, Γ, C, D in the experiments' plane from their lines; ValueError where those are too few."""
+    return identified(experiments, order, feedthrough)[0]
+
+
+def identified(
+    experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
+) -> list[StateSpace]:
+    """The same by every way there is, the one first that leaves the least."""
     if all(e.lines.aliases == 1 for e in experiments):
-        return identify_at_points(experiments, order, feedthrough)
+        return [identify_at_points(experiments, order, feedthrough)]
     # as if the frequency with the most input were the only one of each line
-    plain, left = inputs_and_cost(experiments, *observed(experiments, order), feedthrough)
+    plain = inputs_and_cost(experiments, *observed(experiments, order), feedthrough)
+    found, lines = [plain], sum(e.n_lines for e in experiments)
     try:
-        lifted, less = inputs_and_cost(
-            experiments, *_lifted(experiments, order, feedthrough), feedthrough
-        )
+        start = _lifted(experiments, order, feedthrough)
+        found.append(inputs_and_cost(experiments, *start, feedthrough))
     except (InputError, np.linalg.LinAlgError):
-        return plain
-    return lifted if less < left else plain
+        # too few lines for so many inputs
+        lines = 0
+    if lines < _ENOUGH:
+        found.append(_scattered(experiments, order, feedthrough))
+    # noise-free data may meet a pole of a start
+    found.sort(key=lambda each: each[1] if np.isfinite(each[1]) else np.inf)
+    return [model for model, _ in found]
+
+
+def _scattered(
+    experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool
+) -> tuple[StateSpace, float]:
+    """The best of some sets of poles, those of slow motions among them, and what it leaves."""
+    rng, few = np.random.default_rng(0), thinned_to(experiments, _LINES)
+    tried = []
+    for _ in range(_SETS):
+        size = 1 - 10 ** rng.uniform(-3.5, 0, order)
+        turned = 10 ** rng.uniform(-2.5, np.log10(np.pi), order // 2)
+        poles = size.astype(complex)
+        if rng.random() < 0.5:
+            poles[0 : 2 * (order // 2) : 2] = size[: order // 2] * np.exp(1j * turned)
+            poles[1 : 2 * (order // 2) : 2] = poles[0 : 2 * (order // 2) : 2].conj()
+        A, _ = with_poles(_plane_of(experiments[0]).points(poles))
+        C = rng.standard_normal((experiments[0].n_channels[0], order))
+        found = inputs_and_cost(few, A, C, feedthrough)[1]
+        if np.isfinite(found):
+            tried.append((found, A, C))
+    _, A, C = min(tried, key=lambda t: t[0])
+    return inputs_and_cost(experiments, A, C, feedthrough)
 
 
 def _lifted(
@@ -87,8 +126,10 @@ class _Roots:
     feedthrough: bool
 
     def matrix(self, poles: ComplexArray) -> FloatArray:
-        """Φ̃ with these poles."""
-        X = self.vectors
+        """Φ̃ with these poles, those of integrators a little inside, or a line would meet them."""
+        X, size = self.vectors, np.abs(poles)
+        near = np.abs(size - 1) < _EDGE
+        poles = np.where(near, poles * (1 - _EDGE) / np.where(near, size, 1.0), poles)
         return np.asarray((X * self.plane.points(poles)) @ np.linalg.inv(X)).real
 
     def cost(self, poles: ComplexArray) -> float:

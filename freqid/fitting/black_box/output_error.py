@@ -9,7 +9,12 @@ import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
-from freqid.fitting.black_box.refinement import first_model, nested_model, scattered_model
+from freqid.fitting.black_box.refinement import (
+    first_model,
+    identified_models,
+    nested_model,
+    scattered_model,
+)
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
@@ -102,6 +107,10 @@ def _nested(
         tame = nested_model(lines, spec.order, spec.feedthrough, True, more, seed)
         own = min([own, begun(tame)], key=lambda t: t[1].cost)
     chained = all(e.single and e.one_to_one for e in lines)
+    if not chained:
+        # which of them leads farther the costs of starts do not tell
+        second = identified_models(lines, spec.order, *options)[1:]
+        own = min([own, *map(begun, second)], key=lambda t: t[1].cost)
     if not chained and more:
         rng = np.random.default_rng(seed)
         others = [

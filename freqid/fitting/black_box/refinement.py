@@ -15,7 +15,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.black_box.exchange import TRIAL_STEPS, exchanged, pairs_asked_for
-from freqid.fitting.black_box.folded_subspace import identify
+from freqid.fitting.black_box.folded_subspace import identified, identify
 from freqid.fitting.black_box.pole_groups import fewer_poles
 from freqid.fitting.black_box.rational_lines import (
     FEW,
@@ -148,11 +148,7 @@ def nested_model(
     circle. Raises ValueError where the lines are too few.
     """
     if not all(e.single and e.one_to_one for e in experiments):
-        plain = identify(experiments, order, feedthrough)
-        if stable:
-            A = _with_eigenvalues(plain.A, mirrored)
-            return inputs_of(experiments, A, plain.C, feedthrough)
-        return plain
+        return identified_models(experiments, order, feedthrough, stable)[0]
     few = thinned_to(experiments, _LINES)
     lines = RationalLines(few, feedthrough, stable)
     rng = np.random.default_rng(seed)
@@ -184,6 +180,17 @@ def nested_model(
         lines = RationalLines(experiments, feedthrough, stable)
         best = lines.below(best.poles) or best
     return lines.state_space(best)
+
+
+def identified_models(
+    experiments: Sequence[SpectralExperiment], order: int, feedthrough: bool, stable: bool
+) -> list[StateSpace]:
+    """Starts of any number of channels and of folded lines, the likeliest first."""
+    found = identified(experiments, order, feedthrough)
+    if not stable:
+        return found
+    inner = [(_with_eigenvalues(plain.A, mirrored), plain.C) for plain in found]
+    return [inputs_of(experiments, A, C, feedthrough) for A, C in inner]
 
 
 def scattered_model(
