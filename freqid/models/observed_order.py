@@ -11,15 +11,18 @@ import numpy as np
 from freqid.checks import InputError
 from freqid.lti import observed
 from freqid.models.grey_box import GreyBox
+from freqid.models.model import Model
 
 # how far parameters are moved, as a part of their size: what cancels at one point only is a state
 _MOVED = 0.1
 
 
-def observed_order(model: GreyBox) -> int:
-    """How many states of a plant its outputs show, whatever its parameters."""
+def observed_order(model: Model) -> int:
+    """How many states of a plant its outputs show, whatever its parameters: of a black box all."""
     plant = model.state_space()
     n = len(plant.A)
+    if not isinstance(model, GreyBox):
+        return n
     order = len(observed(plant)[0])
     if order == n:
         return n

@@ -175,7 +175,7 @@ def held_out_cost(est: Estimate, reading: Reading, kept: BoolArray) -> float:
         start = nested_model([part], order, chart.feedthrough, True)
     else:
         start = first_model([part], order, chart.feedthrough)
-    chart = Chart(start, chart.feedthrough, chart.plane, chart.dt, stable=chart.stable)
+    chart = chart.around(start)
     x = polish(Objective(chart, [part]), np.zeros(chart.size), limit=_STEPS, tolerance=1e-6).x
     lines = reading.at_lines().lines(Plane()).in_plane(chart.plane)
     evaluation = lines.at(chart.realise(x))

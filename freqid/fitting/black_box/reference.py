@@ -15,7 +15,12 @@ import numpy as np
 import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.fitting.black_box.refinement import exchanged_model, first_model, with_a_pair
+from freqid.fitting.black_box.refinement import (
+    exchanged_model,
+    first_model,
+    nested_model,
+    with_a_pair,
+)
 from freqid.fitting.black_box.sampled_lines import SampledLines
 from freqid.fitting.cost.box_distance import Surroundings
 from freqid.fitting.cost.charts import Chart, to_plane
@@ -49,19 +54,21 @@ class Reference:
     @classmethod
     def of(
         cls,
-        model: GreyBox,
+        model: GreyBox | DiscreteModel,
         readings: Sequence[Reading],
         count: int | None = None,
         order: int | None = None,
+        stable: bool = False,
     ) -> Reference:
         """Of the model's order, or another, from the data alone, on about ``count`` lines.
 
         Raises InputError where no black box of the order stands beside the model, saying why.
         """
-        seen = SampledLines.of(model, readings, count)
+        seen = SampledLines.of(model, readings, count, stable)
         order = observed_order(model) if order is None else order
+        begun = partial(nested_model, stable=True) if stable else first_model
         try:
-            centre = first_model(seen.lines, order, seen.direct)
+            centre = begun(seen.lines, order, seen.direct)
             return cls._descended(seen.objective(centre), seen.bilinear)
         except np.linalg.LinAlgError as error:
             raise InputError(f"the black box of order {order} has no start: {error}") from None
@@ -69,11 +76,12 @@ class Reference:
     @classmethod
     def larger(
         cls,
-        model: GreyBox,
+        model: GreyBox | DiscreteModel,
         readings: Sequence[Reading],
         count: int,
         mode: complex | None,
         worth: float,
+        stable: bool = False,
     ) -> tuple[Reference | None, float]:
         """One with a mode more than the model, begun from it with this ``mode`` (a pole in z) and
         from the data alone, and about what it leaves of some lines, ``count`` at the most.
@@ -81,7 +89,7 @@ class Reference:
         None where a short way shows that this is more than ``worth``. Raises InputError as ``of``
         does, and where there are several channels.
         """
-        seen = SampledLines.of(model, readings, count)
+        seen = SampledLines.of(model, readings, count, stable)
         if seen.bilinear or not all(e.single and e.one_to_one for e in seen.lines):
             raise InputError("several channels, or lines without a hold, have no rational function")
         pair = [] if mode is None else [seen.plane.points(np.array([mode, np.conj(mode)]))]
@@ -91,7 +99,7 @@ class Reference:
         poles = np.linalg.eigvals(own.A).astype(complex)
         gain = _CHANCE / sum(e.n_rows for e in seen.lines)
         try:
-            centre, left = with_a_pair(seen.lines, poles, pair, seen.direct, gain, worth)
+            centre, left = with_a_pair(seen.lines, poles, pair, (seen.direct, stable), gain, worth)
             if centre is None:
                 return None, left
             return cls._descended(seen.objective(centre), seen.bilinear), left
@@ -158,7 +166,7 @@ class Reference:
         """The minimum next to a model in the plane of the chart, on the same lines."""
         if centre is None or not all(np.isfinite(M).all() for M in centre):
             return None
-        chart = Chart(centre, self.chart.feedthrough, self.chart.plane, self.chart.dt)
+        chart = self.chart.around(centre)
         return self._descended(Objective(chart, self.objective.experiments), self.bilinear)
 
     def _around(self, model: GreyBox, readings: Sequence[Reading]) -> StateSpace:
@@ -180,14 +188,16 @@ class Reference:
         """One that begins from a model: it leaves no more than the model does."""
         chart = self.chart
         centre = self._around(model, readings)
-        return self._from(Chart(centre, chart.feedthrough, chart.plane, chart.dt), readings)
+        return self._from(chart.around(centre), readings)
 
     def model(self, like: Model, hold: Hold) -> DiscreteModel:
         """It as a sampled model behind a hold, with the channels of another."""
         in_z = self.chart.in_z(self.solution.x)
         return DiscreteModel(in_z, self.chart.dt, hold, like.inputs or (), like.outputs or ())
 
-    def with_mode(self, model: GreyBox, readings: Sequence[Reading], mode: StateSpace) -> Reference:
+    def with_mode(
+        self, model: GreyBox | DiscreteModel, readings: Sequence[Reading], mode: StateSpace
+    ) -> Reference:
         """One that begins from a model of an order less and a sampled mode beside it."""
         chart, own = self.chart, _held(model, readings[0].hold)
         W, X = observed(model.state_space(), len(chart.centre.A) - len(mode.A))
@@ -197,7 +207,14 @@ class Reference:
             np.concatenate([own.C, mode.C], axis=1), own.D + mode.D,
         )  # fmt: skip
         centre = to_plane(both, chart.plane)
-        return self._from(Chart(centre, chart.feedthrough, chart.plane, chart.dt), readings)
+        return self._from(chart.around(centre), readings)
+
+    @property
+    def poles(self) -> ComplexArray:
+        """In rad/s."""
+        z, dt = np.linalg.eigvals(self.chart.in_z(self.solution.x).A).astype(complex), self.chart.dt
+        with np.errstate(divide="ignore"):
+            return 2 / dt * (z - 1) / (z + 1) if self.bilinear else np.log(z) / dt
 
     def response(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:
         """Response (outputs, inputs, K) at omega (rad/s), and its relative standard error."""
@@ -222,8 +239,10 @@ class Reference:
         return float(np.sqrt(self.cost / max(freedom, 1)))
 
 
-def _held(model: GreyBox, hold: Hold) -> StateSpace:
+def _held(model: GreyBox | DiscreteModel, hold: Hold) -> StateSpace:
     """The sampled model of a plant behind a hold, with what reaches the next sample fed through."""
+    if isinstance(model, DiscreteModel):
+        return model.state_space()
     assert isinstance(hold, PeriodicHold)
     at, s = model.state_space(), model.sampled(hold)
     if model.late:

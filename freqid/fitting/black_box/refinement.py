@@ -94,17 +94,17 @@ def with_a_pair(
     experiments: Sequence[SpectralExperiment],
     poles: ComplexArray,
     pairs: Sequence[ComplexArray],
-    feedthrough: bool,
+    options: tuple[bool, bool],
     gain: float,
     worth: float,
 ) -> tuple[StateSpace | None, float]:
     """A model with two poles more than these, and about what it leaves: the best of those begun
     with each of the ``pairs``, with what the residual asks for, and from the data alone.
 
-    None where a short way shows that they do not come below a cost ``worth`` more of it. Raises
-    LinAlgError where the polynomials vanish.
+    ``options`` are feedthrough and stable. None where a short way shows that they do not come below
+    a cost ``worth`` more of it. Raises LinAlgError where the polynomials vanish.
     """
-    lines = RationalLines(thinned_to(experiments, _LINES), feedthrough, gain=gain)
+    lines = RationalLines(thinned_to(experiments, _LINES), *options, gain=gain)
     own, unit = lines.below(poles), lines.sizes[0] ** 2
     if own is None:
         raise np.linalg.LinAlgError("the poles stand for no model")

@@ -14,7 +14,7 @@ from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.lti import PeriodicHold, Plane, StateSpace
-from freqid.models import GreyBox
+from freqid.models import DiscreteModel, GreyBox
 
 
 def lines_in_plane(
@@ -44,17 +44,27 @@ def lines_in_plane(
 @dataclass(frozen=True)
 class SampledLines:
     """Lines of a sampled model, in a plane and with the period of its samples (s), whether it lets
-    the input through, and whether that is behind no hold."""
+    the input through, whether that is behind no hold, and whether it has to be stable."""
 
     lines: list[SpectralExperiment]
     plane: Plane
     dt: float
     direct: bool
     bilinear: bool
+    stable: bool = False
 
     @classmethod
-    def of(cls, model: GreyBox, readings: Sequence[Reading], count: int | None) -> SampledLines:
+    def of(
+        cls,
+        model: GreyBox | DiscreteModel,
+        readings: Sequence[Reading],
+        count: int | None,
+        stable: bool = False,
+    ) -> SampledLines:
         """Beside a model; InputError where there are none."""
+        if isinstance(model, DiscreteModel):
+            lines, plane = lines_in_plane(readings, count)
+            return cls(lines, plane, model.dt, bool(model.state_space().D.any()), False, stable)
         bilinear = all(r.unheld for r in readings)
         if bilinear:
             if model.delay_sources:
@@ -66,11 +76,12 @@ class SampledLines:
         lines, plane = lines_in_plane(readings, count)
         # what is left of a delay within a sample lets the input through, too
         direct = bilinear or bool(model.state_space().D.any() or model.delay_sources)
-        return cls(lines, plane, dt, direct or readings[0].hold.reaches_next, bilinear)
+        return cls(lines, plane, dt, direct or readings[0].hold.reaches_next, bilinear, stable)
 
     def objective(self, centre: StateSpace) -> Objective:
         """The cost of models around one."""
-        return Objective(Chart(centre, self.direct, self.plane, self.dt), self.lines)
+        chart = Chart(centre, self.direct, self.plane, self.dt, stable=self.stable)
+        return Objective(chart, self.lines)
 
 
 def _middle_period(readings: Sequence[Reading]) -> float:

@@ -92,6 +92,10 @@ class Chart:
         moves, centre = self.moves + 1, self.matrices(x)
         return Chart(centre, self.feedthrough, self.plane, self.dt, moves, self.stable)
 
+    def around(self, centre: StateSpace) -> Chart:
+        """A chart like this one around another model."""
+        return Chart(centre, self.feedthrough, self.plane, self.dt, stable=self.stable)
+
     def describe(self, x: FloatArray) -> str:
         """Said of the trial point in errors."""
         return f"poles {np.linalg.eigvals(self.matrices(x).A)}"

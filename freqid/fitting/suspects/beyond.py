@@ -44,9 +44,7 @@ def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
     data = [r.data for r in inquiry.readings]
     if not all(isinstance(d, Record) and d.factor == 1 for d in data):
         return None
-    model = inquiry.model
-    states = observed_order(model) if isinstance(model, GreyBox) else len(model.state_space().A)
-    order = min(states + 2, _BOX)
+    order = min(observed_order(inquiry.model) + 2, _BOX)
     try:
         spec = OutputError(order, True, stable=True)
         box = fit_output_error(spec, [r.at_lines() for r in inquiry.readings])

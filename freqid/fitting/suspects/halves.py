@@ -7,13 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
-from freqid.fitting.suspects.parts import Parting
+from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.parts import Parting, confirming
+from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import CURES
 from freqid.fitting.suspects.spread import ELSEWHERE, LEVEL, compared, loudest
 from freqid.lti import Plane
@@ -21,23 +23,47 @@ from freqid.models import Model
 
 # standard errors between two values that are no chance, and relative change of a mode that is none
 _APART, HOLDS_GOOD = 4.0, 0.01
+# part of the data's energy that a black box may lack, a response off by 5 %; and that it may where
+# halves and a larger black box have the same modes
+LITTLE, _MUCH = 2.5e-3, 0.01
 # poles with more damping than this are no modes
 _DAMPED = 0.5
 
 
-def modes_moved(model: Model, halves: Sequence[Estimate | None]) -> float:
-    """Largest relative change of a black box's mode from one half of the data to the other.
+def modes_moved(own: ComplexArray, others: Sequence[ComplexArray | None]) -> float:
+    """Largest relative change of a mode between poles (rad/s) and others, of halves or of more.
 
-    Infinite where a mode is missed in a half; NaN where there are no modes.
+    Infinite where a mode is missed in one; NaN where there are no modes.
     """
-    own = _weakly_damped(model)
-    if not len(own):
+    modes = _weakly_damped(own)
+    if not len(modes):
         return float("nan")
-    modes = [None if f is None else _weakly_damped(f.model) for f in halves]
-    if any(m is None or len(m) < len(own) for m in modes):
+    found = [None if p is None else _weakly_damped(p) for p in others]
+    if any(m is None or len(m) < len(modes) for m in found):
         return float("inf")
-    near = [m[np.abs(m - w).argmin()] / w for w in own for m in modes if m is not None]
+    near = [m[np.abs(m - w).argmin()] / w for w in modes for m in found if m is not None]
     return float(np.abs(np.array(near) - 1).max())
+
+
+def confirmed(inquiry: Asking, said: Sequence[Asked], found: Sequence[Finding]) -> list[Finding]:
+    """What was said of a black box, minor where the modes of both halves of its data agree.
+
+    Its unknowns have no standard errors that mean anything: its modes have. What it lacks much of
+    halves lack alike.
+    """
+    halves = confirming(inquiry.readings)
+    if halves is None:
+        return list(found)
+    parts = [None if f is None else poles_of(f.model) for f in inquiry.apart(halves)]
+    moved = modes_moved(poles_of(inquiry.model), parts)
+    if not moved < HOLDS_GOOD:
+        return list(found)
+    text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
+    return [
+        f if a.harm >= _MUCH
+        else Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number)
+        for f, a in zip(found, said, strict=True)
+    ]  # fmt: skip
 
 
 def modes_differ(
@@ -86,11 +112,14 @@ def _elsewhere(est: Estimate, part: Sequence[Reading], half: Estimate) -> bool:
     return bool(scipy.stats.f.sf(max(f, 0.0), P, half.minimum.freedom) < ELSEWHERE)
 
 
-def _weakly_damped(model: Model) -> FloatArray:
-    """Natural frequencies (rad/s, or per sample time) of a model's weakly damped poles."""
-    poles = model.poles
-    if model.dt:
-        poles = np.log(np.where(poles == 0, 1e-300, poles))
+def poles_of(model: Model) -> ComplexArray:
+    """Poles of a black box in rad/s."""
+    z = model.poles
+    return np.log(np.where(z == 0, 1e-300, z)) / model.dt if model.dt else z
+
+
+def _weakly_damped(poles: ComplexArray) -> FloatArray:
+    """Natural frequencies (rad/s) of weakly damped poles."""
     upper = poles[poles.imag > 0]
     size = np.abs(upper)
     modes: FloatArray = size[-upper.real < _DAMPED * size]

@@ -17,7 +17,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import changing, measurement, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.beyond import looped, midway, unlike
-from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_differ, modes_moved
+from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
@@ -199,15 +199,9 @@ class Inquiry:
         found = [self._finding(scene, a) for a in said]
         if isinstance(self.model, GreyBox) or not said or said[0].name in LIKELY:
             return found
-        # the unknowns of a black box have no standard errors that mean anything: its modes have
-        halves = confirming(self.readings)
-        moved = np.nan if halves is None else modes_moved(self.model, self.apart(halves))
-        if not moved < HOLDS_GOOD:
-            return found
-        text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
-        return [
-            Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number) for f in found
-        ]
+        lacking = [a for a in named if a.harm >= LITTLE]
+        more = [self._finding(scene, a) for a in lacking if a not in said]
+        return [*confirmed(self, said, found), *more]
 
     @cached_property
     def _unphysical(self) -> bool:
@@ -240,7 +234,9 @@ class Inquiry:
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
         if a.name == "another mode" and all(_equally_weighted(r) for r in self.readings):
             text += "; where errors are a share of the response, fit with error='log'"
-        small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS
+        small = (
+            a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS or a.harm < LITTLE
+        )
         if a.name == "unsteady":
             # halves that differ leave the mean of both where it is
             small = bool(a.unit) and abs(a.test.size) < HOLDS_GOOD

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,22 +13,24 @@ import scipy
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Record
 from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
-from freqid.fitting.cost.objective import Objective, Point
+from freqid.fitting.cost.objective import EstimatedStructure, Objective, Point
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved, poles_of
 from freqid.fitting.suspects.scene import LOOSE, Scene
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.fitting.witness import weighted_by
-from freqid.lti import StateSpace, directions
-from freqid.models import GreyBox, observed_order
+from freqid.lti import Plane, StateSpace, directions
+from freqid.models import DiscreteModel, GreyBox, observed_order
 
 # distances of a mode's poles from the unit circle that are tried, in half lines
 _DISTANCES = (1.0, 4.0, 16.0)
@@ -43,12 +46,9 @@ _KEPT = 0.1
 
 def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     """A black box with one mode more, which may lie at any of the lines."""
-    if not isinstance(inquiry.model, GreyBox) or inquiry.model.delay_sources:
+    model, structure = _met(inquiry), inquiry.minimum.structure
+    if model is None:
         return []
-    structure = inquiry.minimum.structure
-    if isinstance(structure, PlacedStructure) or inquiry.minimum.prior is not None:
-        return []
-    assert isinstance(structure, GreyStructure)
     # means over periods are asked in their own cost, everything else at its lines
     means = all(r.both_ends for r in inquiry.readings)
     readings = [r.beside() if means else r.at_lines() for r in inquiry.readings]
@@ -56,14 +56,14 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     if any(r.own_cost != means for r in asked):
         return []
     grey = inquiry.minimum.solution
-    model, group = structure.at(grey.x, 0), range(len(readings))
+    group = range(len(readings))
     weighted = weighted_by([model], [group], readings, every=not scene.even)
     places = float(sum(s.experiment.n_lines for s in scene.seen))
     # the mode's own initial state is free, too
     started = 2 * sum(len(s.free) > 0 for s in scene.seen) - len(scene.absorbed)
-    lines = thinned_to([r.at_lines().lines() for r in weighted], _LINES)
+    lines = thinned_to(_lines(structure, [r.at_lines() for r in weighted]), _LINES)
     some = Objective(structure, lines).point(grey.x)
-    boxes = _boxes(inquiry.model, scene, weighted, _Worth(some, started, scene.freedom, places))
+    boxes = _boxes(model, scene, weighted, _Worth(some, started, scene.freedom, places))
     if not boxes:
         return []
     box = min(boxes, key=lambda b: b.cost)
@@ -75,25 +75,57 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         told = [(grey.cost / box.cost - 1, places if scene.even else places**2)]
     else:
         again = _weighed_again(box, readings, weighted)
-        seen = (Objective(structure, [r.lines() for r in of]) for of in (weighted, again))
+        seen = (Objective(structure, _lines(structure, of)) for of in (weighted, again))
         costs = [polish(objective, grey.x).cost for objective in seen]
         # where the black box tells the noise its shape is as uncertain as the place of the mode
         told = [(costs[0] / box.cost - 1, places), (costs[1] / box.on(again).cost - 1, places**2)]
     wider = shared([(box.objective, box.solution.x)])
-    if inquiry.share is not None:
+    if inquiry.share is not None and isinstance(structure, GreyStructure):
         wider = max(inquiry.share(structure, grey, [box], [group], readings) or wider, 1.0)
     below = int(min(freedom / wider, scene.noise_freedom))
-    found = [
+    told_by = [
         (min(float(scipy.stats.f.sf(f, degrees, below)) * trials, 1.0), f, more)
         for more, trials in told
         if (f := more * freedom / degrees / wider) > 0
     ]
-    if not found:
+    if not told_by:
         return []
-    p, f, more = min(found)
+    p, f, more = min(told_by)
     gain = scene.cost * more / (1 + more)
     test = Score(f, degrees, p, np.nan, 1.0, np.nan, gain)
-    return [Asked("another mode", test, "", p, trials=int(places))]
+    found = Asked("another mode", test, "", p, trials=int(places))
+    if isinstance(inquiry.model, GreyBox):
+        return [found]
+    return [_weighed(found, inquiry, scene, box.on(inquiry.readings))]
+
+
+def _weighed(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> Asked:
+    """One mode more than a black box, whose unknowns mean nothing by themselves: it harms by what
+    it explains where all lines count alike, and where modes move for it.
+    """
+    more = max(scene.cost - box.cost, 0.0) / scene.energy
+    moved = modes_moved(poles_of(inquiry.model), [box.poles])
+    order = observed_order(inquiry.model) + 2
+    words = f"a black box of order {order} explains another {100 * more:.2g} % of the data"
+    return dataclasses.replace(found, detail=words, harm=np.inf if moved > HOLDS_GOOD else more)
+
+
+def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:
+    """What is compared with a larger black box, none itself or one; None where nothing is."""
+    model, minimum = inquiry.model, inquiry.minimum
+    structure = minimum.structure
+    if model.late or isinstance(structure, PlacedStructure) or minimum.prior is not None:
+        return None
+    if isinstance(structure, GreyStructure):
+        return structure.at(minimum.x, 0)
+    return model if isinstance(model, DiscreteModel) else None
+
+
+def _lines(structure: EstimatedStructure, readings: Sequence[Reading]) -> list[SpectralExperiment]:
+    """Lines in the plane of a structure."""
+    if not isinstance(structure, Chart):
+        return [r.lines() for r in readings]
+    return [r.lines(Plane()).in_plane(structure.plane) for r in readings]
 
 
 def _weighed_again(
@@ -148,21 +180,23 @@ class _Worth:
 
 
 def _boxes(
-    model: GreyBox, scene: Scene, readings: Sequence[Reading], worth: _Worth
+    model: GreyBox | DiscreteModel, scene: Scene, readings: Sequence[Reading], worth: _Worth
 ) -> list[Reference]:
     """Black boxes in their minima: begun from the data, and from the model with a mode where that
     explains most; none where a short way shows no gain.
     """
     order, found = observed_order(model) + 2, []
+    # what is stable by request is compared with the like
+    stable = isinstance(scene.structure, Chart) and scene.structure.stable
     mode = None
     try:
         single = all(s.experiment.single and s.experiment.one_to_one for s in scene.seen)
-        if single and not all(r.unheld for r in readings):
-            mode = _lacking(scene, readings[0].sample_time)
+        if single and (model.dt or not all(r.unheld for r in readings)):
+            mode = _lacking(scene, model.dt or readings[0].sample_time)
             pole = None if mode is None else complex(*mode.A[:, 0])
-            own, _ = Reference.larger(model, readings, _LINES, pole, worth.cost(2 * order))
+            own, _ = Reference.larger(model, readings, _LINES, pole, worth.cost(2 * order), stable)
             return [] if own is None else [own.on(readings)]
-        own = Reference.of(model, readings, _LINES, order=order)
+        own = Reference.of(model, readings, _LINES, order, stable)
         found = [own.on(readings)]
     except (InputError, np.linalg.LinAlgError):
         return []

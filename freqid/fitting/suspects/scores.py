@@ -58,7 +58,8 @@ class Asked:
     """A suspect with its test, its unit, what it was found at, and its corrected p.
 
     What is ``certain`` the data themselves show, however little it explains; ``odd`` is a hold that
-    no converter has.
+    no converter has. ``harm`` is the part of the data's energy that a black box lacks for it,
+    infinite where its modes move.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Asked:
     trials: int = 1
     certain: bool = False
     odd: bool = False
+    harm: float = float("nan")
 
 
 def of_several(p: float, trials: int) -> float:
