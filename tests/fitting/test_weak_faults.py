@@ -241,3 +241,24 @@ def test_decimated_data_whose_mode_has_gone_to_its_mirror_image_name_the_hold():
         assert est.warnings[0].kind == "hold rejected"
         assert "zero-order hold of about 0.0020" in est.warnings[0] or "0.0019" in est.warnings[0]
         assert est.verdict.grade == "do not use"
+
+
+@pytest.mark.parametrize(("late", "noise"), [(0.178, 0.25), (0.4, 0.05)])
+def test_a_long_delay_beside_slow_outputs_is_told_by_the_past(late, noise):
+    """Of a mode that answers 18 samples late 39 % were explained at half its damping, and trusted:
+    the witness beside slow outputs has none of that delay either.
+    """
+
+    def mode(w, z, g):
+        return [[0, 1], [-w * w, -2 * z * w]], [[0], [w * w * g]], [[1, 0]], [[0.0]]
+
+    plant = fq.GreyBox(
+        mode, [fq.Parameter("w", 34.5), fq.Parameter("z", 0.05), fq.Parameter("g", 1.0)]
+    )
+    true = dataclasses.replace(plant, input_delay=late)
+    record = fq.simulate(true, fq.chirp(0.3, 35, 14.54, 0.01), 0.01).decimate(2, keep_input=True)
+    record = record.with_noise(noise * record.y.std(), seed=69)
+    est = fq.fit(plant, record)
+    assert not est.verdict.trusted
+    assert [w.kind for w in est.warnings] == ["unexplained"]
+    assert fq.fit(true, record).verdict.trusted

@@ -23,6 +23,7 @@ from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LIKELY, evidence, ordered
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
+from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
@@ -132,8 +133,11 @@ class Inquiry:
         another hold speaks, and one more mode is believed where nothing simple explains as much.
         """
         scene = self.scene
-        if scene is None or not self.speaking:
+        if scene is None:
             return []
+        limit = LEVEL / max(len(self.asked), 1)
+        if not self.speaking:
+            return unexplained(self, scene, limit, self._std)
         most = max(a.test.gain for a in self.speaking)
         if other := unmirrored(self, scene, most):
             return [other]
@@ -165,7 +169,7 @@ class Inquiry:
         alike = "unlike experiments" not in merged and self.share is None
         if not alike or (ranked[0].name not in ("another mode", "feedback") and not runaway):
             return ranked
-        loop = looped(self, scene, LEVEL / max(len(self.asked), 1))
+        loop = looped(self, scene, limit)
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
 
     @in_one_blas_thread

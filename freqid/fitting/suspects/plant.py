@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -155,19 +156,20 @@ def feedback(scene: Scene, model: Model) -> list[Columns]:
     if scene.share is not None:
         # what a reference explains of an input answers to nothing else
         return []
-    ahead = [_shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
-    past = [_shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
+    ahead = [shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
+    past = [shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
     ways = (False,) if scene.even else (False, True)
     return [Columns(ahead, beside=past, trials=len(ways), alike=alike) for alike in ways]
 
 
-def _shifted(s: Seen, model: Model, samples: range) -> FloatArray:
+def shifted(s: Seen, model: Model, samples: Iterable[int]) -> FloatArray:
     """Rows of each input, so many samples early, at each output."""
+    early = list(samples)
     ahead = np.exp(1j * s.omega_input * input_dt(s.reading.data))
     shape = (model.n_outputs, model.n_inputs, len(s.omega_input))
     rows = []
     for o, i in np.ndindex(*shape[:2]):
-        for k in samples:
+        for k in early:
             G = np.zeros(shape, complex)
             G[o, i] = ahead ** float(k)
             rows.append(s.answered(G))

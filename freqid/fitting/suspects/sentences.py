@@ -24,6 +24,7 @@ CURES = {
     "unlike experiments": "fit them apart and compare; find out what has changed between them",
     "amplitude": "the plant is not linear: identify it at the level at which it will work",
     "unsteady": "see est.spread, fit the halves apart, and find out what has changed",
+    "unexplained": "it lacks something: a delay, a mode, another structure",
     "another mode": (
         "give the model one more mode, a black box a higher order, or narrow the band"
     ),
@@ -55,5 +56,6 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
         "amplitude": "the parameters change with the level of the input",
         "unsteady": f"the second half of the record differs from the first{halves}",
+        "unexplained": f"{detail} explain more of the output than the model makes of them",
         "another mode": detail or "a black box with one mode more explains the data better",
     }[name]
