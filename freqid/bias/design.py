@@ -102,6 +102,13 @@ def experiment_design(
     }
     edges = dict(zip(spectra, grid, strict=True))
     assumed = listed("holds", holds)
+    for given in assumed:
+        own = as_hold(given, base_dt, hold)
+        if plant.late and isinstance(own, PeriodicHold) and not own.constant:
+            raise InputError(
+                f"holds has {given!r}: the plant's input_delay needs a zero-order hold or a "
+                "band-limited input; leave it out"
+            )
     flag("d_optimal", d_optimal)
     processes(n_jobs)
     names = [p.name for p in plant.free_parameters]

@@ -19,7 +19,7 @@ def files_of(source: Source) -> list[Path]:
     """The files that a path, a pattern or several paths name, in order; none for anything else.
 
     Those of a pattern are in the order of their names, 2 before 10. Raises FileNotFoundError for a
-    pattern without files, ValueError for a file that comes twice.
+    pattern without files, ValueError for a file that comes twice or for no files.
     """
     if isinstance(source, (str, Path)):
         pattern = str(source)
@@ -29,8 +29,10 @@ def files_of(source: Source) -> list[Path]:
         if not files:
             raise FileNotFoundError(f"{pattern}: no file has such a name; check the path")
         return files
-    if not isinstance(source, (list, tuple)) or not source:
+    if not isinstance(source, (list, tuple)):
         return []
+    if not source:
+        raise InputError("source is empty; give at least one file, or blocks of samples")
     if not all(isinstance(each, (str, Path)) for each in source):
         return []
     files = [Path(each) for each in source]

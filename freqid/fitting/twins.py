@@ -7,8 +7,10 @@ others are said.
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -27,8 +29,12 @@ _EQUAL, _COST = 1e-8, 1e-9
 _NEARER = 0.05
 # a start that is nearer to one answer by a factor of two, over all parameters, tells which is meant
 _TOLD = float(np.log(2))
+# nepers of a change of sign
+_FARTHEST = 1e3
 # standard errors by which values differ
 _APART = 2.0
+# what stands for the number of a part in names: all digits, each digit, the last word or letter
+_LABELS = (r"(\d+)", r"(\d)", r"(?<=_)([^_]+)$", r"([A-Za-z])$")
 # pairs of places in the vector of unknowns that are exchanged together
 Exchange = tuple[tuple[int, int], ...]
 
@@ -46,16 +52,43 @@ def nearest_to_start(
 
 def _nearer(objective: Objective, structure: GreyStructure, solution: Solution) -> Solution | None:
     """A twin that is nearer to the start; None where there is none."""
-    x = solution.x
-    for exchange in _exchanges(structure):
-        other = _exchanged(structure, x, exchange)
-        if other is None or _distance(structure, other) > _distance(structure, x) - _NEARER:
-            continue
-        if _alike(structure, x, other):
-            point = objective.point(other)
-            if point is not None and _same_cost(objective, solution.cost, point.cost):
-                return dataclasses.replace(solution, x=other, point=point)
+    for _, other in _twins(structure, solution.x, -_NEARER):
+        point = objective.point(other)
+        if point is not None and _same_cost(objective, solution.cost, point.cost):
+            return dataclasses.replace(solution, x=other, point=point)
     return None
+
+
+def nearest_order(structure: GreyStructure, x: FloatArray) -> list[int]:
+    """Which of the unknowns (P,) of an answer each parameter takes so that it is the nearest one to
+    the start.
+    """
+    order = list(range(structure.count))
+    while (twin := next(_twins(structure, x, -_NEARER), None)) is not None:
+        exchange, x = twin
+        for i, j in exchange:
+            order[i], order[j] = order[j], order[i]
+    return order
+
+
+def _twins(
+    structure: GreyStructure, x: FloatArray, farther: float
+) -> Iterator[tuple[Exchange, FloatArray]]:
+    """Other answers with the same response, ``farther`` (nepers) from the start at the most."""
+    names, units = structure.physical_names, [p.unit for p in structure.parameters]
+    start = [structure.meant[name] for name in names]
+    values = (x * structure.scale).tolist()
+    for exchange in _exchanges(tuple(names), tuple(units)):
+        farther_by = sum(
+            _apart(start[i], values[j]) - _apart(start[i], values[i])
+            for pair in exchange
+            for i, j in (pair, pair[::-1])
+        )
+        if farther_by > farther:
+            continue
+        other = _exchanged(structure, x, exchange)
+        if other is not None and _alike(structure, x, other):
+            yield exchange, other
 
 
 def exchangeable(minimum: Minimum | None) -> list[Finding]:
@@ -69,19 +102,14 @@ def exchangeable(minimum: Minimum | None) -> list[Finding]:
         # the unknowns of a black box mean nothing
         return []
     x, found = minimum.x, []
-    near = _distance(structure, x)
     std = np.sqrt(np.diag(Spread(np.ones(len(x)), minimum).covariance))
-    for exchange in _exchanges(structure):
-        other = _exchanged(structure, x, exchange)
-        if other is None or _distance(structure, other) > near + _TOLD:
-            continue
+    for exchange, other in _twins(structure, x, _TOLD):
         if (np.abs(other - x) <= _APART * std).all():
             # which is whose matters no more than what noise does to either
             continue
-        if _alike(structure, x, other):
-            point = minimum.objective.point(other)
-            if point is not None and _same_cost(minimum.objective, minimum.point.cost, point.cost):
-                found.append(_names(structure, exchange))
+        point = minimum.objective.point(other)
+        if point is not None and _same_cost(minimum.objective, minimum.point.cost, point.cost):
+            found.append(_names(structure, exchange))
     if not found:
         return []
     return [
@@ -99,22 +127,32 @@ def _names(structure: GreyStructure, exchange: Exchange) -> str:
     return " and ".join(", ".join(names[pair[side]] for pair in exchange) for side in (0, 1))
 
 
-def _exchanges(structure: GreyStructure) -> Iterator[Exchange]:
-    """Two parameters of one unit, or all that have one number in their names with all that have
-    another (w1, z1 and w2, z2).
+@lru_cache(maxsize=256)
+def _exchanges(names: tuple[str, ...], units: tuple[str, ...]) -> list[Exchange]:
+    """Two parameters of one unit, or all that have one label in their names with all that have
+    another in its place: w1, z1 and w2, z2; k1, k11, k12 and k2, k22, k21; w_a, z_a and w_b, z_b.
     """
-    parameters = structure.parameters
-    for i, j in combinations(range(structure.count), 2):
-        if parameters[i].unit == parameters[j].unit:
-            yield ((i, j),)
-    numbered: dict[str, dict[tuple[str, ...], int]] = {}
-    for place, name in enumerate(structure.physical_names):
-        parts = re.split(r"(\d+)", name)
-        if len(parts) == 3:
-            numbered.setdefault(parts[1], {})[parts[0], parts[2]] = place
-    for one, two in combinations(numbered.values(), 2):
-        if one.keys() == two.keys() and len(one) > 1:
-            yield tuple((one[stem], two[stem]) for stem in one)
+    found: list[Exchange] = [
+        ((i, j),) for i, j in combinations(range(len(names)), 2) if units[i] == units[j]
+    ]
+    place = {name: i for i, name in enumerate(names)}
+    for parting in _LABELS:
+        parts = [re.split(parting, name) for name in names]
+        # every second part is a label
+        labels = sorted({label for each in parts for label in each[1::2]})
+        for one, two in combinations(labels, 2):
+            turn = {one: two, two: one}
+            turned = [
+                "".join(
+                    [part if k % 2 == 0 else turn.get(part, part) for k, part in enumerate(each)]
+                )
+                for each in parts
+            ]
+            pairs = [(i, place.get(name, -1)) for i, name in enumerate(turned)]
+            exchange = tuple((i, j) for i, j in pairs if i < j)
+            if len(exchange) > 1 and all(j >= 0 for _, j in pairs) and exchange not in found:
+                found.append(exchange)
+    return found
 
 
 def _exchanged(structure: GreyStructure, x: FloatArray, exchange: Exchange) -> FloatArray | None:
@@ -123,10 +161,12 @@ def _exchanged(structure: GreyStructure, x: FloatArray, exchange: Exchange) -> F
     """
     values, other = x * structure.scale, x.copy()
     for pair in exchange:
+        if structure.parameters[pair[0]].prior != structure.parameters[pair[1]].prior:
+            return None
         for place, value in zip(pair, values[list(pair[::-1])], strict=True):
             parameter = structure.parameters[place]
             low, high = parameter.physical
-            if parameter.prior is not None or not low <= value <= high:
+            if not low <= value <= high:
                 return None
             other[place] = value / structure.scale[place]
     inside = (structure.lower <= other) & (other <= structure.upper)
@@ -134,13 +174,12 @@ def _exchanged(structure: GreyStructure, x: FloatArray, exchange: Exchange) -> F
     return other if inside.all() and moved.any() else None
 
 
-def _distance(structure: GreyStructure, x: FloatArray) -> float:
-    """How far the parameters are from the start, in nepers; signs apart are farther than any."""
-    start = np.array([structure.meant[name] for name in structure.physical_names])
-    with np.errstate(all="ignore"):
-        ratio = (x * structure.scale)[: structure.count] / start
-        nepers = np.where(ratio > 0, np.abs(np.log(np.abs(ratio))), 1e3)
-    return float(np.nansum(np.where(start == 0, 0.0, nepers)))
+def _apart(start: float, value: float) -> float:
+    """How far a value is from where it began, in nepers; of another sign farther than any."""
+    if start == 0:
+        return 0.0
+    ratio = value / start
+    return abs(math.log(ratio)) if 0 < ratio < math.inf else _FARTHEST
 
 
 def _alike(structure: GreyStructure, x: FloatArray, other: FloatArray) -> bool:

@@ -113,3 +113,9 @@ def test_a_delay_of_nothing_is_no_bound_that_the_data_push_against():
     est = fq.asymptotic_fit(plant(0.0), fq.ChirpSpectrum(1, 100), DT, "zoh", start={"a": 80.0})
     assert est["Td"] == pytest.approx(0, abs=1e-9)
     assert not est.warnings
+
+
+def test_a_hold_that_no_delay_goes_with_is_refused_before_work_begins():
+    """All of its rows were infinite, without a reason."""
+    with pytest.raises(ValueError, match=r"holds has 'foh': the plant's input_delay needs"):
+        fq.experiment_design(plant(0.0037), DT, noise_std=0.1, holds=[None, "foh"])

@@ -126,3 +126,9 @@ def test_more_files_than_may_be_open_at_once(tmp_path, record):
         np.testing.assert_array_equal(stream.load().y, record.y)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
+def test_no_files_are_told():
+    """The message was about a sample time of blocks."""
+    with pytest.raises(ValueError, match="source is empty; give at least one file"):
+        fq.open([])

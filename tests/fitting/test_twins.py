@@ -118,8 +118,52 @@ def test_fleets_and_resamples():
     table = fq.fit_many(plant(), many, n_jobs=1, progress=False, start=told)
     assert (table["verdict"] == "trust").all()
     assert (table["t1"] > table["t2"]).all()
+    quick = fq.fit_many(plant(), many, n_jobs=1, progress=False, verdicts=False, start=told)
+    assert (quick["t1"] > quick["t2"]).all()
+    other = {"t1": 12.0, "t2": 30.0}
+    quick = fq.fit_many(plant(), many, n_jobs=1, progress=False, verdicts=False, start=other)
+    assert (quick["t1"] < quick["t2"]).all()
+    assert np.abs(quick["t1_std"] / table["t2_std"] - 1).max() < 0.05
     drawn = fq.bootstrap(plant(), many[:5], n=12, start={"t1": 20.0, "t2": 20.0})
     assert len({bool(order) for order in drawn["t1"] > drawn["t2"]}) == 1
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("w1", "z1", "g1", "w2", "z2", "g2"), ("w_a", "z_a", "g_a", "w_b", "z_b", "g_b"),
+     ("w11", "z1", "g1", "w22", "z2", "g2"), ("wx", "zx", "gx", "wy", "zy", "gy")],
+)  # fmt: skip
+def test_whatever_tells_the_parts_in_their_names(names):
+    """Names with two numbers, words or letters were left out: which mode came first was chance."""
+
+    def two(w, z, g, v, y, h):
+        A = np.zeros((4, 4))
+        A[:2, :2], A[2:, 2:] = [[0, 1], [-w * w, -2 * z * w]], [[0, 1], [-v * v, -2 * y * v]]
+        return A, [[0], [w * w * g], [0], [v * v * h]], [[1, 0, 1, 0]], None
+
+    true = dict(zip(names, (20.0, 0.05, 1.0, 75.0, 0.03, 0.3), strict=True))
+    source = f"def build({', '.join(names)}): return two({', '.join(names)})"
+    space = {"two": two}
+    exec(source, space)
+    model = fq.GreyBox(space["build"], [fq.Parameter(n, v) for n, v in true.items()])
+    data = fq.simulate(model, fq.white_noise(1500, seed=3), 0.01).with_noise(0.05, seed=1)
+    begin = dict(zip(names, (60.0, 0.04, 0.5, 30.0, 0.04, 0.5), strict=True))
+    est = fq.fit(model, data, start=begin, n_starts=8)
+    assert est[names[0]] == pytest.approx(75, rel=0.01)
+    assert est[names[3]] == pytest.approx(20, rel=0.01)
+    assert "exchangeable" not in kinds(est)
+    between = dict(zip(names, (39.0, 0.04, 0.5, 38.0, 0.04, 0.5), strict=True))
+    est = fq.fit(model, data, start=between, n_starts=8)
+    (said,) = [w for w in est.warnings if w.kind == "exchangeable"]
+    assert f"{names[0]}, {names[1]}, {names[2]} and {names[3]}" in said
+
+
+def test_equal_priors_tell_nothing():
+    alike = plant().with_prior(t1=(25.0, 15.0), t2=(25.0, 15.0))
+    assert "exchangeable" in kinds(fq.fit(alike, record()))
+    unlike = plant().with_prior(t1=(40.0, 15.0), t2=(15.0, 15.0))
+    est = fq.fit(unlike, record())
+    assert "exchangeable" not in kinds(est)
 
 
 def test_three_that_may_be_exchanged_end_nearest_to_the_start():

@@ -7,6 +7,7 @@ left to a search of their own.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -25,6 +26,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.search.batched import descend
 from freqid.fitting.search.descent import uninterrupted
 from freqid.fitting.sufficiency import enough_rows
+from freqid.fitting.twins import nearest_order
 from freqid.lti import in_one_blas_thread
 from freqid.models import GreyBox
 
@@ -81,6 +83,20 @@ def minima(
     return found
 
 
+def _nearest(structure: GreyStructure, done: Done) -> Done:
+    """The same minimum, with values that may be exchanged as they are nearest to the start."""
+    names, values = structure.physical_names, np.array(list(done.values.values()))
+    order = nearest_order(structure, values / structure.scale)
+    if order == list(range(len(order))):
+        return done
+    whose = dict(zip(names, (names[i] for i in order), strict=True))
+    return dataclasses.replace(
+        done,
+        values={n: done.values[other] for n, other in whose.items()},
+        std={n: done.std[other] for n, other in whose.items()},
+    )
+
+
 def _plain(model: GreyBox, options: Mapping[str, object]) -> bool:
     """Whether the fit is one of least squares at the lines from one start."""
     if not set(options) <= _OPTIONS or options.get("hold") == "estimate":
@@ -120,7 +136,7 @@ def _of_one_shape(
         if len(which):
             some = every.some(which)
             for i, each in zip(which, _minima_of(some, at(some)), strict=True):
-                found[i] = each
+                found[i] = None if each is None else _nearest(structure, each)
 
     def left() -> IntArray:
         return np.array([i for i, each in enumerate(found) if each is None], dtype=int)
