@@ -21,14 +21,13 @@ from freqid.checks import (
     unknown,
 )
 from freqid.data import DataSet, FrequencyResponse
-from freqid.fitting.cost.objective import EstimatedStructure
+from freqid.fitting.cost.objective import Answering
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding, Inquired
 from freqid.fitting.questioned import Questioned
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.shown import Shown
 from freqid.fitting.tied import with_tied
-from freqid.fitting.uncertainty.coefficient_variance import with_coefficient_variance
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.profiles import profile_intervals
@@ -108,10 +107,12 @@ class Estimate(Questioned, Shown):
         return own if isinstance(own, Spread) else Spread(np.ones(len(self.values)), given=own)
 
     @property
-    def _unknowns(self) -> tuple[EstimatedStructure, FloatArray, Spread]:
+    def _unknowns(self) -> tuple[Answering, FloatArray, Spread]:
         """The model as the optimiser saw it, its unknowns, and how they scatter."""
         if self.problem is not None and isinstance(self.uncertainty, Spread):
             return self.problem.structure, self.problem.x, self.uncertainty
+        if (kept := vars(self).get("box")) is not None:
+            return kept, np.zeros(len(kept.half)), kept.spread
         if not isinstance(self.model, GreyBox):
             return self.minimum.structure, self.minimum.x, self.scatter
         # an estimate that is not of a fit: the grey box itself still tells all that is asked
@@ -220,8 +221,8 @@ class Estimate(Questioned, Shown):
         if omega is None:
             omega = np.geomspace(1e-3, 1, 200) * np.pi / self.dt
         frf: FrequencyResponse = self.model.frequency_response(omega, hold)
-        if self.problem is None and not isinstance(self.model, GreyBox):
-            return with_coefficient_variance(frf, self.model, self.covariance_matrix, hold)
+        if self.problem is None and not isinstance(self.model, GreyBox) and "box" not in vars(self):
+            return frf
         return replace(frf, variance=response_variance(*self._unknowns, frf.omega, hold))
 
     def derived(self, function: Callable[[GreyBox], ArrayLike]) -> tuple[FloatArray, FloatArray]:

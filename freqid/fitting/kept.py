@@ -19,6 +19,7 @@ from freqid.fitting.grades import Verdict
 from freqid.fitting.met import data_digest, remembered
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.tied import with_tied
+from freqid.fitting.uncertainty.kept_box import KeptBox
 from freqid.models import GreyBox, hold_of_dict, hold_to_dict, model_of_dict, model_to_dict
 
 if TYPE_CHECKING:
@@ -76,15 +77,23 @@ def written(est: Estimate) -> Written:
         "data": [_described(d) for d in est.data],
         "suspects": _table(est.suspects),
         "modes": _table(est.modes()) if est.problem is not None else None,
+        "box": _box_of(est),
     }
+
+
+def _box_of(est: Estimate) -> Written | None:
+    """How a black box scatters; None for other models, and where that is not known."""
+    box: KeptBox | None = vars(est).get("box")
+    if box is None and est.problem is not None and not isinstance(est.model, GreyBox):
+        box = KeptBox.of(est.problem.structure, est.problem.x, est.scatter)
+    return None if box is None else box.to_dict()
 
 
 def load(path: str | Path, model: GreyBox | None = None) -> Estimate:
     """An estimate that ``est.save`` wrote: it simulates, draws and converts as before.
 
-    A black box has the variance of its response where its coefficients tell it: from order three on
-    they may go together to all digits. What needs the data (profiles, bootstrap, suspects) is not
-    kept; verdict, witness and warnings are those that were saved.
+    What needs the data (profiles, bootstrap, suspects) is not kept; verdict, witness and warnings
+    are those that were saved.
 
     Args:
         path: a .json file.
@@ -163,6 +172,8 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip
+    if kept.get("box") is not None:
+        vars(est)["box"] = KeptBox.from_dict(kept["box"])
     for name, key in (("suspects", "suspects"), ("known_modes", "modes")):
         if kept.get(key) is not None:
             est.__dict__[name] = _frame(kept[key])

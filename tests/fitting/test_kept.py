@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.linalg
 
 import freqid as fq
 
@@ -163,23 +164,39 @@ def test_intervals_inside_bounds_are_kept(tmp_path):
     assert fq.load(tmp_path / "a.json").parameters.loc["fm", "value"] != 1.0
 
 
-@pytest.mark.parametrize(
-    "spec",
-    [
-        fq.OutputError(1),
-        fq.OutputError(2, feedthrough=True),
-        fq.TransferFunction(0, 1),
-        fq.TransferFunction(0, 1, delay="estimate"),
-    ],
-)
-def test_a_loaded_black_box_has_its_band(spec, tmp_path):
-    """J Σ Jᴴ by its coefficients is what the chart of the fit had said."""
-    record = fq.simulate(fq.first_order(), fq.white_noise(3000, seed=1), 2e-3).with_noise(0.05)
-    est = fq.fit(spec, record)
+def modes_of_order(n):
+    """Two modes and lags of total order n, well apart."""
+    blocks = [np.array([[-0.6, 30.0], [-30.0, -0.6]]), np.array([[-2.0, 90.0], [-90.0, -2.0]])]
+    A = scipy.linalg.block_diag(*blocks[: n // 2], *[np.array([[-12.0]])] * (n % 2))
+    plant = fq.GreyBox(
+        lambda g: (A, g * np.arange(1, n + 1.0)[:, None], np.ones((1, n)), None),
+        [fq.Parameter("g", 1.0)],
+    )
+    record = fq.simulate(plant, fq.white_noise(4000, seed=1), 2e-3)
+    return record.with_noise(0.05 * record.y.std(), seed=2)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 5])
+@pytest.mark.parametrize("kind", ["sampled", "direct", "rational", "late"])
+def test_a_loaded_black_box_has_its_band_and_its_poles(kind, order, tmp_path):
+    """From order three on its coefficients go together to all digits, and it had no band."""
+    spec = {
+        "sampled": fq.OutputError(order), "direct": fq.OutputError(order, feedthrough=True),
+        "rational": fq.TransferFunction(order - 1, order),
+        "late": fq.TransferFunction(order - 1, order, delay="estimate"),
+    }[kind]  # fmt: skip
+    est = fq.fit(spec, modes_of_order(order))
     est.save(tmp_path / "box.json")
+    kept = fq.load(tmp_path / "box.json")
+    kept.save(tmp_path / "again.json")
     omega = np.geomspace(1, 300, 20)
-    kept = fq.load(tmp_path / "box.json").frequency_response(omega).variance
-    np.testing.assert_allclose(kept, est.frequency_response(omega).variance, rtol=1e-4)
+    hold = None if kind in ("sampled", "direct") else fq.ZeroOrderHold(2e-3)
+    for each in (kept, fq.load(tmp_path / "again.json")):
+        for through in (None, hold):
+            told = [e.frequency_response(omega, through).variance for e in (each, est)]
+            np.testing.assert_allclose(*told, rtol=1e-6)
+        for one, two in zip(each.pole_scatter(), est.pole_scatter(), strict=True):
+            np.testing.assert_allclose(one, two, rtol=1e-6)
 
 
 def test_the_band_of_a_loaded_black_box_of_several_channels(tmp_path):

@@ -104,26 +104,40 @@ class Chart:
         self, x: FloatArray, omega: FloatArray, hold: Hold | None
     ) -> tuple[ComplexArray, ComplexArray]:
         """Response at x, taken at exp(jω·dt), and its derivatives by x: a hold is inside."""
-        w = self.plane.points(on_circle(omega * self.dt))
-        plant = self.realise(x).basis.through(BandLimited())
-        return response_and_derivatives(plant, w, factor=self.plane.input_factor(w))
+        return response_in_plane(self.realise(x), self.plane, self.dt, omega)
 
     def poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Poles (n,) in rad/s and their derivatives by x (n, P).
-
-        z = (w + a)/(1 + a w), λ = ln z / dt: through the coefficients of a polynomial of poles
-        that lie close together nothing would be left of the digits.
-        """
-        at, d = self.realise(x).linearisation
-        w, change = eigenvalues_and_derivatives(at.A, d.A)
-        a = self.plane.a
-        z = (w + a) / (1 + a * w)
-        slope = (1 - a**2) / (1 + a * w) ** 2 / z / self.dt
-        return np.log(z) / self.dt, change * slope[:, None]
+        """Poles (n,) in rad/s and their derivatives by x (n, P)."""
+        return poles_in_plane(self.realise(x).linearisation, self.plane, self.dt)
 
     def in_z(self, x: FloatArray) -> StateSpace:
         """The state space at x in the z plane."""
         return from_plane(self.matrices(x), self.plane)
+
+
+def response_in_plane(
+    at: Realisation, plane: Plane, dt: float, omega: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Response of a model in a plane at exp(jω·dt), and its derivatives."""
+    w = plane.points(on_circle(omega * dt))
+    through = at.basis.through(BandLimited())
+    return response_and_derivatives(through, w, factor=plane.input_factor(w))
+
+
+def poles_in_plane(
+    linearisation: Linearisation, plane: Plane, dt: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Poles (n,) in rad/s of a model in a plane, and their derivatives (n, P).
+
+    z = (w + a)/(1 + a w), λ = ln z / dt: through the coefficients of a polynomial of poles
+    that lie close together nothing would be left of the digits.
+    """
+    at, d = linearisation
+    w, change = eigenvalues_and_derivatives(at.A, d.A)
+    a = plane.a
+    z = (w + a) / (1 + a * w)
+    slope = (1 - a**2) / (1 + a * w) ** 2 / z / dt
+    return np.log(z) / dt, change * slope[:, None]
 
 
 def _kron(A: FloatArray, B: FloatArray) -> FloatArray:

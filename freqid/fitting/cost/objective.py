@@ -60,10 +60,12 @@ class ScannableStructure(Structure, Protocol):
         ...
 
 
-class EstimatedStructure(Structure, Protocol):
-    """A structure that says what a user asks of an estimate, each with its derivatives by x."""
+class Answering(Protocol):
+    """What says all that a user asks of an estimate, each with its derivatives by x."""
 
-    names: list[str]
+    def realise(self, x: FloatArray) -> Realisation:
+        """Matrices and their derivatives."""
+        ...
 
     def response(
         self, x: FloatArray, omega: FloatArray, hold: Hold | None
@@ -74,6 +76,12 @@ class EstimatedStructure(Structure, Protocol):
     def poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Poles (n,) in rad/s and their derivatives (n, P)."""
         ...
+
+
+class EstimatedStructure(Structure, Answering, Protocol):
+    """A structure that was fitted."""
+
+    names: list[str]
 
 
 @dataclass(frozen=True)

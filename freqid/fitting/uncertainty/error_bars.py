@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, numbers
-from freqid.fitting.cost.objective import EstimatedStructure
+from freqid.fitting.cost.objective import Answering
 from freqid.fitting.uncertainty.minimum import Spread
 from freqid.lti import Hold
 from freqid.models import GreyBox
@@ -47,7 +47,7 @@ def derived(
     return at, np.sqrt(np.maximum(parts.sum(axis=(-2, -1)), 0))
 
 
-def modes(structure: EstimatedStructure, x: FloatArray, spread: Spread) -> pd.DataFrame:
+def modes(structure: Answering, x: FloatArray, spread: Spread) -> pd.DataFrame:
     """Natural frequency (Hz) and damping ratio of each mode, with standard errors.
 
     Real poles have a damping ratio of 1 (−1 where they are unstable), which is no estimate and has
@@ -86,7 +86,7 @@ def modes(structure: EstimatedStructure, x: FloatArray, spread: Spread) -> pd.Da
 
 
 def pole_scatter(
-    structure: EstimatedStructure, x: FloatArray, spread: Spread
+    structure: Answering, x: FloatArray, spread: Spread
 ) -> tuple[ComplexArray, FloatArray]:
     """Poles (n,) in rad/s and the covariance of their real and imaginary parts, (n, 2, 2)."""
     poles, change = structure.poles(x)
@@ -95,7 +95,7 @@ def pole_scatter(
 
 
 def response_variance(
-    structure: EstimatedStructure,
+    structure: Answering,
     x: FloatArray,
     spread: Spread,
     omega: FloatArray,

@@ -197,24 +197,30 @@ class Spread:
 
     ``change`` is the derivative of the named values by the unknowns, (names, unknowns), or (names,)
     where each is one unknown in other units. ``given`` (unknowns, unknowns) stands for the
-    minimum's own covariance where that is not of data.
+    minimum's own covariance where that is not of data, or ``half`` (unknowns, k), of which that is
+    the product with its transpose.
     """
 
     change: FloatArray
     minimum: Minimum | None = None
     given: FloatArray | None = None
+    half: FloatArray | None = None
 
     @cached_property
     def of_unknowns(self) -> FloatArray:
         """Covariance of the unknowns."""
         if self.given is not None:
             return self.given
+        if self.half is not None:
+            return self.half @ self.half.T
         assert self.minimum is not None
         return self.minimum.covariance
 
     @cached_property
     def factor(self) -> FloatArray:
         """F (unknowns, k) with F Fᵀ the covariance of what is known of the unknowns."""
+        if self.half is not None:
+            return self.half
         if self.given is None and self.minimum is not None:
             return self.minimum.factor
         return root(self.known(0.0))
