@@ -120,17 +120,26 @@ class _Evaluation:
         return np.ascontiguousarray(values.reshape(*values.shape[:-3], -1)).view(float)
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        """Derivative of the residual by each parameter, (P, rows)."""
+        """Derivative of the residual by each parameter, (P, rows).
+
+        With w = C⁻¹ e and H = C_U Gᴴ − C_UY it is L⁻¹ dG (U − ½ H w) − ½ L⁻¹ Hᴴ dGᴴ w: at each line
+        a matrix times the entries of dG and another times their conjugates, for all parameters.
+        """
         assert self.dG is not None
-        weighted = np.einsum("ekba,ekb->eka", self.inverse.conj(), self._scaled())
-        rows = []
-        for dG in self.dG:
-            change = np.einsum("kpm,ekm->ekp", dG, self.U)
-            half = dG @ self.C_U @ self.G.conj().swapaxes(-1, -2) - dG @ self.C_UY
-            dC = half + half.conj().swapaxes(-1, -2)
-            moved = change - 0.5 * np.einsum("ekab,ekb->eka", dC, weighted)
-            rows.append(self._rows(np.einsum("ekab,ekb->eka", self.inverse, moved)))
-        return np.array(rows)
+        P, K, p, m = self.dG.shape
+        w = np.einsum("ekba,ekb->eka", self.inverse.conj(), self._scaled())
+        H = self.C_U @ self.G.conj().swapaxes(-1, -2) - self.C_UY
+        seen = self.U - 0.5 * np.einsum("ekmp,ekp->ekm", H, w)
+        back = self.inverse @ H.conj().swapaxes(-1, -2)
+        own = self.inverse[..., None] * seen[:, :, None, None, :]  # (E, K, p, p, m)
+        other = -0.5 * back[:, :, :, None, :] * w[:, :, None, :, None]
+        by_entry, by_conjugate = (
+            M.transpose(1, 3, 4, 0, 2).reshape(K, p * m, -1) for M in (own, other)
+        )
+        entries = self.dG.transpose(1, 0, 2, 3).reshape(K, P, p * m)
+        change = entries @ by_entry
+        change += entries.conj() @ by_conjugate
+        return self._rows(change.reshape(K, P, -1, p).transpose(1, 2, 0, 3))
 
     def _scaled(self) -> ComplexArray:
         scaled: ComplexArray = np.einsum("ekab,ekb->eka", self.inverse, self.error)
