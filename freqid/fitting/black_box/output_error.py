@@ -16,6 +16,7 @@ from freqid.fitting.black_box.refinement import (
     scattered_model,
 )
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
+from freqid.fitting.black_box.stability_edge import at_the_edge, held_back
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
@@ -71,6 +72,11 @@ def fit_output_error(
         at = chart.in_z(solution.x)
         centre = Chart(at, spec.feedthrough, Plane(), dt, stable=spec.stable)
         chart, solution, objective = _descend(centre, samples)
+    edge = None
+    if spec.stable and not solution.converged:
+        edge = at_the_edge(chart, solution.x, objective.experiments)
+    if edge is not None:
+        chart, solution, objective = edge
     model = DiscreteModel(chart.in_z(solution.x), dt, first.hold, *common_names([first.data]))
     est = coefficient_estimate(
         model,
@@ -80,6 +86,8 @@ def fit_output_error(
         first.hold,
         dt,
     )
+    if edge is not None:
+        est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution)])
     return dataclasses.replace(est, n_starts=more)
 
 

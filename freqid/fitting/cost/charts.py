@@ -8,6 +8,7 @@ any order and for any number of channels, where coefficients of polynomials are 
 
 from __future__ import annotations
 
+import copy
 import warnings
 
 import numpy as np
@@ -95,6 +96,17 @@ class Chart:
     def around(self, centre: StateSpace) -> Chart:
         """A chart like this one around another model."""
         return Chart(centre, self.feedthrough, self.plane, self.dt, stable=self.stable)
+
+    def holding(self, slopes: FloatArray) -> Chart:
+        """The same chart without the directions along which something changes whose derivatives by
+        its unknowns are these, (c, unknowns).
+        """
+        kept = scipy.linalg.null_space(slopes).T
+        same = copy.copy(self)
+        same._directions = kept @ self._directions
+        same.size, same.derivative = len(kept), same._parted(same._directions)
+        same.lower, same.upper = np.full(same.size, -np.inf), np.full(same.size, np.inf)
+        return same
 
     def describe(self, x: FloatArray) -> str:
         """Said of the trial point in errors."""

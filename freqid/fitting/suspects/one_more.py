@@ -114,7 +114,8 @@ def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:
     """What is compared with a larger black box, none itself or one; None where nothing is."""
     model, minimum = inquiry.model, inquiry.minimum
     structure = minimum.structure
-    if model.late or isinstance(structure, PlacedStructure) or minimum.prior is not None:
+    late = model.late or bool(getattr(model, "delay_sources", ()))
+    if late or isinstance(structure, PlacedStructure) or minimum.prior is not None:
         return None
     if isinstance(structure, GreyStructure):
         return structure.at(minimum.x, 0)

@@ -1,0 +1,89 @@
+"""Stable black boxes that the data want to grow: the least cost with poles on the unit circle.
+
+Steps that leave the circle are refused, so that a descent stops wherever it meets it. Here poles
+that want to leave are held at their radius, and everything else goes to its minimum (an active set:
+Nocedal and Wright, Numerical Optimization, 2006, section 15.2).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from freqid.checks import BoolArray, FloatArray, InputError
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.experiments import Experiment
+from freqid.fitting.cost.held_charts import HeldChart, radial
+from freqid.fitting.cost.objective import Objective, Point
+from freqid.fitting.findings import Finding
+from freqid.fitting.search.descent import Solution, polish
+
+# a pole this near to the circle may be held there
+_NEAR = 1e-3
+# rounds at the most, evaluations of each, and the relative gain of the cost that ends one
+_ROUNDS, _STEPS, _GAIN = 12, 80, 1e-9
+# part of the cost that a round gains at the least while it goes on
+_CREEPS = 1e-7
+
+Edge = tuple[Chart, Solution, Objective]
+
+
+def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) -> Edge | None:
+    """The minimum from a point of a stable chart where a descent met the circle, with the poles
+    held that want to leave it; None where the rounds do not end.
+    """
+    centre, before, held_before = chart.matrices(x), np.inf, -1
+    edge: Edge | None = None
+    for _ in range(_ROUNDS):
+        free = chart.around(centre)
+        free.stable = False
+        point = Objective(free, experiments).point(np.zeros(free.size))
+        if point is None:
+            return None
+        leaving = _leaving(free, point)
+        count = int(leaving.sum())
+        if edge is not None and count == held_before:
+            return edge
+        if count == len(leaving) or count == held_before == 0:
+            # nothing is left to move, or what is free inside of the circle met it again
+            return None
+        held = HeldChart(free, leaving) if count else chart.around(centre)
+        objective = Objective(held, experiments)
+        try:
+            found = polish(objective, np.zeros(held.size), limit=_STEPS, tolerance=_GAIN)
+        except InputError:
+            return None
+        # a pair that wants to part into two real poles creeps towards where they meet
+        if not found.converged and count and found.cost > before * (1 - _CREEPS):
+            found = dataclasses.replace(found, converged=True)
+        centre, held_before, before = held.matrices(found.x), count, found.cost
+        edge = (held, found, objective) if found.converged else None
+    return None
+
+
+def _leaving(chart: Chart, point: Point) -> BoolArray:
+    """Which poles next to the circle, or beyond, the next step would take outwards."""
+    P = chart.size
+    R, c = point.triangle[:P, :P], point.triangle[:P, P]
+    step = -np.linalg.lstsq(R, c)[0]
+    size, slope = radial(chart.centre.A, chart.derivative.A)
+    leaving: BoolArray = (size > 1 - _NEAR) & (size + slope @ step > 1)
+    return leaving
+
+
+def held_back(chart: Chart, solution: Solution) -> list[Finding]:
+    """What is said of the poles that are held."""
+    if not isinstance(chart, HeldChart):
+        return []
+    frequency = chart.held_frequencies(solution.x)
+    which = ", ".join(f"{f:.4g}" for f in frequency)
+    one = len(frequency) == 1
+    found = Finding(
+        "edge of a bound",
+        f"{'a motion' if one else 'motions'} at {which} Hz {'does' if one else 'do'} not fade: the "
+        "data want more, which stable=True forbids, as noise of few lines does; fit a lower order",
+        number=float(len(frequency)),
+    )
+    return [found]
