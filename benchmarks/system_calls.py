@@ -48,18 +48,24 @@ def _asked(function, *args, before=None):
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
-        os.close(answer)
-        os.close(go)
-        os.read(wait, 1)
         try:
-            result = function(*args)
-        except BaseException as error:
-            result = (type(error).__mro__[:-1], str(error))
-        # kept open until the end, so that its number is none that is watched
-        os.write(said, pickle.dumps(result))
-        os._exit(0)
+            os.close(answer)
+            os.close(go)
+            # calls are counted, and fail, from here on
+            os.write(said, b".")
+            os.read(wait, 1)
+            try:
+                result = function(*args)
+            except BaseException as error:
+                result = (type(error).__mro__[:-1], str(error))
+            # kept open until the end, so that its number is none that is watched
+            os.write(said, pickle.dumps(result))
+        finally:
+            # whatever happens, the double of this process goes no further
+            os._exit(0)
     os.close(said)
     os.close(wait)
+    os.read(answer, 1)
     watching = before(child) if before else None
     os.write(go, b".")
     os.close(go)
