@@ -214,7 +214,7 @@ def test_lines_that_share_their_noise_are_counted_once():
 
 def test_a_delay_one_too_long_is_not_chosen_for_a_pole_that_grows():
     """b/(s + a) 4.3 samples late: behind five samples order 2 has a pole at −340, an advance."""
-    for seed in range(2):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         u = rng.standard_normal(3000)
         late = np.r_[np.zeros(43), np.repeat(u, 10)][: 10 * len(u)]

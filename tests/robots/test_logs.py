@@ -158,7 +158,7 @@ def test_the_error_bar_of_an_offset_in_noise(plant):
     u = fq.chirp(5, 60, 4, 1e-3)
     u_time, y_time = 1e-3 * np.arange(len(u)), 0.05 + 1e-3 * np.arange(3900)
     y, score = simulated(plant, u_time, u, y_time), []
-    for seed in range(10):
+    for seed in range(20):
         noise = 0.05 * y.std() * np.random.default_rng(seed).standard_normal(len(y))
         record = fq.Record.from_logs(u_time, u, y_time - 0.0042, y + noise, offset="estimate")
         est = fq.fit(plant, record, start=start_of(plant))

@@ -223,7 +223,7 @@ def test_error_bars_of_stamps_whose_noise_is_unlike():
         given.append((u_time, u, y_time[:count], y[:count]))
     clean = [fq.Record.from_logs(*g) for g in given]
     pulls = []
-    for seed in range(24):
+    for seed in range(40):
         data = [r.with_noise(size, seed=10 * seed + i)
                 for i, (r, size) in enumerate(zip(clean, (0.5, 0.02), strict=True))]  # fmt: skip
         est = fq.fit(LAG, data, separate="a")
