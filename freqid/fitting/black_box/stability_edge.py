@@ -15,7 +15,7 @@ import numpy as np
 from freqid.checks import BoolArray, FloatArray, InputError
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment
-from freqid.fitting.cost.held_charts import HeldChart, radial
+from freqid.fitting.cost.held_charts import RADIUS, HeldChart, radial
 from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.findings import Finding
 from freqid.fitting.search.descent import Solution, polish
@@ -24,6 +24,8 @@ from freqid.fitting.search.descent import Solution, polish
 _NEAR = 1e-3
 # rounds at the most, evaluations of each, and the relative gain of the cost that ends one
 _ROUNDS, _STEPS, _GAIN = 12, 80, 1e-9
+# how far rounding takes a pole that is held from its radius
+_ROUNDED = 1e-9
 # part of the cost that a round gains at the least while it goes on
 _CREEPS = 1e-7
 
@@ -44,7 +46,7 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
             return None
         leaving = _leaving(free, point)
         count = int(leaving.sum())
-        if edge is not None and count == held_before:
+        if edge is not None and (leaving == _at_radius(free)).all():
             return edge
         if count == len(leaving) or count == held_before == 0:
             # nothing is left to move, or what is free inside of the circle met it again
@@ -61,6 +63,12 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
         centre, held_before, before = held.matrices(found.x), count, found.cost
         edge = (held, found, objective) if found.converged else None
     return None
+
+
+def _at_radius(chart: Chart) -> BoolArray:
+    """Which poles are where they were held."""
+    at: BoolArray = np.abs(np.abs(np.linalg.eigvals(chart.centre.A)) - RADIUS) < _ROUNDED
+    return at
 
 
 def _leaving(chart: Chart, point: Point) -> BoolArray:
