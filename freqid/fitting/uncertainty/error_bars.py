@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 _STEP = 1e-6
 # a pole of this part of the fastest one's size is at zero, up to rounding
 _INTEGRATES = 1e-10
+# what is told of a mode
+_MODE = (
+    "frequency", "frequency_std", "damping", "damping_std", "time_constant", "time_constant_std"
+)  # fmt: skip
 
 
 def derived(
@@ -82,7 +86,7 @@ def modes(structure: Answering, x: FloatArray, spread: Spread) -> pd.DataFrame:
                 "time_constant_std": np.sqrt(size_var) / size**2 if real and known else np.nan,
             }
         )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_MODE)
 
 
 def pole_scatter(
