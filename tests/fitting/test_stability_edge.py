@@ -107,3 +107,53 @@ def test_what_is_stable_by_itself_is_left_alone():
     free, stable = (fq.fit(fq.OutputError(2, stable=s), record) for s in (False, True))
     assert stable.cost == pytest.approx(free.cost, rel=1e-6)
     assert "edge of a bound" not in [w.kind for w in stable.warnings]
+
+
+W = 2 * np.pi * 6
+ALONE = {
+    "growing lag": ([1.0], [1.0, -0.2], 1),
+    "double integrator": ([1.0], [1.0, 0.0, 0.0], 2),
+    "growing mode": ([1.0], [1.0, -0.01 * W, W * W], 2),
+    "two growing modes": (
+        [3.0, 0.0, 1.0], np.polymul([1.0, -0.01 * W, W * W], [1.0, -0.02 * W, 4 * W * W]), 4
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("plant", ALONE)
+def test_every_pole_may_be_held(plant):
+    """Where no pole was free nothing was held: not converged, and never the edge of a bound."""
+    above, below, order = ALONE[plant]
+    sampled = scipy.signal.cont2discrete(scipy.signal.tf2ss(above, below), DT)[:4]
+    b, a = scipy.signal.ss2tf(*sampled)
+    met = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        u = rng.standard_normal(400)
+        y = scipy.signal.lfilter(b[0], a, u)
+        record = fq.Record(u, y + 0.05 * y.std() * rng.standard_normal(400), DT)
+        free = fq.fit(fq.OutputError(order), record)
+        if np.abs(free.model.poles).max() < 1 + 1e-6:
+            continue
+        met += 1
+        est = fq.fit(fq.OutputError(order, stable=True), record)
+        assert (np.abs(est.model.poles) < 1).all()
+        assert "edge of a bound" in [w.kind for w in est.warnings]
+        assert est.cost >= free.cost * (1 - 1e-6)
+    assert met > 3
+
+
+def test_motions_that_do_not_fade_in_data_without_noise():
+    """A last step over the circle ended in "the model is unstable there", a bare error."""
+    w, v = 2 * np.pi * 5, 2 * np.pi * 14
+    above = np.polyadd([(w) ** 2, 0, (w * v) ** 2], [0.5 * v**2, 0, 0.5 * (w * v) ** 2])
+    below = np.polymul([1, 0, w**2], [1, 0, v**2])
+    A, B, C, _, _ = scipy.signal.cont2discrete(scipy.signal.tf2ss(above, below), DT)
+    u = scipy.signal.chirp(DT * np.arange(150), 0.67, 1.49, 45)
+    x, y = np.zeros(4), np.zeros(150)
+    for k in range(150):
+        y[k] = C[0] @ x
+        x = A @ x + B[:, 0] * u[k]
+    est = fq.fit(fq.OutputError(4, stable=True), fq.Record(u, y, DT))
+    poles = np.sort(np.abs(np.angle(est.model.poles)))[::2]
+    assert poles == pytest.approx([w * DT, v * DT], rel=1e-4)

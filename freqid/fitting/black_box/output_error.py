@@ -16,7 +16,7 @@ from freqid.fitting.black_box.refinement import (
     scattered_model,
 )
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.black_box.stability_edge import at_the_edge, held_back
+from freqid.fitting.black_box.stability_edge import at_the_edge, held_back, pressed
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
@@ -49,6 +49,10 @@ _STILL = 3.0
 _CHARTS = 5
 # how far inside of the unit circle a pole of a stable start lies at the least
 _EDGE = 1e-9
+# and one of what is found, which rounding may have put on it
+_END = 1e-12
+# a minimum at the circle that costs so many times more is another one
+_LIKE = 1.001
 
 
 @fits(OutputError, black_box=True)
@@ -73,7 +77,7 @@ def fit_output_error(
         centre = Chart(at, spec.feedthrough, Plane(), dt, stable=spec.stable)
         chart, solution, objective = _descend(centre, samples)
     edge = None
-    if spec.stable and not solution.converged:
+    if spec.stable and (not solution.converged or pressed(chart, solution.x)):
         edge = at_the_edge(chart, solution.x, objective.experiments)
     if edge is not None:
         chart, solution, objective = edge
@@ -147,10 +151,10 @@ def _unstable(found: Descent) -> bool:
     return bool((np.abs(np.linalg.eigvals(chart.in_z(solution.x).A)) > 1).any())
 
 
-def within_circle(start: StateSpace) -> StateSpace:
+def within_circle(start: StateSpace, inside: float = _EDGE) -> StateSpace:
     """The same where rounding has put a pole that may not leave the unit circle on it."""
     radius = float(np.abs(np.linalg.eigvals(start.A)).max(initial=0.0))
-    return start if radius < 1 else start._replace(A=start.A * ((1 - _EDGE) / radius))
+    return start if radius <= 1 - inside else start._replace(A=start.A * ((1 - inside) / radius))
 
 
 def _enough_lines(

@@ -22,6 +22,8 @@ from freqid.fitting.search.descent import Solution, polish
 
 # a pole this near to the circle may be held there
 _NEAR = 1e-3
+# and one this near has met it
+_MET = 1e-6
 # rounds at the most, evaluations of each, and the relative gain of the cost that ends one
 _ROUNDS, _STEPS, _GAIN = 12, 80, 1e-9
 # how far rounding takes a pole that is held from its radius
@@ -42,14 +44,14 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
         free = chart.around(centre)
         free.stable = False
         point = Objective(free, experiments).point(np.zeros(free.size))
-        if point is None:
+        if point is None or not np.isfinite(point.triangle).all():
             return None
         leaving = _leaving(free, point)
         count = int(leaving.sum())
         if edge is not None and (leaving == _at_radius(free)).all():
             return edge
-        if count == len(leaving) or count == held_before == 0:
-            # nothing is left to move, or what is free inside of the circle met it again
+        if count == held_before == 0:
+            # what is free inside of the circle met it again
             return None
         held = HeldChart(free, leaving) if count else chart.around(centre)
         objective = Objective(held, experiments)
@@ -63,6 +65,11 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
         centre, held_before, before = held.matrices(found.x), count, found.cost
         edge = (held, found, objective) if found.converged else None
     return None
+
+
+def pressed(chart: Chart, x: FloatArray) -> bool:
+    """Whether a pole has met the circle, where steps may end that would go on beyond."""
+    return bool(np.abs(np.linalg.eigvals(chart.matrices(x).A)).max(initial=0.0) > 1 - _MET)
 
 
 def _at_radius(chart: Chart) -> BoolArray:

@@ -88,6 +88,10 @@ class Chart:
             raise ArithmeticError("the model is unstable there")
         return Realisation.of(Linearisation(at, self.derivative))
 
+    def linearised(self, x: FloatArray) -> Linearisation:
+        """The state space at x and its derivatives, where a last step left the circle as well."""
+        return Linearisation(self.matrices(x), self.derivative)
+
     def moved(self, x: FloatArray) -> Chart:
         """A chart around the model at x."""
         moves, centre = self.moves + 1, self.matrices(x)
@@ -120,7 +124,7 @@ class Chart:
 
     def poles(self, x: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Poles (n,) in rad/s and their derivatives by x (n, P)."""
-        return poles_in_plane(self.realise(x).linearisation, self.plane, self.dt)
+        return poles_in_plane(self.linearised(x), self.plane, self.dt)
 
     def in_z(self, x: FloatArray) -> StateSpace:
         """The state space at x in the z plane."""
@@ -161,6 +165,8 @@ def _kron(A: FloatArray, B: FloatArray) -> FloatArray:
 def balanced(model: StateSpace) -> StateSpace:
     """The same model with reachability and observability Gramians equal, where it is stable."""
     A, B, C, D = model
+    if not len(A):
+        return model
     if np.abs(np.linalg.eigvals(A)).max() >= 1 - 1e-9:
         size_B, size_C = float(np.linalg.norm(B)), float(np.linalg.norm(C))
         ratio = np.sqrt(size_C / size_B) if size_B and size_C else 1.0

@@ -26,7 +26,7 @@ def radial(A: FloatArray, dA: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 class HeldChart(Chart):
     """Models near the centre of a chart with those of its poles ``held`` (n,), in the order of
-    ``numpy.linalg.eigvals``, on the circle. There has to be one that is free.
+    ``numpy.linalg.eigvals``, on the circle.
     """
 
     def __init__(self, chart: Chart, held: BoolArray) -> None:
@@ -61,6 +61,10 @@ class HeldChart(Chart):
         if np.abs(np.linalg.eigvals(at.A)).max() >= 1:
             raise ArithmeticError("the model is unstable there")
         return Realisation.of(Linearisation(at, self._slopes(x)))
+
+    def linearised(self, x: FloatArray) -> Linearisation:
+        """The state space at x and its derivatives there."""
+        return Linearisation(self.matrices(x), self._slopes(x))
 
     def _each(self, x: FloatArray) -> list[StateSpace]:
         split = np.split(x, self._ends[:-1], axis=-1)
