@@ -33,6 +33,8 @@ from freqid.models import DiscreteModel, GreyBox, Model, late_sampled, observed_
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
+# rates of lags, over the lines, from which pairs of them begin
+_RATES = 4
 # part of a line's noise that is no gain
 _CHANCE = 0.05
 # a cost that is less by this part is that of another minimum
@@ -92,14 +94,16 @@ class Reference:
         seen = SampledLines.of(model, readings, count, stable)
         if seen.bilinear or not all(e.single and e.one_to_one for e in seen.lines):
             raise InputError("several channels, or lines without a hold, have no rational function")
-        pair = [] if mode is None else [seen.plane.points(np.array([mode, np.conj(mode)]))]
+        begun = _lags(seen.lines, model.dt or readings[0].sample_time)
+        begun += [] if mode is None else [np.array([mode, np.conj(mode)])]
+        pairs = [seen.plane.points(pair) for pair in begun]
         # what is not seen of the plant is not seen of its samples
         W, X = observed(model.state_space(), observed_order(model))
         own = to_plane(reduced(_held(model, readings[0].hold), W, X), seen.plane)
         poles = np.linalg.eigvals(own.A).astype(complex)
         gain = _CHANCE / sum(e.n_rows for e in seen.lines)
         try:
-            centre, left = with_a_pair(seen.lines, poles, pair, (seen.direct, stable), gain, worth)
+            centre, left = with_a_pair(seen.lines, poles, pairs, (seen.direct, stable), gain, worth)
             if centre is None:
                 return None, left
             return cls._descended(seen.objective(centre), seen.bilinear), left
@@ -237,6 +241,16 @@ class Reference:
         """Standard error of the rows that it leaves."""
         freedom = self.objective.n_rows - self.unknowns - self.solution.point.n_initial
         return float(np.sqrt(self.cost / max(freedom, 1)))
+
+
+def _lags(lines: Sequence[SpectralExperiment], dt: float) -> list[ComplexArray]:
+    """Pairs of real poles in z, a slow one and a fast one: two lags taken for one leave no peak."""
+    omega = np.concatenate([e.lines.omega for e in lines])
+    low, high = omega[omega > 0].min(initial=np.inf), omega.max(initial=0.0)
+    if not low < high:
+        return []
+    z = np.exp(-np.geomspace(low, high, _RATES) * dt).astype(complex)
+    return [np.array([slow, fast]) for slow, fast in zip(z, z[_RATES // 2 :], strict=False)]
 
 
 def _held(model: GreyBox | DiscreteModel, hold: Hold) -> StateSpace:

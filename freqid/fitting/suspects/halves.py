@@ -15,6 +15,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.parts import Parting, confirming
+from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import CURES
 from freqid.fitting.suspects.spread import ELSEWHERE, LEVEL, compared, loudest
@@ -45,11 +46,13 @@ def modes_moved(own: ComplexArray, others: Sequence[ComplexArray | None]) -> flo
     return float(np.abs(np.array(near) - 1).max())
 
 
-def confirmed(inquiry: Asking, said: Sequence[Asked], found: Sequence[Finding]) -> list[Finding]:
+def confirmed(
+    inquiry: Asking, scene: Scene, said: Sequence[Asked], found: Sequence[Finding]
+) -> list[Finding]:
     """What was said of a black box, minor where the modes of both halves of its data agree.
 
     Its unknowns have no standard errors that mean anything: its modes have. What it lacks much of
-    halves lack alike.
+    halves lack alike, and a gain that changes leaves modes where they are.
     """
     halves = confirming(inquiry.readings)
     if halves is None:
@@ -60,7 +63,7 @@ def confirmed(inquiry: Asking, said: Sequence[Asked], found: Sequence[Finding]) 
         return list(found)
     text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
     return [
-        f if a.harm >= _MUCH
+        f if a.harm >= _MUCH or (a.name == "unsteady" and a.test.gain >= _MUCH * scene.moving)
         else Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number)
         for f, a in zip(found, said, strict=True)
     ]  # fmt: skip

@@ -205,7 +205,7 @@ class Inquiry:
             return found
         lacking = [a for a in named if a.harm >= LITTLE]
         more = [self._finding(scene, a) for a in lacking if a not in said]
-        return [*confirmed(self, said, found), *more]
+        return [*confirmed(self, scene, said, found), *more]
 
     @cached_property
     def _unphysical(self) -> bool:

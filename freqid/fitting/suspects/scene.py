@@ -93,6 +93,11 @@ class Scene:
         return dataclasses.replace(self, more=directions(kept, LOOSE)[2])
 
     @cached_property
+    def moving(self) -> float:
+        """The energy of all lines but those at zero: a constant says nothing of what moves."""
+        return self.energy - sum(s.experiment.energy_at(0.0) for s in self.seen)
+
+    @cached_property
     def left(self) -> FloatArray:
         """Everything that is left, the rows of what was known before at the end."""
         rows = np.concatenate([*(s.left for s in self.seen), self.known[:, -1]])
