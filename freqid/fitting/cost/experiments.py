@@ -243,11 +243,6 @@ class SpectralExperiment:
         Y = self.lines.error(self.lines.Y)
         return float(np.vdot(Y, Y).real)
 
-    def energy_at(self, omega: float) -> float:
-        """The part of it that lies at one frequency (rad/s)."""
-        Y = self.lines.error(self.lines.Y)[..., self.lines.omega == omega]
-        return float(np.vdot(Y, Y).real)
-
     def thinned(self, part: float = 1.0, evenly: bool = False) -> SpectralExperiment:
         """About a ``part`` of the lines that count, weighted so that costs stay comparable."""
         kept, weight = self.lines.spread(part, evenly)

@@ -95,7 +95,9 @@ class Scene:
     @cached_property
     def moving(self) -> float:
         """The energy of all lines but those at zero: a constant says nothing of what moves."""
-        return self.energy - sum(s.experiment.energy_at(0.0) for s in self.seen)
+        lines = [s.experiment.lines for s in self.seen]
+        still = [each.error(each.Y)[..., each.omega == 0] for each in lines]
+        return self.energy - sum(float(np.vdot(Y, Y).real) for Y in still)
 
     @cached_property
     def left(self) -> FloatArray:
