@@ -34,7 +34,8 @@ def in_hertz(name: str, unit: str) -> float:
     plain = name.casefold().strip()
     if re.search(r"(?<![a-z])log", plain):
         raise InputError(f"column {name!r} may hold logarithms; give frequencies in Hz")
-    if not text or f"{plain}/{text}".endswith("rad/s"):
+    # "omega_rad/s" is a name and a unit of its own where the end is taken for one
+    if not text or (text == "s" and plain.endswith("rad")):
         tail = re.search(r"(?:^f|[_\s]|frequency)(hz|khz|mhz|ghz)$", plain)
         turned = re.search(r"^(w|omega|ω)(?![a-z])|rad|angular", plain)
         text = tail[1] if tail else "rad/s" if turned else "hz"

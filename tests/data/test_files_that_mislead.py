@@ -132,6 +132,7 @@ def test_columns_that_could_be_two_things_are_asked_for(put):
     ("name", "first"),
     [("Frequency kHz", 1000.0), ("fkHz", 1000.0), ("Frequency_MHz", 1e6),
      ("Angular frequency", 1 / (2 * np.pi)), ("Frequency rad/s", 1 / (2 * np.pi)),
+     ("Frequency [rad/s]", 1 / (2 * np.pi)), ("Frequency (rad/s)", 1 / (2 * np.pi)),
      ("omega_hz", 1.0)],
 )  # fmt: skip
 def test_units_in_the_names_of_frequencies(put, name, first):
