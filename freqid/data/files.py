@@ -144,7 +144,7 @@ def read(
         raise
     except InputError as error:
         text = str(error).replace(
-            _REPAIR, "start= and stop= cut the file, resample=True fills gaps"
+            _REPAIR, "read(start=, stop=) cuts the file, resample=True fills gaps"
         )
         raise InputError(f"{path}: {text} (found {found})") from None
 

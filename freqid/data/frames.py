@@ -12,7 +12,7 @@ from freqid.data.cells import no_number
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
 from freqid.data.readers.table import named
-from freqid.data.regular_time import on_a_grid
+from freqid.data.regular_time import on_a_grid, uneven
 from freqid.data.remembered import (
     as_printed,
     is_kept,
@@ -202,11 +202,7 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
         row = int(np.argmax(~(gaps > 0))) + 1
         raise InputError(f"column 'time' does not increase in row {row}; sort or repair the rows")
     if np.abs(gaps - step).max() > 0.01 * step:
-        row = int(np.argmax(np.abs(gaps - step))) + 1
-        raise InputError(
-            f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on "
-            "average; resample=True puts them on a regular grid"
-        )
+        raise InputError(uneven(times))
     if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
         raise InputError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")
     # a time column printed with few digits carries their rounding: prefer the round number

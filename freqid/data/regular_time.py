@@ -12,6 +12,8 @@ from freqid.data.printed_times import plain_period, printed_period
 
 # rows of a regular time for each that is there, beyond which a stamp is wrong and no gap
 EMPTY = 1000
+# missing samples in a row that are no longer filled well by straight lines
+_FEW = 5
 
 
 def on_a_grid(
@@ -64,3 +66,23 @@ def on_a_grid(
         else:
             new[name] = np.interp(grid, times[there], x[there])
     return new, notes
+
+
+def uneven(times: FloatArray) -> str:
+    """What is said of increasing times that are not regular: where, and what to do about it."""
+    gaps = np.diff(times)
+    step, usual = gaps.mean(), np.median(gaps)
+    row = int(np.argmax(np.abs(gaps - step))) + 1
+    said = (
+        f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on average"
+    )
+    missing = int((np.rint(gaps / usual) - 1)[gaps > 1.5 * usual].sum())
+    if gaps[row - 1] <= (_FEW + 1.5) * usual:
+        lost = f"; {missing} samples are missing" if missing else ""
+        return f"{said}{lost}; resample=True puts them on a regular grid"
+    before, after = times[row - 1] - times[0], times[row] - times[0]
+    return (
+        f"{said}; {missing} samples are missing, and lines through a long gap are no data: "
+        f"fit what lies before and after it as two records, read(stop={before:.9g}) and "
+        f"read(start={after:.9g}); resample=True fills it all the same"
+    )

@@ -92,8 +92,8 @@ def _box_of(est: Estimate) -> Written | None:
 def load(path: str | Path, model: GreyBox | None = None) -> Estimate:
     """An estimate that ``est.save`` wrote: it simulates, draws and converts as before.
 
-    What needs the data (profiles, bootstrap, suspects) is not kept; verdict, witness and warnings
-    are those that were saved.
+    What needs the data (profiles, bootstrap, spread) is not kept; verdict, witness, suspects and
+    warnings are those that were saved.
 
     Args:
         path: a .json file.

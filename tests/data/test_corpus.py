@@ -153,7 +153,7 @@ def test_a_workbook_that_begins_with_the_time_alone(tmp_path):
     record = fq.read(tmp_path / "log.xlsx", "torque", "speed", resample=True)
     assert record.units["torque"] == "N m"
     np.testing.assert_allclose(record.y[3:], Y[3:])
-    with pytest.raises(ValueError, match="start= and stop= cut the file"):
+    with pytest.raises(ValueError, match=r"read\(start=, stop=\) cuts the file"):
         fq.read(tmp_path / "log.xlsx", "torque", "speed")
     whole = fq.read(tmp_path / "log.xlsx", "torque", "speed", start=T[3] - T[0])
     np.testing.assert_allclose(whole.y, Y[3:])
@@ -322,7 +322,9 @@ def test_what_is_cut_off_may_be_damaged(tmp_path):
     frame = pd.DataFrame({"time": t, "u": np.sin(9 * t), "y": np.cos(9 * t)})
     frame.loc[60, "y"] = np.nan
     frame.to_csv(tmp_path / "r.csv", index=False)
-    with pytest.raises(ValueError, match="start= and stop= cut the file, resample=True fills"):
+    with pytest.raises(
+        ValueError, match=r"read\(start=, stop=\) cuts the file, resample=True fills"
+    ):
         fq.read(tmp_path / "r.csv")
     assert fq.read(tmp_path / "r.csv", stop=0.5).n_samples == 50
 

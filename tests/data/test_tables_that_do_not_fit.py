@@ -1,5 +1,7 @@
 """Tables, streams and records that do not fit: each is refused in words that name what is wrong."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -171,3 +173,19 @@ def test_stamps_as_durations_and_as_words():
     assert any("durations" in note for note in record.notes)
     with pytest.raises(ValueError, match="u_time must be three finite times"):
         fq.Record.from_logs(np.array(["a"] * 60, dtype="U1"), RECORD.u, 0.01 * T, RECORD.y)
+
+
+def test_a_long_gap_says_how_to_read_what_lies_around_it(tmp_path):
+    """It recommended straight lines through 200 samples, which moved all that was fitted."""
+    t = np.delete(np.arange(2000) * 1e-3, np.arange(700, 900))
+    path = tmp_path / "gap.csv"
+    u = np.sin(np.arange(len(t)) ** 1.5)
+    rows = zip(t, u, np.cumsum(u), strict=True)
+    path.write_text("time,u,y\n" + "".join(f"{a:.3f},{b:.6f},{c:.6f}\n" for a, b, c in rows))
+    with pytest.raises(ValueError, match="200 samples are missing") as said:
+        fq.read(path)
+    before, after = (float(re.search(rf"read\({w}=([\d.]+)\)", str(said.value))[1])
+                     for w in ("stop", "start"))  # fmt: skip
+    assert (before, after) == (0.699, 0.9)
+    assert fq.read(path, stop=before).n_samples == 699
+    assert fq.read(path, start=after).n_samples == 1100
