@@ -75,7 +75,7 @@ class Inquired(Protocol):
         ...
 
     def between_halves(self, est: Estimate) -> list[Finding]:
-        """Modes of a black box that differ between halves of its data."""
+        """Modes of a black box that are noise, or differ between halves of its data."""
         ...
 
     def spread(self, est: Estimate) -> pd.DataFrame:

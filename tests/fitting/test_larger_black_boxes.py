@@ -168,3 +168,41 @@ def test_a_constant_is_not_counted_with_what_moves(mean):
         assert "another mode" in [k.kind for k in low.warnings if k.severity == "serious"]
         assert not low.verdict.trusted
         assert right.verdict.trusted
+
+
+def ghost(seed, noise=0.1):
+    """A lag with a mode that steps hardly excite, in noise."""
+    below = np.polymul([1, 0.5], [1, 3.2, 6400])
+    A, B, C, D, _ = scipy.signal.cont2discrete(scipy.signal.tf2ss([1, 2, 2500.0], below), DT)
+    b, a = scipy.signal.ss2tf(A, B, C, D)
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.standard_normal(14), 125)[:1500]
+    y = scipy.signal.lfilter(b[0], a, u)
+    record = fq.Record(u, y + noise * y.std() * rng.standard_normal(1500), DT)
+    return record, np.abs(np.roots(below)) / (2 * np.pi)
+
+
+def test_a_mode_that_only_the_noise_has_is_named():
+    """14 of 38 had one, 5 to 1000 standard errors from any that is there, and were trusted."""
+    named = 0
+    for seed in range(12):
+        record, true = ghost(seed)
+        est = fq.fit(fq.OutputError(3), record)
+        modes = est.modes()
+        modes = modes[modes["damping"] < 0.5]
+        apart = [
+            np.abs(f - true).min() > 5 * std
+            for f, std in zip(modes["frequency"], modes["frequency_std"], strict=True)
+        ]
+        named += "order too high" in [w.kind for w in est.warnings]
+        assert not (any(apart) and est.verdict.trusted)
+    assert named > 3
+
+
+@pytest.mark.parametrize("past", [0.0, 0.9])
+def test_modes_that_are_there_are_no_ghosts(past):
+    for seed in range(8):
+        order = 3 + seed % 3
+        record, _ = recorded(seed, order, n=[300, 1000][seed % 2], past=past)
+        est = fq.fit(fq.OutputError(order), record)
+        assert "order too high" not in [w.kind for w in est.warnings]

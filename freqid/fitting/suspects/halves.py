@@ -36,10 +36,10 @@ def modes_moved(own: ComplexArray, others: Sequence[ComplexArray | None]) -> flo
 
     Infinite where a mode is missed in one; NaN where there are no modes.
     """
-    modes = _weakly_damped(own)
+    modes = weakly_damped(own)
     if not len(modes):
         return float("nan")
-    found = [None if p is None else _weakly_damped(p) for p in others]
+    found = [None if p is None else weakly_damped(p) for p in others]
     if any(m is None or len(m) < len(modes) for m in found):
         return float("inf")
     near = [m[np.abs(m - w).argmin()] / w for w in modes for m in found if m is not None]
@@ -121,7 +121,7 @@ def poles_of(model: Model) -> ComplexArray:
     return np.log(np.where(z == 0, 1e-300, z)) / model.dt if model.dt else z
 
 
-def _weakly_damped(poles: ComplexArray) -> FloatArray:
+def weakly_damped(poles: ComplexArray) -> FloatArray:
     """Natural frequencies (rad/s) of weakly damped poles."""
     upper = poles[poles.imag > 0]
     size = np.abs(upper)

@@ -17,6 +17,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import changing, measurement, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.beyond import looped, midway, unlike
+from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, unmirrored
 from freqid.fitting.suspects.leakage import leaking
@@ -257,12 +258,13 @@ class Inquiry:
 
     @in_one_blas_thread
     def between_halves(self, est: Estimate) -> list[Finding]:
-        """Whether modes of a black box, which no witness watches, move between halves."""
+        """Whether modes of a black box, which nothing else watches, are noise or change midway."""
         if isinstance(self.model, GreyBox) or est.problem is None or est.minimum.exact:
             return []
+        ghosts = [] if self.scene is None else in_noise(self, self.scene)
         halves = confirming(self.readings, len(est.values))
-        if halves is None or not est.converged:
-            return []
+        if ghosts or halves is None or not est.converged:
+            return ghosts
         found = modes_differ(est, halves, self.apart(halves))
         return [] if found is None else [found]
 
