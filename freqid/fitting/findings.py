@@ -74,8 +74,8 @@ class Inquired(Protocol):
         """Sentences on those that are no chance."""
         ...
 
-    def between_halves(self, est: Estimate) -> list[Finding]:
-        """Modes of a black box that are noise, or differ between halves of its data."""
+    def on_modes(self, est: Estimate, changed: bool) -> list[Finding]:
+        """Modes of a black box that are noise, or, unless a change was said, move midway."""
         ...
 
     def spread(self, est: Estimate) -> pd.DataFrame:

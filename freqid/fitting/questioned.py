@@ -42,8 +42,9 @@ class Questioned:
         ``number``. The suspects are asked when this is read for the first time.
         """
         asked = [] if self.inquiry is None else self.inquiry.findings()
-        if self.inquiry is not None and "unsteady" not in [a.kind for a in asked]:
-            asked = [*asked, *self.inquiry.between_halves(self)]  # type: ignore[arg-type]
+        if self.inquiry is not None:
+            changed = "unsteady" in [a.kind for a in asked]
+            asked = [*asked, *self.inquiry.on_modes(self, changed)]  # type: ignore[arg-type]
         return [*asked, *self.signs, *exchangeable(self.problem)]
 
     @cached_property

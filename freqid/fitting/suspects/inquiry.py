@@ -257,13 +257,13 @@ class Inquiry:
         return compared(est, [(p.between, self.apart(p)) for p in parted])
 
     @in_one_blas_thread
-    def between_halves(self, est: Estimate) -> list[Finding]:
-        """Whether modes of a black box, which nothing else watches, are noise or change midway."""
+    def on_modes(self, est: Estimate, changed: bool) -> list[Finding]:
+        """Modes of a black box that are noise, or, unless a change was said, move midway."""
         if isinstance(self.model, GreyBox) or est.problem is None or est.minimum.exact:
             return []
         ghosts = [] if self.scene is None else in_noise(self, self.scene)
         halves = confirming(self.readings, len(est.values))
-        if ghosts or halves is None or not est.converged:
+        if ghosts or changed or halves is None or not est.converged:
             return ghosts
         found = modes_differ(est, halves, self.apart(halves))
         return [] if found is None else [found]

@@ -57,13 +57,9 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     doubted = told is None or told.p_value > _RARE
     if doubted and not comparison.plain and not isinstance(inquiry.model, GreyBox):
         # a lag that the model lacks hides in weights by what it leaves: then all lines alike
-        alike = comparison.told(readings)
-        told = min((t for t in (told, alike) if t is not None), key=_p_value, default=None)
+        both = [t for t in (told, comparison.told(readings)) if t is not None]
+        told = min(both, key=lambda a: a.p_value, default=None)
     return [] if told is None else [told]
-
-
-def _p_value(asked: Asked) -> float:
-    return asked.p_value
 
 
 @dataclass(frozen=True)
