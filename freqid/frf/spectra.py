@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy
@@ -97,13 +98,14 @@ def spectra(
     any frequency that folds onto it lies inside. Raises ValueError for a band outside
     (0, Nyquist), one that holds no line, or an input that is zero over it.
 
-    A record never changes, so it keeps its spectra: each is computed once, however many fits ask.
+    A record never changes, so its spectra are kept as long as it lives: each is computed once,
+    however many fits ask.
     """
     if isinstance(record, KnownLines) and record.lines is not None:
         return record.spectra(limits)
     inside = as_band(limits, 0.5 / record.input_dt)
     key = inside, lifted and record.factor > 1
-    known: dict[tuple[Band | None, bool], Spectra] = record.__dict__.setdefault("_spectra", {})
+    known = _KNOWN.setdefault(record, {})
     if key not in known:
         computed = _compute(record, inside, key[1])
         while len(known) >= _REMEMBERED:
@@ -112,8 +114,9 @@ def spectra(
     return known[key]
 
 
-# spectra that a record keeps
+# spectra that are kept of a record, beside it: its copies and its file are its samples alone
 _REMEMBERED = 4
+_KNOWN: WeakKeyDictionary[Record, dict[tuple[Band | None, bool], Spectra]] = WeakKeyDictionary()
 
 
 def _compute(record: Record, limits: Band | None, lifted: bool) -> Spectra:

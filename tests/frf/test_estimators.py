@@ -1,11 +1,17 @@
 """Non-parametric estimates: against scipy, the true plant, and their own error bars."""
 
+import copy
+import gc
+import pickle
+import weakref
+
 import control
 import numpy as np
 import pytest
 import scipy.signal
 
 import freqid as fq
+from freqid.frf.spectra import spectra
 
 T1 = 0.5e-3
 
@@ -21,6 +27,21 @@ def light():
 def rms(frf, model, hold):
     true = model.frequency_response(frf.omega, hold).response
     return np.sqrt(np.mean(np.abs(frf.response / true - 1) ** 2))
+
+
+def test_spectra_are_kept_beside_a_record_for_as_long_as_it_lives():
+    record = fq.simulate(fq.first_order(), fq.white_noise(2000, seed=0), 1e-3)
+    before = len(pickle.dumps(record))
+    kept = spectra(record)
+    assert spectra(record) is kept
+    assert len(pickle.dumps(record)) == before
+    again = copy.copy(record)
+    assert spectra(again) is not kept
+    np.testing.assert_array_equal(spectra(again).Y, kept.Y)
+    gone = weakref.ref(kept)
+    del kept, record
+    gc.collect()
+    assert gone() is None
 
 
 @pytest.mark.parametrize("window", ["hann", ("tukey", 0.5), "boxcar"])
