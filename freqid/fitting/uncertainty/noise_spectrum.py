@@ -57,29 +57,29 @@ def _autoregressive(power: FloatArray) -> FloatArray:
     Signals, 2005, sections 3.5.1 and C.8).
     """
     K = power.shape[1]
-    shape = np.ones(power.shape)
     most = min(_ORDERS, K // _ORDER_LINES)
+    shape = np.ones(power.shape)
     if most < 1:
         return shape
-    for row, one in enumerate(power):
-        r = scipy.fft.irfft(one)[: most + 1]
-        if not r[0] > 0:
-            continue
-        a, left = np.ones(1), float(r[0])
-        best, chosen = 2 * K * np.log(left), a
-        for order in range(1, most + 1):
-            k = -float(a @ r[order:0:-1]) / left
-            a = np.append(a, 0.0) + k * np.append(0.0, a[::-1])
-            left *= 1 - k**2
-            if not left > 1e-12 * r[0]:
-                break
-            criterion = 2 * K * np.log(left) + order * np.log(2 * K)
-            if criterion < best:
-                best, chosen = criterion, a
-        if len(chosen) > 1:
-            angle = np.pi * np.arange(K) / max(K - 1, 1)
-            gain = np.abs(np.polyval(chosen[::-1], np.exp(-1j * angle))) ** 2
-            shape[row] = 1 / np.maximum(gain, 1e-300)
+    r = scipy.fft.irfft(power, axis=-1)[:, : most + 1]
+    going = r[:, 0] > 0
+    left = np.where(going, r[:, 0], 1.0)
+    a = np.zeros_like(r)
+    a[:, 0] = 1.0
+    chosen, best = a.copy(), 2 * K * np.log(left)
+    for order in range(1, most + 1):
+        k = -(a[:, :order] * r[:, order:0:-1]).sum(axis=1) / left
+        a[:, : order + 1] += k[:, None] * a[:, order::-1]
+        going &= left * (1 - k**2) > 1e-12 * r[:, 0]
+        left = np.where(going, left * (1 - k**2), left)
+        criterion = 2 * K * np.log(left) + order * np.log(2 * K)
+        better = going & (criterion < best)
+        best[better], chosen[better] = criterion[better], a[better]
+    coloured = chosen[:, 1:].any(axis=1)
+    if coloured.any():
+        z = np.exp(-1j * np.pi * np.arange(K) / max(K - 1, 1))
+        gain = np.abs(np.polynomial.polynomial.polyval(z, chosen[coloured].T)) ** 2
+        shape[coloured] = 1 / np.maximum(gain, 1e-300)
     return shape
 
 
