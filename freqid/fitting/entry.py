@@ -34,7 +34,7 @@ from freqid.fitting.robust import robust_fit
 from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
 from freqid.frf import stretches
-from freqid.lti import Hold, InputHolds, in_one_blas_thread
+from freqid.lti import Hold, InputHolds, tuned
 from freqid.models import GreyBox
 
 _LOG = logging.getLogger(__name__)
@@ -50,7 +50,7 @@ _KNOWN = (grey_box, black_box)
     fixed="what is known is the model's; model.fix('k')",
     method="there is one; start, n_starts and weights are what can be chosen",
 )
-@in_one_blas_thread
+@tuned
 def fit(
     model: object,
     data: DataSet | Sequence[DataSet] | Stream,

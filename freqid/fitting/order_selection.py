@@ -25,7 +25,7 @@ from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
-from freqid.lti import Hold, Plane, in_one_blas_thread
+from freqid.lti import Hold, Plane, tuned
 from freqid.models import OutputError
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ _FOLDS = 4
 _CERTAIN = 30.0
 
 
-@in_one_blas_thread
+@tuned
 def select_order(
     data: Record | FrequencyResponse,
     orders: Iterable[int],
@@ -125,7 +125,7 @@ def _chosen(scores: FloatArray, mdl: FloatArray, growing: BoolArray) -> int:
     return other if mdl[other] - mdl[best] < _CERTAIN else best
 
 
-@in_one_blas_thread
+@tuned
 def _row_of(
     reading: Reading, late: tuple[int, int], stable: bool, asked: tuple[int, bool, int]
 ) -> dict[str, object]:

@@ -34,7 +34,7 @@ from freqid.fitting.search.verdict import Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom, shared
-from freqid.lti import in_one_blas_thread
+from freqid.lti import tuned
 from freqid.models import Model, observed_order
 
 # level below which the black box explains the data so much better that it is no chance
@@ -84,7 +84,7 @@ class Testimony:
         """The same where the minimum was found by an earlier search."""
         return dataclasses.replace(self, n_agreed=search.n_agreed)
 
-    @in_one_blas_thread
+    @tuned
     def __call__(self) -> Witness:
         """The witness; absent, with the reason, where there is none."""
         structure = self.minimum.structure

@@ -29,6 +29,7 @@ from freqid.data import (
 from freqid.frf.local_windows import Form, Lines, Local, inflation, local_models
 from freqid.frf.measured import measured
 from freqid.frf.spectra import spectra
+from freqid.lti import tuned
 
 # where the noise of a response is so many times what one input without a transient would leave, in
 # one window of ten, windows are widened, up to a part of all lines
@@ -100,6 +101,7 @@ def local_rational(
     return _estimate(records, order, order, band, width, reference)
 
 
+@tuned
 def _estimate(
     records: Record | Sequence[Record],
     order: int,

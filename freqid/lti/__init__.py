@@ -34,4 +34,4 @@ from freqid.lti.responses import (
 from freqid.lti.rounding import VISIBLE, rounding, sentence, warn_of_rounding
 from freqid.lti.sampled import sum_runs
 from freqid.lti.state_space import Linearisation, StateSpace
-from freqid.lti.threads import in_one_blas_thread
+from freqid.lti.tuning import keep_freed_memory, tuned

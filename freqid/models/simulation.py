@@ -20,7 +20,15 @@ from freqid.checks import (
     samples,
 )
 from freqid.data import Record, as_holds
-from freqid.lti import Hold, InputHolds, PeriodicHold, Sampled, ZeroOrderHold, warn_of_rounding
+from freqid.lti import (
+    Hold,
+    InputHolds,
+    PeriodicHold,
+    Sampled,
+    ZeroOrderHold,
+    keep_freed_memory,
+    warn_of_rounding,
+)
 from freqid.models.conversion import ModelLike, as_model
 from freqid.models.model import Model
 
@@ -186,6 +194,7 @@ def simulate(
         raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
     if not plant.dt:
         warn_of_rounding(system, between, np.pi / dt * np.geomspace(0.1, 1, 3))
+    keep_freed_memory()
     y = np.zeros((len(u), len(system.C)))
     groups = between.groups if isinstance(between, InputHolds) else [(between, list(range(m)))]
     for number, (each, members) in enumerate(groups):

@@ -1,5 +1,7 @@
 """Records of one shape at once: the same cost, minimum and error bars, and none where in doubt."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -187,3 +189,28 @@ def test_of_long_records_a_part_of_the_lines_raises_no_more_doubts():
     records = [clean.with_noise(0.01 * float(clean.y.std()), seed=i) for i in range(60)]
     found = minima(plant, records, {"start": {"b": 120.0, "a": 80.0}})
     assert sum(each is None for each in found) <= 5
+
+
+def test_memory_does_not_grow_with_the_records():
+    plant, records = runs("lag", count=320, samples=4000)
+    own = records[0].u.nbytes + records[0].y.nbytes
+
+    def fitted(count):
+        """What is left of so many records more, and the most on the way."""
+        tracemalloc.start()
+        some = records[:count]
+        table = fq.fit_many(plant, some, verdicts=False, n_jobs=1, chunk=count, progress=False)
+        told = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert (table["error"] == "").all()
+        return told
+
+    # modules that are imported on the way
+    fitted(9)
+    most = {}
+    for count in (160, 320):
+        left, most[count] = fitted(count)
+        # records that keep their lines grow to twice their own size
+        assert left < 8 * own
+    # all of a chunk at once were four times the records: 40 MB more
+    assert most[320] < most[160] + 16 * own

@@ -61,6 +61,23 @@ class ManyPoints:
         return np.asarray(self.jacobian - seen @ self.transient)
 
 
+@dataclass(frozen=True)
+class Part:
+    """About so much of the ``lines`` (K,) of experiments of one shape, each times a ``factor`` (K,)
+    as often as it stands for others; ``first`` is the first of them there.
+    """
+
+    lines: IntArray
+    factor: FloatArray
+    first: SpectralExperiment
+
+    @classmethod
+    def of(cls, first: SpectralExperiment, part: float, evenly: bool = False) -> Part:
+        """A ``part`` of the lines, ``evenly`` spread or where the energy is."""
+        lines, weight = first.lines.spread(part, evenly)
+        return cls(lines, np.sqrt(weight), first.thinned(part, evenly))
+
+
 class ManyCosts:
     """Costs of ``structure`` on records with the same lines, weights and hold."""
 
@@ -81,12 +98,11 @@ class ManyCosts:
         made.energy = np.repeat(made.energy, count)
         return made
 
-    def thinned(self, part: float, evenly: bool = False) -> ManyCosts:
-        """About a ``part`` of the lines, weighted so that costs stay comparable."""
-        kept, weight = self.first.lines.spread(part, evenly)
-        more, other = np.sqrt(weight), copy.copy(self)
-        other.first = self.first.thinned(part, evenly)
-        other.U, other.Y = self.U[..., kept] * more, self.Y[..., kept] * more
+    def thinned(self, part: Part) -> ManyCosts:
+        """A part of the lines, weighted so that costs stay comparable."""
+        other = copy.copy(self)
+        other.first = part.first
+        other.U, other.Y = (each[..., part.lines] * part.factor for each in (self.U, self.Y))
         return other
 
     def some(self, which: slice | IntArray) -> ManyCosts:

@@ -24,6 +24,7 @@ from freqid.fitting.many.rows import (
     rows_of,
 )
 from freqid.fitting.many.store import TableStore
+from freqid.lti import keep_freed_memory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 # records of a chunk, which is kept or lost as one, with verdicts and without, and from how many on
 # processes are worth it
 _CHUNK, _QUICK, _FEW = 8, 128, 16
+# bytes of a chunk on its way to a process: more of them are memory that is new each time, and the
+# first chunks keep the others waiting
+_BYTES = 2**24
 
 
 def fit_many(
@@ -60,7 +64,8 @@ def fit_many(
             ``parallel``.
         verdicts: False leaves out witness, warnings and verdict, which take longer than the fit.
         reading: arguments of ``read`` for paths, ``{"inputs": "torque"}``.
-        chunk: records that are kept, or lost, as one; None takes 8, or 128 without verdicts.
+        chunk: records that are kept, or lost, as one; None takes 8, or without verdicts 128 paths,
+            and as many records as are 16 MB.
         progress: None shows a bar on a terminal, True also lines in a log, False nothing.
         fit_options: of ``fit``: band, hold, weights, start, …
 
@@ -81,10 +86,11 @@ def fit_many(
     if progress is not None:
         flag("progress", progress)
     path = None if path is None else path_of("path", path)
-    size = (_CHUNK if verdicts else _QUICK) if chunk is None else whole("chunk", chunk)
+    asked = None if chunk is None else whole("chunk", chunk)
     named = _named(records)
     if not named:
         raise InputError("records=[] holds nothing to be fitted")
+    size = asked or (_CHUNK if verdicts else _chunk(named.values()))
     free_of_columns(model)
     task = Task(
         model,
@@ -116,6 +122,12 @@ def fit_many(
     return whole_table
 
 
+def _chunk(sources: Iterable[Source]) -> int:
+    """Records of a chunk without verdicts."""
+    most = max((r.u.nbytes + r.y.nbytes for r in sources if isinstance(r, Record)), default=1)
+    return min(max(_BYTES // most, _CHUNK), _QUICK)
+
+
 def _fitted_in_chunks(
     task: Task,
     missing: Sequence[tuple[str, Source]],
@@ -127,6 +139,7 @@ def _fitted_in_chunks(
     """Tables of the rows that are missing, ``size`` of them at a time, as they are finished."""
     import pandas as pd
 
+    keep_freed_memory()
     jobs = [missing[i : i + size] for i in range(0, len(missing), size)]
     # a few are not worth processes of their own, but a cluster that is asked for is
     if n_jobs is None and not configured():

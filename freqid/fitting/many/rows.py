@@ -18,6 +18,7 @@ from freqid.fitting.entry import fit
 from freqid.fitting.fitters import Near
 from freqid.fitting.many.together import Done, minima
 from freqid.fitting.search.descent import uninterrupted
+from freqid.lti import keep_freed_memory
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ class Task:
 
 def rows_of(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
     """A row each: those of one shape together as far as nothing is in doubt, the others alone."""
+    keep_freed_memory()
     rows: list[Row] = []
     taken: list[float] = []
     records: list[DataSet | None] = []

@@ -8,39 +8,36 @@ left to a search of their own.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+import logging
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import FloatArray, IntArray
+from freqid.checks import FloatArray
 from freqid.data import Record
-from freqid.fitting.channel_order import in_order_of
-from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.fitting.cost.many_costs import ManyCosts, one_shape
+from freqid.fitting.cost.many_costs import ManyCosts, Part
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.entry import fit
-from freqid.fitting.grey_box import checked_start
+from freqid.fitting.many.alike import Alike
 from freqid.fitting.many.left import Left, inverse_of
-from freqid.fitting.reading import Reading
 from freqid.fitting.search.batched import descend
 from freqid.fitting.search.descent import uninterrupted
-from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.twins import nearest_order
-from freqid.lti import in_one_blas_thread
+from freqid.lti import tuned
 from freqid.models import GreyBox
+
+_LOG = logging.getLogger(__name__)
 
 # what a batch knows of the options of ``fit``
 _OPTIONS = {"start", "band", "hold", "seed"}
 # residuals and their derivatives in a batch at a time: more of them leave the processor's cache
 _VALUES = 540_000
-# lines of the first steps; gain and step that end these, and how many there are of each at most
-_LINES, _GAIN, _FIRST_STEP, _LIMIT, _STEPS = 300, 1e-4, 1e-3, 40, 5
+# gain and step that end the first steps, and how many there are of these and the last at most
+_GAIN, _FIRST_STEP, _LIMIT, _STEPS = 1e-4, 1e-3, 40, 5
 # after a step of this size, or this part of a standard error, there is one more: the cost is flat
 # to ten digits then; over one of that size residuals are straight lines and their slopes constant
 _LAST_STEP, _OF_STD, _STRAIGHT = 1e-4, 0.05, 1e-7
-# lines that are enough for error bars and doubts
-_ENOUGH = 4000
 # records that are tried from the start, of which the others learn where they may be
 _PROBED = 8
 # channels up to which poles with free residues are a fair opponent
@@ -57,7 +54,7 @@ class Done:
     fit_percent: float
 
 
-@in_one_blas_thread
+@tuned
 def minima(
     model: object, records: Sequence[object], options: Mapping[str, object]
 ) -> list[Done | None]:
@@ -115,43 +112,53 @@ def _alone(record: Record) -> bool:
 def _of_one_shape(
     model: GreyBox, records: Sequence[Record], options: Mapping[str, object]
 ) -> list[Done | None]:
-    skip_zero = model.integrates
-    band, hold = options.get("band"), options.get("hold")
-    experiments: list[SpectralExperiment] = []
-    for record in records:
-        reading = Reading.of(
-            in_order_of(model, record), hold, band, skip_zero=skip_zero,  # type: ignore[arg-type]
-        )  # fmt: skip
-        experiments.append(reading.lines(like=experiments[0] if experiments else None))
-    structure = GreyStructure(model, checked_start(model, options.get("start")))  # type: ignore[arg-type]
-    shape = len(experiments[0].lines.Y), len(experiments[0].lines.U)
-    own = model.n_outputs, model.n_inputs
-    if not one_shape(experiments) or shape != own or shape[0] * shape[1] > _CHANNELS:
-        return [None] * len(records)
-    enough_rows(experiments[:1], len(structure.names))
-    every = ManyCosts(structure, experiments)
+    alike = Alike(model, records, options)
     found: list[Done | None] = [None] * len(records)
+    if model.n_outputs * model.n_inputs > _CHANNELS:
+        return found
+    columns = len(alike.structure.start) + len(model.poles) + 1
+    size = max(_VALUES // (alike.first.n_rows * columns), 1)
 
-    def look(which: IntArray, at: Callable[[ManyCosts], FloatArray]) -> None:
-        if len(which):
-            some = every.some(which)
-            for i, each in zip(which, _minima_of(some, at(some)), strict=True):
-                found[i] = None if each is None else _nearest(structure, each)
+    def look(which: Sequence[int], size: int, near: FloatArray | None, start: bool) -> None:
+        for at in range(0, len(which), size):
+            some = which[at : at + size]
+            for i, each in zip(some, _looked(alike, some, near, start), strict=True):
+                found[i] = None if each is None else _nearest(alike.structure, each)
 
-    def left() -> IntArray:
-        return np.array([i for i, each in enumerate(found) if each is None], dtype=int)
-
-    first = np.arange(min(_PROBED, len(records)))
-    look(first, _from_start)
+    first = range(min(_PROBED, len(records)))
+    look(first, _PROBED, None, start=True)
     known = [list(each.values.values()) for each in found if each is not None]
-    near = np.median(known, axis=0) / structure.scale if known else None
+    near = np.median(known, axis=0) / alike.structure.scale if known else None
     if near is None and len(records) > 1:
         # so far off plain steps find nothing: a search of one shows where the others are
-        near = _searched(model, records[0], options, structure)
+        near = _searched(model, records[0], options, alike.structure)
     if near is not None:
         # machines of one kind are alike
-        look(left(), lambda some: np.tile(near, (len(some.Y), 1)))
-    look(np.setdiff1d(left(), first), _from_start)
+        look([i for i in first if found[i] is None], size, near, start=False)
+    look(range(len(first), len(records)), size, near, start=True)
+    return found
+
+
+def _looked(
+    alike: Alike, which: Sequence[int], near: FloatArray | None, start: bool
+) -> list[Done | None]:
+    """Minima of some of the records: next to a point ``near`` all of them; from the ``start``, if
+    that is asked for, those that have none there.
+    """
+    found: list[Done | None] = [None] * len(which)
+    try:
+        every = alike.costs(which)
+        if near is not None:
+            found = _minima(every, alike.enough, np.tile(near, (len(which), 1)))
+        left = np.array([i for i, each in enumerate(found) if each is None], dtype=int)
+        if start and len(left):
+            some = every.some(left)
+            ends = _minima(some, alike.enough, _from_start(some, alike.few))
+            for i, each in zip(left, ends, strict=True):
+                found[i] = each
+    except (Exception, SystemExit):
+        # whatever it is, the fit of the record alone says it in words
+        _LOG.debug("records are left to fits of their own", exc_info=True)
     return found
 
 
@@ -166,30 +173,17 @@ def _searched(
     return est.values / structure.scale
 
 
-def _from_start(every: ManyCosts) -> FloatArray:
-    """Where damped steps on some lines lead from the structure's own start, (S, P)."""
-    lines = every.first.n_lines
-    few = every.thinned(_LINES / lines) if lines / 2 >= _LINES else every
+def _from_start(every: ManyCosts, few: Part | None) -> FloatArray:
+    """Where damped steps on ``few`` lines lead from the structure's own start, (S, P)."""
+    some = every if few is None else every.thinned(few)
     begin = np.tile(every.structure.start, (len(every.Y), 1))
-    return descend(few, begin, last_step=_FIRST_STEP, limit=_LIMIT, gain=_GAIN).values
-
-
-def _minima_of(every: ManyCosts, near: FloatArray) -> list[Done | None]:
-    """Those next to points (S, P), so many at a time as memory is quick with."""
-    columns = near.shape[1] + len(every.structure.model.poles) + 1
-    size = max(_VALUES // (every.first.n_rows * columns), 1)
-    part = min(_ENOUGH / every.first.n_lines, 1.0)
-    few = every.thinned(part, evenly=True) if part <= 0.5 else every
-    found: list[Done | None] = []
-    for first in range(0, len(near), size):
-        some = slice(first, first + size)
-        found += _minima(every.some(some), few.some(some), near[some])
-    return found
+    return descend(some, begin, last_step=_FIRST_STEP, limit=_LIMIT, gain=_GAIN).values
 
 
 @np.errstate(all="ignore")
-def _minima(every: ManyCosts, few: ManyCosts, x: FloatArray) -> list[Done | None]:
-    """Those next to points (S, P), error bars and doubts on ``few`` of the lines."""
+def _minima(every: ManyCosts, enough: Part | None, x: FloatArray) -> list[Done | None]:
+    """Those next to points (S, P), error bars and doubts on ``enough`` of the lines."""
+    few = every if enough is None else every.thinned(enough)
     x = x.copy()
     done: list[Done | None] = [None] * len(x)
     share = few.first.n_lines / every.first.n_lines

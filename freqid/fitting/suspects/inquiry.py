@@ -35,7 +35,7 @@ from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
-from freqid.lti import in_one_blas_thread
+from freqid.lti import tuned
 from freqid.models import GreyBox, Model
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ class Inquiry:
         loop = looped(self, scene, limit)
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
 
-    @in_one_blas_thread
+    @tuned
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects."""
         scene, named = self.scene, self.named
@@ -248,7 +248,7 @@ class Inquiry:
         severity: Severity = "minor" if small else "serious"
         return Finding(a.name, text, severity, float(a.test.statistic))
 
-    @in_one_blas_thread
+    @tuned
     def spread(self, est: Estimate) -> pd.DataFrame:
         """How far its numbers move between parts of the data; see ``Estimate.spread``."""
         if est.problem is None or est.minimum.exact:
@@ -256,7 +256,7 @@ class Inquiry:
         parted = partings(self.readings, self.scene, len(est.values))
         return compared(est, [(p.between, self.apart(p)) for p in parted])
 
-    @in_one_blas_thread
+    @tuned
     def on_modes(self, est: Estimate, changed: bool) -> list[Finding]:
         """Modes of a black box that are noise, or, unless a change was said, move midway."""
         if isinstance(self.model, GreyBox) or est.problem is None or est.minimum.exact:
@@ -268,7 +268,7 @@ class Inquiry:
         found = modes_differ(est, halves, self.apart(halves))
         return [] if found is None else [found]
 
-    @in_one_blas_thread
+    @tuned
     def table(self) -> pd.DataFrame:
         """The suspects by name: statistic, p_value, size, unit, power, largest_shift."""
         import pandas as pd

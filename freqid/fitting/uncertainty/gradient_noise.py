@@ -12,7 +12,7 @@ from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.uncertainty.noise_spectrum import local_mean, local_power, smoothed_power
-from freqid.lti import Realisation, eliminate, in_one_blas_thread
+from freqid.lti import Realisation, eliminate, tuned
 
 # lines of an experiment that are enough for a covariance
 _LINES = 4000
@@ -22,7 +22,7 @@ _MEANS = 5
 MOST_LEVERAGE = 0.9
 
 
-@in_one_blas_thread
+@tuned
 def score_covariance(
     objective: Objective, x: FloatArray, alone: FloatArray | None = None
 ) -> FloatArray | None:
