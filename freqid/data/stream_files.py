@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import mmap
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -41,16 +42,16 @@ def of_file(path: Path, asked: Asked) -> Found:
 
 
 def _of_npy(path: Path, block: int, columns: Sequence[str] | None) -> Found:
-    def mapped() -> Found:
-        rows = np.load(path, mmap_mode="r", allow_pickle=False)
-        return of_array(rows, columns, block, str(path))
+    def mapped() -> Array:
+        return np.load(path, mmap_mode="r", allow_pickle=False)
 
     def anew(first: int, which: Sequence[int]) -> Iterator[Array]:
-        yield from mapped().blocks(first, which)
+        rows = mapped()
+        yield from _given_back(rows, of_array(rows, columns, block, str(path)).blocks(first, which))
 
     try:
         # mapped for as long as it is read: of many files not all are open at once
-        return dataclasses.replace(mapped(), blocks=anew)
+        return dataclasses.replace(of_array(mapped(), columns, block, str(path)), blocks=anew)
     except InputError:
         raise
     except Exception as error:
@@ -62,13 +63,23 @@ def _of_npy(path: Path, block: int, columns: Sequence[str] | None) -> Found:
     found = of_array(rows, columns, block, str(path))
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
-        yield from found.blocks(first, which)
+        yield from _given_back(rows, found.blocks(first, which))
         raise InputError(
             f"{path} ends after {len(rows)} of {promised} samples; "
             "slice(stop=…) takes what is there"
         )
 
     return dataclasses.replace(found, blocks=blocks, n_samples=promised)
+
+
+def _given_back(rows: Array, blocks: Iterator[Array]) -> Iterator[Array]:
+    """Blocks of a mapped file, whose pages count as memory of the process until they are given
+    back; whoever looks again finds them as they were.
+    """
+    for each in blocks:
+        yield each
+        if isinstance(rows.base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+            rows.base.madvise(mmap.MADV_DONTNEED)
 
 
 def _ended_early(path: Path) -> tuple[Array, int] | None:

@@ -22,7 +22,7 @@ from freqid.data.stream_views import (
     of_columns,
     part_of,
 )
-from freqid.lti import Hold
+from freqid.lti import Hold, keep_freed_memory
 
 # samples of a block that is read at once
 BLOCK = 1 << 18
@@ -215,6 +215,7 @@ class Stream:
 
     def checked(self, first: int = 0) -> Iterator[Array]:
         """Blocks (n, channels) from a sample on; ValueError, saying where, for what is none."""
+        keep_freed_memory()
         width, at = self.n_inputs + self.n_outputs, first
         blocks = self._told(first, lambda: at)
         for block in blocks:
