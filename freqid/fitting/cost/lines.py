@@ -98,12 +98,7 @@ class Lines:
         """
         # weights may leave out lines with a period of their own
         counted = np.flatnonzero(self.counted)
-        power = (np.abs(self.U) ** 2).sum(axis=(0, 1)).reshape(-1, self.aliases).sum(axis=1)
-        power = power[counted]
-        order = np.argsort(-power)
-        energy = np.cumsum(power[order])
-        driven = np.zeros(len(counted), bool)
-        driven[order[: int(np.searchsorted(energy, _ENERGY * energy[-1])) + 1]] = True
+        driven = np.zeros(len(counted), bool) if evenly else self._driven()[counted]
         if evenly or driven.sum() >= _FEW * len(counted):
             groups, wanted = [counted], part * len(counted)
         else:
@@ -114,6 +109,15 @@ class Lines:
         lines = np.concatenate(kept)
         order = np.argsort(lines)
         return lines[order], weight[order]
+
+    def _driven(self) -> BoolArray:
+        """Which of the lines that count are the strongest, that hold the input's energy, (K,)."""
+        power = (np.abs(self.U) ** 2).sum(axis=(0, 1)).reshape(-1, self.aliases).sum(axis=1)
+        power = np.where(self.counted, power, 0.0)
+        strongest = np.sort(power)[::-1]
+        energy = np.cumsum(strongest)
+        least = strongest[int(np.searchsorted(energy, _ENERGY * energy[-1]))]
+        return np.asarray((power >= least) & self.counted)
 
     def some(self, lines: IntArray, factor: FloatArray) -> Lines:
         """Some of the lines, the data multiplied (lines,) so that costs stay comparable."""
