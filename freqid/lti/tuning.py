@@ -6,18 +6,16 @@ half of its speed.
 
 glibc maps large arrays anew each time, and gives back what is free above twice that size: work that
 goes through such arrays touches every page for the first time, again and again, for a third of its
-time. What is large follows the largest array that was freed so far (mallopt(3), dynamic mmap
-threshold).
+time. In a worker of Dask, which gives back all that it can, it is two thirds.
 """
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from functools import cache, wraps
 from threading import Lock
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
-
-import numpy as np
 
 if TYPE_CHECKING:
     import threadpoolctl
@@ -35,17 +33,25 @@ def _controller() -> threadpoolctl.ThreadpoolController:
     return ThreadpoolController()
 
 
-# the most that glibc's threshold rises to, 32 MiB, less what an allocation adds
-_LARGE = 2**25 - 2**14
+# glibc's names for the size from which arrays are mapped on their own, at most 32 MiB, and for what
+# may be free before it is given back (mallopt(3))
+_MMAP_THRESHOLD, _TRIM_THRESHOLD = -3, -1
+_LARGE = 2**25
 
 
 @cache
 def keep_freed_memory() -> None:
-    """Let arrays below 32 MiB come from memory that was freed before; once is enough.
+    """Let arrays up to 32 MiB come from memory that was freed before; once is enough.
 
-    The array that is freed here is never touched, and costs nothing. Other allocators do not mind.
+    Twice as much may stay free. Other allocators do not mind.
     """
-    np.empty(_LARGE, np.uint8)
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return
+    # the first alone would fix the second at what the environment says
+    mallopt(_MMAP_THRESHOLD, _LARGE)
+    mallopt(_TRIM_THRESHOLD, 2 * _LARGE)
 
 
 def tuned(function: Callable[Args, Result]) -> Callable[Args, Result]:
