@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from freqid.checks import InputError
 from freqid.data import Record
 from freqid.fitting.black_box.refinement import nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.cost.charts import Chart
+from freqid.fitting.black_box.subspace import inputs_and_cost
+from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.noise_models import MeasuredNoise
@@ -24,11 +26,13 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.uncertainty.evenness import evenly_spread
-from freqid.lti import Plane, ZeroOrderHold
+from freqid.lti import Plane, StateSpace, ZeroOrderHold
 from freqid.models import DiscreteModel
 
 # states of controller and delays that a loop may have beyond the plant's own
 _BEYOND = (0, 1, 2, 4)
+# places of a lag that is added to a smaller black box, and how many of them are followed
+_RATES, _FOLLOWED = 8, 2
 # lines on which the orders are compared, evaluations of each, and the gain that ends one
 _LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
 
@@ -50,7 +54,7 @@ class LoopBox:
         """
         readings = [Reading.of(r) for r in records]
         orders = [max(order, 1) + more for more in _BEYOND]
-        tried = [box for n in orders if (box := _begun(readings, n)) is not None]
+        tried = _least(readings, orders)
         first = _shortest(tried)
         model = first.model
         errors = [errors_of(model, r) for r in readings]
@@ -60,9 +64,9 @@ class LoopBox:
             r.with_(noise=MeasuredNoise().learnt(e.error, e.n_samples))
             for r, e in zip(readings, errors, strict=True)
         ]
-        again = [_begun(weighted, n) for n in orders]
-        again += [_descended(box.chart.moved(box.found.x), weighted) for box in tried]
-        return _shortest([box for box in again if box is not None])
+        again = [_descended(box.chart.moved(box.found.x), weighted) for box in tried]
+        known = [box for box in again if box is not None]
+        return _shortest(known + _least(weighted, orders))
 
     @property
     def order(self) -> int:
@@ -95,6 +99,41 @@ def _shortest(boxes: Sequence[LoopBox]) -> LoopBox:
             "reference=False to fit the record directly"
         )
     return min(boxes, key=lambda box: box.length)
+
+
+def _least(readings: Sequence[Reading], orders: Sequence[int]) -> list[LoopBox]:
+    """The best of each order: begun from the data alone, and from that of the order below."""
+    found: dict[int, LoopBox] = {}
+    for n in orders:
+        tried = [_begun(readings, n), *(_grown(found[n - 1], readings) if n - 1 in found else ())]
+        if boxes := [box for box in tried if box is not None]:
+            found[n] = min(boxes, key=lambda box: box.found.cost)
+    return list(found.values())
+
+
+def _grown(box: LoopBox, readings: Sequence[Reading]) -> list[LoopBox | None]:
+    """Those of an order more that begin with a lag at one end, where it is worth most.
+
+    The states of a controller show little beside those of the plant, and a start from the data
+    alone spends the order on noise.
+    """
+    lines, plane = lines_in_plane(readings, _LINES)
+    A, B, C, D = box.chart.in_z(box.found.x)
+    dt, omega = readings[0].sample_time, np.concatenate([e.lines.omega for e in lines])
+    begun = []
+    for rate in np.geomspace(omega[omega > 0].min(), omega.max(), _RATES):
+        for end in np.eye(len(C)):
+            larger = StateSpace(
+                scipy.linalg.block_diag(A, np.exp(-rate * dt)),
+                np.concatenate([B, np.zeros_like(B[:1])]), np.column_stack([C, end]), D,
+            )  # fmt: skip
+            at = to_plane(larger, plane)
+            begun.append(inputs_and_cost(lines, at.A, at.C, feedthrough=True))
+    begun.sort(key=lambda each: each[1])
+    return [
+        _descended(Chart(start, True, plane, dt, stable=True), readings)
+        for start, _ in begun[:_FOLLOWED]
+    ]
 
 
 def _begun(readings: Sequence[Reading], order: int) -> LoopBox | None:
