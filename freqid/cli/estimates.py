@@ -162,6 +162,9 @@ def fit_many(
     if "verdict" in table:
         for grade, count in table["verdict"].value_counts().items():
             print(f"  {grade}: {count}")
+            if grade == "do not use":
+                for name in table[table["verdict"] == grade]["name"].head(10):
+                    print(f"    {typed(str(name))}")
     for row in failed.head(10).itertuples():
         print(f"  {typed(str(row.error))}")
     return 0 if len(failed) < len(table) else 1

@@ -8,6 +8,7 @@ that counted as white.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,7 +106,10 @@ def _least(readings: Sequence[Reading], orders: Sequence[int]) -> list[LoopBox]:
     """The best of each order: begun from the data alone, and from that of the order below."""
     found: dict[int, LoopBox] = {}
     for n in orders:
-        tried = [_begun(readings, n), *(_grown(found[n - 1], readings) if n - 1 in found else ())]
+        tried = [_begun(readings, n)]
+        if n - 1 in found:
+            with suppress(InputError, np.linalg.LinAlgError):
+                tried += _grown(found[n - 1], readings)
         if boxes := [box for box in tried if box is not None]:
             found[n] = min(boxes, key=lambda box: box.found.cost)
     return list(found.values())
@@ -122,18 +126,14 @@ def _grown(box: LoopBox, readings: Sequence[Reading]) -> list[LoopBox | None]:
     dt, omega = readings[0].sample_time, np.concatenate([e.lines.omega for e in lines])
     begun = []
     for rate in np.geomspace(omega[omega > 0].min(), omega.max(), _RATES):
+        with_lag = scipy.linalg.block_diag(A, np.exp(-rate * dt))
         for end in np.eye(len(C)):
-            larger = StateSpace(
-                scipy.linalg.block_diag(A, np.exp(-rate * dt)),
-                np.concatenate([B, np.zeros_like(B[:1])]), np.column_stack([C, end]), D,
-            )  # fmt: skip
+            larger = StateSpace(with_lag, np.pad(B, ((0, 1), (0, 0))), np.column_stack([C, end]), D)
             at = to_plane(larger, plane)
             begun.append(inputs_and_cost(lines, at.A, at.C, feedthrough=True))
     begun.sort(key=lambda each: each[1])
-    return [
-        _descended(Chart(start, True, plane, dt, stable=True), readings)
-        for start, _ in begun[:_FOLLOWED]
-    ]
+    starts = [start for start, _ in begun[:_FOLLOWED]]
+    return [_descended(Chart(s, True, plane, dt, stable=True), readings) for s in starts]
 
 
 def _begun(readings: Sequence[Reading], order: int) -> LoopBox | None:

@@ -92,6 +92,19 @@ def test_fleets_begin_where_they_are_told_to(folder, capsys):
     assert "matches no file but" in capsys.readouterr().err
 
 
+def test_files_of_a_fleet_that_are_not_to_be_used_are_named(folder, capsys):
+    record = fq.read("log.csv")
+    turned = fq.Record(record.u, -record.y, record.dt)
+    fq.write(turned, "turned.csv")
+    assert run("fit-many", "*.csv", "--model", "mine.py:plant", "--out", "table.parquet") == 0
+    table = pd.read_parquet("table.parquet").set_index("name")
+    assert table.loc["log.csv", "verdict"] == "trust"
+    bad = list(table.index[table["verdict"] == "do not use"])
+    told = capsys.readouterr().out.splitlines()
+    where = told.index(f"  do not use: {len(bad)}")
+    assert [line.strip() for line in told[where + 1 : where + 1 + len(bad)]] == bad == ["turned.csv"]
+
+
 def test_the_explorer_takes_plants_with_parameters_alone(folder, capsys):
     assert run("explore", "log.csv", "--model", "mine.py:box") == 2
     assert "is no grey box; the explorer moves parameters" in capsys.readouterr().err
