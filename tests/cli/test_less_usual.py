@@ -102,7 +102,9 @@ def test_files_of_a_fleet_that_are_not_to_be_used_are_named(folder, capsys):
     bad = list(table.index[table["verdict"] == "do not use"])
     told = capsys.readouterr().out.splitlines()
     where = told.index(f"  do not use: {len(bad)}")
-    assert [line.strip() for line in told[where + 1 : where + 1 + len(bad)]] == bad == ["turned.csv"]
+    assert (
+        [line.strip() for line in told[where + 1 : where + 1 + len(bad)]] == bad == ["turned.csv"]
+    )
 
 
 def test_the_explorer_takes_plants_with_parameters_alone(folder, capsys):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.fitting.loop_box import LoopBox
 
 DT, N, GAIN = 2e-3, 5000, 0.1
 PLANT = fq.two_mass()
@@ -155,3 +156,24 @@ def test_a_state_of_the_controller_that_shows_little_is_found():
     assert all("a black box of order 4" in " ".join(e.notes) for e in fits)
     assert np.abs(z).max() < 4
     assert [e.verdict.grade for e in fits] == ["trust"] * 3
+
+
+def test_the_loop_of_a_record_is_looked_for_once(monkeypatch):
+    """Asked as it is, and again through its reference, it took twice the time."""
+    sought, whole = [], LoopBox.of.__func__
+
+    def of(cls, records, order):
+        sought.append((len(records), order))
+        return whole(cls, records, order)
+
+    monkeypatch.setattr(LoopBox, "of", classmethod(of))
+    record = disturbed(1, 0.005)
+    est = fq.fit(PLANT, record)
+    assert any("goes together with what the reference leaves" in note for note in est.notes)
+    assert sought == [(1, 3)]
+    again = fq.fit(PLANT, record, reference=True)
+    np.testing.assert_array_equal(again.values, est.values)
+    assert len(sought) == 1
+    # another record beside it is another loop
+    fq.fit(PLANT, [record, disturbed(2, 0.005)], reference=True)
+    assert sought[1:] == [(2, 3)]
