@@ -65,7 +65,7 @@ def fit_many(
         verdicts: False leaves out witness, warnings and verdict, which take longer than the fit.
         reading: arguments of ``read`` for paths, ``{"inputs": "torque"}``.
         chunk: records that are kept, or lost, as one; None takes 8, or without verdicts 128 paths,
-            and as many records as are 16 MB.
+            and of records as many as are 16 MB, 8 to 128.
         progress: None shows a bar on a terminal, True also lines in a log, False nothing.
         fit_options: of ``fit``: band, hold, weights, start, …
 
