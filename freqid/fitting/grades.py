@@ -22,7 +22,14 @@ _VAGUE = 0.5
 _BESIDE = 0.3
 # what makes numbers useless where it is what explains most of what is wrong
 _USELESS = frozenset(
-    {"not converged", "no signal", "feedback", "swapped", "wrong sign", "hold rejected"}
+    {
+        "not converged",
+        "no signal",
+        "feedback",
+        "swapped channels",
+        "wrong sign",
+        "hold rejected",
+    }
 )
 
 

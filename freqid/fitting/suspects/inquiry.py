@@ -51,8 +51,6 @@ _SURE = 1e-6
 _SMALL, _HARMLESS = 0.3, 1e-3
 # standard errors by which a value is not physical for certain
 _CERTAIN = 2.0
-# part of the output left that means trouble
-_MOST_LEFT = 0.3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
@@ -178,14 +176,15 @@ class Inquiry:
         """Sentences on the strongest suspects."""
         scene, named = self.scene, self.named
         if scene is None:
-            return unheard(self.minimum, self.model, self.readings)
-        if found := silent(scene) or leaking(scene, self.model, self._std):
+            nothing = unheard(self.minimum, self.model, self.readings)
+            return nothing or ([] if self.minimum.exact else turned(self, self._unphysical))
+        if found := silent(scene):
+            return turned(self, self._unphysical) or found
+        if found := leaking(scene, self.model, self._std):
             return found
         if found := begun_in_motion(self.minimum, scene, self.readings):
             return found
-        trouble = self._unphysical or (bool(self.named) and scene.cost > _MOST_LEFT * scene.energy)
-        turn = turned(self, self._unphysical) if trouble else []
-        if turn:
+        if turn := turned(self, self._unphysical):
             return turn
         if not named:
             return []
