@@ -194,8 +194,11 @@ def _lines_wanted(experiments: Sequence[SpectralExperiment], noise: float) -> in
 
 def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:
     """From the minimum on a part of the lines to that on all, no worse than the start."""
-    best = polish(objective, found.solution.x)
     start = cast(GreyStructure, objective.structure).start
+    if objective.point(found.solution.x) is None:
+        # a lag that is next to nothing can be computed at some lines and not at others
+        return polish(objective, start)
+    best = polish(objective, found.solution.x)
     there = scout.point(start)
     if there is None or there.cost > _FAR * found.solution.cost + scout.rounding:
         return best

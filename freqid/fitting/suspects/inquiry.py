@@ -177,14 +177,14 @@ class Inquiry:
         scene, named = self.scene, self.named
         if scene is None:
             nothing = unheard(self.minimum, self.model, self.readings)
-            return nothing or ([] if self.minimum.exact else turned(self, self._unphysical))
+            return nothing or ([] if self.minimum.exact else self._turned(None))
         if found := silent(scene):
-            return turned(self, self._unphysical) or found
+            return self._turned(scene, quiet=True) or found
         if found := leaking(scene, self.model, self._std):
             return found
         if found := begun_in_motion(self.minimum, scene, self.readings):
             return found
-        if turn := turned(self, self._unphysical):
+        if turn := self._turned(scene):
             return turn
         if not named:
             return []
@@ -206,6 +206,9 @@ class Inquiry:
         lacking = [a for a in named if a.harm >= LITTLE]
         more = [self._finding(scene, a) for a in lacking if a not in said]
         return [*confirmed(self, scene, said, found), *more]
+
+    def _turned(self, scene: Scene | None, quiet: bool = False) -> list[Finding]:
+        return turned(self, scene, self._unphysical, quiet)
 
     @cached_property
     def _unphysical(self) -> bool:

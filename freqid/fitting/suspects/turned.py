@@ -10,32 +10,39 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 import scipy
 
-from freqid.checks import InputError
-from freqid.data import FrequencyResponse, Record
+from freqid.checks import FloatArray, InputError
+from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record, StampedRecord
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.models import GreyBox
 
 # what is left has to fall to this part for a turn to be believed
 _BETTER = 0.5
-# or what is explained to grow so many times, by no chance at this level
+# or what is explained to grow so many times; by no chance at this level either
 _MORE, _CHANCE = 4.0, 1e-6
+# part of what a black box explains besides that has to be explained
+_MOST = 0.7
 # the same where values alone speak against a fit: no more than so much may be left
 _AS_GOOD = 1.1
 # starts of the fits to the data turned back, channels that are turned one by one at the most, and
 # lines of a black box
 _STARTS, _CHANNELS, _LINES = 3, 8, 600
-# part of the data left that means trouble
-_MOST_LEFT = 0.3
+_SIDES = {"y": "output", "u": "input"}
+# part of an output left that may mean trouble, and that from which no black box has to say so
+_LEFT, _MOST_LEFT = 0.05, 0.3
 
 
 @dataclass(frozen=True)
@@ -47,46 +54,64 @@ class _Turn:
     back: Callable[[Reading], Reading]
 
 
-def turned(inquiry: Asking, unphysical: bool) -> list[Finding]:
+def turned(inquiry: Asking, scene: Scene | None, unphysical: bool, quiet: bool) -> list[Finding]:
     """A finding where the plant explains the data turned back, and them alone, with sense.
 
-    Asked where values are ``unphysical``, or much is left of the data.
+    Asked where values are ``unphysical``, or much is left of an output; where the fit is ``quiet``,
+    the input not heard in it, whatever is no chance is enough.
     """
-    asked = _Asked(inquiry)
-    model = inquiry.model
-    structure = inquiry.minimum.structure
+    model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or isinstance(structure, PlacedStructure):
         return []
-    if not isinstance(structure, GreyStructure) or not (unphysical or asked.share > _MOST_LEFT):
+    asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
+    trouble = unphysical or quiet or asked.shares.max() > _LEFT
+    if not isinstance(structure, GreyStructure) or not trouble:
         return []
-    best: tuple[float, str, str] | None = None
-    for turn in _turns(model):
+    start = dict(zip(structure.physical_names, structure.values, strict=False))
+    begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
+    best: tuple[float, _Turn] | None = None
+    for turn in _turns(model, inquiry.readings[0].data):
         try:
             readings = [turn.back(r) for r in inquiry.readings]
             if not unphysical and not asked.worth(model, readings, turn.kind):
                 continue
-            start = dict(zip(structure.physical_names, structure.values, strict=False))
-            options = SearchOptions(n_starts=_STARTS)
-            est = fitter_of(model)(model.with_values(**start), readings, options)
+            est = fitter_of(model)(begun, readings, options)
+            told = asked.explained(est, readings, turn.kind)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             continue
+        if any(w.kind == "not physical" for w in est.signs):
+            continue
         left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
-        sane = not any(w.kind == "not physical" for w in est.signs)
-        told = asked.much(left, len(est.values))
-        if not sane or not (told or (unphysical and left < _AS_GOOD * asked.share)):
+        if not (told or (unphysical and left < _AS_GOOD * asked.share)):
             continue
         if best is None or left < best[0]:
-            best = left, turn.kind, turn.what
+            best = left, turn
         if est.witness.verdict == "complete":
             break
     if best is None:
         return []
-    left, kind, what = best
+    left, turn = best
     text = (
-        f"{what}: turned back, {100 * (1 - np.sqrt(left)):.4g} % of the data are explained by "
+        f"{turn.what}: turned back, {100 * (1 - np.sqrt(left)):.4g} % of the data are explained by "
         "physical values; turn the channel"
     )
-    return [Finding(kind, text, number=float(left))]
+    return [Finding(turn.kind, text, number=float(left))]
+
+
+def shares(minimum: Minimum, scene: Scene | None) -> FloatArray:
+    """What is left of each output's energy, (outputs,), transients taken off; of all of them where
+    there is no scene.
+    """
+    if scene is None:
+        return np.array([minimum.cost / max(minimum.objective.energy, 1e-300)])
+    left, whole = (
+        np.sum([np.sum(rows.reshape(s.n_outputs, -1) ** 2, axis=1) for rows, s in each], axis=0)
+        for each in (
+            [(s.left, s) for s in scene.seen], [(s.at_rest, s) for s in scene.seen],
+        )
+    )  # fmt: skip
+    found: FloatArray = left / np.maximum(whole, 1e-300)
+    return found
 
 
 @dataclass(frozen=True)
@@ -94,43 +119,64 @@ class _Asked:
     """What a fit leaves of its data, and what would be less."""
 
     inquiry: Asking
+    shares: FloatArray
+    quiet: bool
 
     @cached_property
     def share(self) -> float:
-        """Of the data's energy."""
-        minimum = self.inquiry.minimum
-        return float(minimum.cost / max(minimum.objective.energy, 1e-300))
+        """Of the energy of all data."""
+        return float(shares(self.inquiry.minimum, None)[0])
 
-    def much(self, left: float, unknowns: int) -> bool:
-        """Whether a part of the energy that so many unknowns leave is so much less."""
-        if left < _BETTER * self.share:
-            return True
-        if 1 - left < _MORE * max(1 - self.share, 0.0):
-            return False
+    def _no_chance(self, left: float, unknowns: int) -> bool:
+        """Whether a part of the energy that so many unknowns leave is less by no chance."""
         freedom = self.inquiry.minimum.freedom
-        f = (self.share - left) / max(left, 1e-300) * freedom / unknowns
-        return bool(scipy.stats.f.sf(f, unknowns, freedom) < _CHANCE)
+        f = (self.share - left) / max(left, 1e-300) * freedom / max(unknowns, 1)
+        return bool(scipy.stats.f.sf(max(f, 0.0), max(unknowns, 1), freedom) < _CHANCE)
+
+    def explained(self, est: Estimate, readings: Sequence[Reading], kind: str) -> bool:
+        """Whether a fit to data turned back leaves so much less, of the worst output as of all, and
+        most of what a black box explains is explained.
+        """
+        left = float(shares(est.minimum, None)[0])
+        box = self._boxes.get(kind)
+        if not self._no_chance(left, len(est.values)):
+            return False
+        if box is not None and self.share - left < _MOST * (self.share - box):
+            return False
+        if self.quiet or 1 - left > _MORE * max(1 - self.share, 0.0):
+            return True
+        if len(self.shares) == 1:
+            return left < _BETTER * self.share
+        own, worst = shares(est.minimum, Scene.of(est.minimum, readings)), np.argmax(self.shares)
+        return bool(own[worst] < _BETTER * self.shares[worst])
 
     @cached_property
-    def _seen(self) -> dict[str, bool]:
+    def _boxes(self) -> dict[str, float | None]:
+        """What black boxes leave of the energy of data turned back; None where there is none."""
         return {}
 
     def worth(self, model: GreyBox, readings: Sequence[Reading], kind: str) -> bool:
         """Whether a black box of the plant's order explains data turned back so much better.
 
-        Other signs are one black box's. Where there is none the plant itself is tried.
+        Other signs are one black box's. Where there is none the plant itself is tried, if much is
+        left.
         """
-        if kind not in self._seen:
+        if kind not in self._boxes:
             try:
                 box = Reference.of(model, readings, _LINES)
-                left = box.cost / max(box.objective.energy, 1e-300)
-                self._seen[kind] = self.much(left, box.unknowns)
+                self._boxes[kind] = box.cost / max(box.objective.energy, 1e-300)
             except (InputError, np.linalg.LinAlgError):
-                self._seen[kind] = True
-        return self._seen[kind]
+                self._boxes[kind] = None
+        left = self._boxes[kind]
+        if left is None:
+            return self.quiet or bool(self.shares.max() > _MOST_LEFT)
+        if not self._no_chance(left, len(model.free_parameters)):
+            return False
+        enough = len(self.shares) > 1 or self.quiet or left < _BETTER * self.share
+        return enough or 1 - left > _MORE * max(1 - self.share, 0.0)
 
 
-def _turns(model: GreyBox) -> list[_Turn]:
+def _turns(model: GreyBox, data: DataSet) -> list[_Turn]:
     """All outputs of the other sign, input and output exchanged, single channels of the other."""
     sign = "of the opposite sign of the model's"
     found = [_Turn("wrong sign", f"the outputs are {sign}", _negated)]
@@ -138,31 +184,45 @@ def _turns(model: GreyBox) -> list[_Turn]:
         return [*found, _Turn("swapped channels", "input and output are exchanged", _exchanged)]
     if model.n_inputs + model.n_outputs > _CHANNELS:
         return found
-    sides = (("output", model.outputs, model.n_outputs), ("input", model.inputs, model.n_inputs))
-    for side, names, count in sides:
-        for i in range(count if count > 1 else 0):
-            which = repr(names[i]) if names else str(i + 1)
+    for side, names in (("y", data.output_names), ("u", data.input_names)):
+        for i, name in enumerate(names if len(names) > 1 else ()):
             back = partial(_negated, side=side, channel=i)
-            found.append(_Turn("wrong sign", f"{side} {which} is {sign}", back))
+            found.append(_Turn("wrong sign", f"{_SIDES[side]} {name!r} is {sign}", back))
     return found
 
 
-def _negated(r: Reading, side: str = "output", channel: int | None = None) -> Reading:
+def _negated(r: Reading, side: str = "y", channel: int | None = None) -> Reading:
     data = r.data
     taken = slice(None) if channel is None else channel
     if isinstance(data, FrequencyResponse):
-        response = data.response.copy()
-        response[taken if side == "output" else (slice(None), taken)] *= -1
-        return r.with_(data=dataclasses.replace(data, response=response))
-    name = "y" if side == "output" else "u"
-    signal = np.array(getattr(data, name), dtype=float)
-    signal[(..., taken) if signal.ndim > 1 else slice(None)] *= -1
-    return r.with_(data=dataclasses.replace(data, **{name: signal}))
+        return r.with_(data=_negated_response(data, side, taken))
+    # a log's samples stand beside those of its grid
+    names = {f"{side}_logged"} if isinstance(data, StampedRecord) else set()
+    signals: dict[str, Any] = {}
+    for name in names | {side}:
+        signal = np.array(getattr(data, name), dtype=float)
+        signal[..., taken] *= -1
+        signals[name] = signal
+    return r.with_(data=dataclasses.replace(data, **signals))
+
+
+def _negated_response(data: FrequencyResponse, side: str, taken: int | slice) -> FrequencyResponse:
+    signs = np.ones(data.response.shape[0]), np.ones(data.response.shape[1])
+    signs[0 if side == "y" else 1][taken] = -1
+    response = data.response * np.outer(*signs)[..., None]
+    if not isinstance(data, PeriodicResponse):
+        return dataclasses.replace(data, response=response)
+    # outputs come first in the noise
+    both = np.concatenate(signs)
+    return dataclasses.replace(
+        data, response=response, outputs=data.outputs * signs[0][:, None, None],
+        inputs=data.inputs * signs[1][:, None, None], noise=data.noise * np.outer(both, both),
+    )  # fmt: skip
 
 
 def _exchanged(r: Reading) -> Reading:
     data = r.data
-    if not isinstance(data, Record) or data.factor > 1:
+    if type(data) is not Record or data.factor > 1:
         raise InputError("only records of one rate can have their channels exchanged")
     turned = dataclasses.replace(
         data, u=data.y, y=data.u, input_names=data.output_names, output_names=data.input_names

@@ -1,0 +1,150 @@
+"""Channels that are turned round are named, however the plant's parameters are bounded."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import freqid as fq
+
+DT = 2e-3
+POSITIVE = {"lower": 0.0}
+
+
+def spring(m, c, k):
+    A = np.array([[0, 1], [-k / m, -c / m]])
+    return A, np.array([[0], [1 / m]]), np.array([[1.0, 0]]), np.zeros((1, 1))
+
+
+def lag(gain, T):
+    return np.array([[-1 / T]]), np.array([[gain / T]]), np.ones((1, 1)), np.zeros((1, 1))
+
+
+def two_sensors(m, c, k):
+    A, B, _, _ = spring(m, c, k)
+    return A, B, np.eye(2), np.zeros((2, 1))
+
+
+def two_mass(Jm, Jl, k, d, fm):
+    A = np.array([[-(d + fm) / Jm, -k / Jm, d / Jm], [1, 0, -1], [d / Jl, k / Jl, -d / Jl]])
+    return A, np.array([[1 / Jm], [0], [0]]), np.array([[1.0, 0, 0]]), np.zeros((1, 1))
+
+
+def bounded(function, **values):
+    return fq.GreyBox(function, [fq.Parameter(n, v, **POSITIVE) for n, v in values.items()])
+
+
+SPRING = bounded(spring, m=1.0, c=2.0, k=400.0)
+LAG = bounded(lag, gain=2.0, T=0.3)
+TWO = bounded(two_mass, Jm=4e-3, Jl=5e-3, k=100.0, d=0.1, fm=0.05)
+SENSORS = bounded(two_sensors, m=1.0, c=2.0, k=400.0)
+INPUTS = {
+    "chirp": fq.chirp(0.3, 60, 3000 * DT, DT),
+    "white": fq.white_noise(3000, seed=5),
+}
+
+
+def measured(model, kind, noise, seed=1):
+    """A record with this part of the output's size as noise."""
+    record = fq.simulate(model, INPUTS[kind], DT)
+    e = np.random.default_rng(seed).standard_normal(record.y.shape)
+    return dataclasses.replace(record, y=record.y + noise * record.y.std(axis=0) * e)
+
+
+def begun(model):
+    return {n: v * (1.2 if i % 2 else 0.85) for i, (n, v) in enumerate(model.values.items())}
+
+
+@pytest.mark.parametrize(
+    ("model", "kind", "noise"),
+    [
+        (SPRING, "chirp", 0.02), (SPRING, "white", 0.2), (LAG, "white", 0.02), (LAG, "chirp", 1.5),
+        (TWO, "white", 0.02),
+    ],
+)  # fmt: skip
+def test_a_wrong_sign_is_named_where_bounds_keep_the_plant_from_following(model, kind, noise):
+    """Found: "no signal", of data that the plant explains to their noise once they are turned."""
+    record = measured(model, kind, noise)
+    turned = fq.Record(record.u, -record.y, DT)
+    est = fq.fit(model, turned, start=begun(model))
+    assert est.warnings[0].kind == "wrong sign"
+    assert est.verdict.grade == "do not use"
+    assert fq.fit(model, record, start=begun(model)).verdict.trusted
+
+
+@pytest.mark.parametrize(("model", "kind"), [(SPRING, "chirp"), (LAG, "white")])
+def test_exchanged_channels_are_named_and_not_to_be_used(model, kind):
+    """Found: "no signal", and a doubt only where they were named."""
+    record = measured(model, kind, 0.02)
+    est = fq.fit(model, fq.Record(record.y, record.u, DT), start=begun(model))
+    assert est.warnings[0].kind == "swapped channels"
+    assert est.verdict.grade == "do not use"
+
+
+@pytest.mark.parametrize("channel", [0, 1])
+def test_one_output_of_the_wrong_sign_is_named(channel):
+    record = measured(SENSORS, "white", 0.05)
+    y = record.y.copy()
+    y[:, channel] *= -1
+    names = ("position", "speed")
+    est = fq.fit(SENSORS, fq.Record(record.u, y, DT, output_names=names), start=begun(SENSORS))
+    first = est.warnings[0]
+    assert first.kind == "wrong sign"
+    assert repr(names[channel]) in first
+    assert est.verdict.grade == "do not use"
+
+
+def test_one_input_of_the_wrong_sign_is_named():
+    def pushed(m, c, k):
+        A, B, C, _ = spring(m, c, k)
+        return A, np.column_stack([B, [[k / m], [-c * k / m**2]]]), C, np.zeros((1, 2))
+
+    model = bounded(pushed, m=1.0, c=2.0, k=400.0)
+    u = np.column_stack([fq.white_noise(3000, seed=2), 0.01 * fq.white_noise(3000, seed=3)])
+    record = fq.simulate(model, u, DT)
+    noise = 0.02 * record.y.std() * np.random.default_rng(1).standard_normal(record.y.shape)
+    turned = fq.Record(u * [1, -1], record.y + noise, DT, input_names=("force", "ground"))
+    est = fq.fit(model, turned, start=begun(model))
+    assert est.warnings[0].kind == "wrong sign"
+    assert "'ground'" in est.warnings[0]
+
+
+def test_a_response_of_the_wrong_sign_is_named():
+    omega = np.geomspace(2, 300, 60)
+    found = 1 / (400 - omega**2 + 2j * omega)
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal((60, 2)) @ [1, 1j] * 0.02 * np.abs(found).mean()
+    frf = fq.FrequencyResponse(omega, -(found + noise))
+    assert fq.fit(SPRING, frf, start=begun(SPRING)).warnings[0].kind == "wrong sign"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_turned_where_the_input_is_not_heard(seed):
+    rng = np.random.default_rng(seed)
+    record = fq.Record(rng.standard_normal(1000), rng.standard_normal(1000), DT)
+    kinds = [w.kind for w in fq.fit(SPRING, record, start=begun(SPRING)).warnings]
+    assert "no signal" in kinds
+    assert not {"wrong sign", "swapped channels"} & set(kinds)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nothing_is_turned_in_noise_or_where_a_mode_is_missing(seed):
+    loud = fq.fit(TWO, measured(TWO, "white", 2.0, seed), start=begun(TWO))
+    lacking = fq.fit(SPRING, measured(TWO, "chirp", 0.02, seed), start=begun(SPRING))
+    for est in (loud, lacking):
+        assert not {"wrong sign", "swapped channels"} & {w.kind for w in est.warnings}
+
+
+def test_means_of_periods_of_the_wrong_sign_are_named():
+    u = fq.multisine((1, 60), 2, DT, periods=6)
+    record = fq.simulate(SPRING, u, DT).with_noise(0.02)
+    means = fq.periodic(fq.Record(record.u, -record.y, DT), period=2.0, skip=1)
+    assert fq.fit(SPRING, means, start=begun(SPRING)).warnings[0].kind == "wrong sign"
+
+
+def test_a_log_of_the_wrong_sign_is_named():
+    record = measured(SPRING, "white", 0.02).slice(0, 2)
+    rng = np.random.default_rng(1)
+    kept = np.sort(rng.permutation(record.n_samples)[:800])
+    log = fq.Record.from_logs(record.time, record.u, record.time[kept], -record.y[kept])
+    assert fq.fit(SPRING, log, start=begun(SPRING)).warnings[0].kind == "wrong sign"
