@@ -38,6 +38,7 @@ class Alike:
         self.model, self.records, self.options = model, records, options
         start = checked_start(model, options.get("start"))  # type: ignore[arg-type]
         self.structure = GreyStructure(model, start)
+        self._skip_zero = model.integrates
         self.first = self._lines_of(records[0])
         shape = len(self.first.lines.Y), len(self.first.lines.U)
         if not one_shape([self.first]) or shape != (model.n_outputs, model.n_inputs):
@@ -71,5 +72,5 @@ class Alike:
         # a copy's spectra go with it
         data = in_order_of(self.model, copy.copy(record))
         band, hold = self.options.get("band"), self.options.get("hold")
-        reading = Reading.of(data, hold, band, skip_zero=self.model.integrates)  # type: ignore[arg-type]
+        reading = Reading.of(data, hold, band, skip_zero=self._skip_zero)  # type: ignore[arg-type]
         return reading.lines(like=like)
