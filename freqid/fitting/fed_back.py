@@ -23,6 +23,8 @@ FED_BACK = (
     "what a fit to the input as it is leaves goes together with what the reference leaves of it: "
     "the noise comes back through a loop, or the input was measured with noise; it was not used"
 )
+# what an input that answers to the noise at once looks like
+_ALIKE = frozenset({"feedback", "delay", "feedthrough", "hold rejected"})
 # standard errors that it may have moved a parameter by: going through the reference costs as much
 _HARMLESS = 0.7
 
@@ -44,7 +46,9 @@ def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
         heard = heard or heard_back(left, unexplained, float(np.mean(record.inputs**2)))
     if heard and _pulled(est, readings, way.unexplained) > _HARMLESS:
         return True
-    return any(w.kind == "feedback" and w.severity == "serious" for w in est.warnings)
+    # beside a reference each of these is asked of an input without noise
+    asked = _ALIKE if heard else {"feedback"}
+    return any(w.kind in asked and w.severity == "serious" for w in est.warnings)
 
 
 def _pulled(
