@@ -12,11 +12,15 @@ import scipy
 from freqid.checks import InputError
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.objective import Objective
 from freqid.fitting.findings import Finding
+from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.halves import poles_of, weakly_damped
+from freqid.fitting.suspects.one_more import lines_beside
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.shared_noise import shared
+from freqid.fitting.witness import weighted_by
 from freqid.models import DiscreteModel
 
 # level above which what a pair of poles explains is what noise alone has somewhere
@@ -36,8 +40,14 @@ def in_noise(inquiry: Asking, scene: Scene) -> list[Finding]:
     if order < 1 or model.late or any(r.own_cost for r in inquiry.readings):
         return []
     readings = [r.at_lines() for r in inquiry.readings]
+    # noise that lies where it is strong is explained by any pole there: each line by its own
+    weighted = weighted_by([model], [range(len(readings))], readings)
+    cost = scene.cost
     try:
-        box = Reference.of(model, readings, None, order, structure.stable)
+        box = Reference.of(model, weighted, None, order, structure.stable)
+        if any(new is not old for new, old in zip(weighted, readings, strict=True)):
+            objective = Objective(structure, lines_beside(structure, weighted))
+            cost = polish(objective, inquiry.minimum.x).cost
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return []
     started = 2 * sum(len(s.free) > 0 for s in scene.seen)
@@ -46,7 +56,7 @@ def in_noise(inquiry: Asking, scene: Scene) -> list[Finding]:
     below = int(min(scene.freedom / wider, scene.noise_freedom))
     if degrees < 1 or below < 10:
         return []
-    f = max(box.cost / scene.cost - 1, 0.0) * scene.freedom / degrees / wider
+    f = max(box.cost / cost - 1, 0.0) * scene.freedom / degrees / wider
     # it may lie at any of the lines
     places = sum(s.experiment.n_lines for s in scene.seen)
     p = min(float(scipy.stats.f.sf(f, degrees, below)) * places, 1.0)

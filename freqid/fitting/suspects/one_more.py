@@ -87,7 +87,7 @@ class _Comparison:
         places = float(sum(s.experiment.n_lines for s in scene.seen))
         # the mode's own initial state is free, too
         started = 2 * sum(len(s.free) > 0 for s in scene.seen) - len(scene.absorbed)
-        lines = thinned_to(_lines(structure, [r.at_lines() for r in ways]), _LINES)
+        lines = thinned_to(lines_beside(structure, [r.at_lines() for r in ways]), _LINES)
         some = Objective(structure, lines).point(grey.x)
         boxes = _boxes(self.model, scene, ways, _Worth(some, started, scene.freedom, places))
         if not boxes:
@@ -102,7 +102,7 @@ class _Comparison:
             told = [(grey.cost / box.cost - 1, places if scene.even else places**2)]
         else:
             again = _weighed_again(begun, readings, weighted)
-            seen = (Objective(structure, _lines(structure, of)) for of in (weighted, again))
+            seen = (Objective(structure, lines_beside(structure, of)) for of in (weighted, again))
             costs = [polish(objective, grey.x).cost for objective in seen]
             # where the black box tells the noise its shape is as uncertain as the mode's place
             more_again = costs[1] / box.on(again).cost - 1
@@ -150,7 +150,9 @@ def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:
     return model if isinstance(model, DiscreteModel) else None
 
 
-def _lines(structure: EstimatedStructure, readings: Sequence[Reading]) -> list[SpectralExperiment]:
+def lines_beside(
+    structure: EstimatedStructure, readings: Sequence[Reading]
+) -> list[SpectralExperiment]:
     """Lines in the plane of a structure."""
     if not isinstance(structure, Chart):
         return [r.lines() for r in readings]
