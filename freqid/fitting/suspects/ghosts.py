@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
@@ -21,7 +22,7 @@ from freqid.fitting.suspects.one_more import lines_beside
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.fitting.witness import weighted_by
-from freqid.models import DiscreteModel
+from freqid.models import ContinuousModel, DiscreteModel, GreyBox, observed_order
 
 # level above which what a pair of poles explains is what noise alone has somewhere
 _CHANCE = 0.05
@@ -33,25 +34,31 @@ def in_noise(inquiry: Asking, scene: Scene) -> list[Finding]:
     """A finding where a black box of two orders less explains as much, but for a peak of noise, and
     lacks a mode of this one.
     """
-    model, structure = inquiry.model, inquiry.minimum.structure
-    if not isinstance(model, DiscreteModel) or not isinstance(structure, Chart):
+    model, structure, x = inquiry.model, inquiry.minimum.structure, inquiry.minimum.x
+    plant: GreyBox | DiscreteModel
+    if isinstance(model, DiscreteModel) and isinstance(structure, Chart):
+        plant, stable = model, structure.stable
+    elif isinstance(model, ContinuousModel) and isinstance(structure, GreyStructure):
+        plant, stable = structure.at(x), False
+    else:
         return []
-    order = len(structure.centre.A) - 2
+    order = observed_order(model) - 2
     if order < 1 or model.late or any(r.own_cost for r in inquiry.readings):
         return []
     readings = [r.at_lines() for r in inquiry.readings]
     # noise that lies where it is strong is explained by any pole there: each line by its own
-    weighted = weighted_by([model], [range(len(readings))], readings)
+    weighted = weighted_by([model], [range(len(readings))], readings, every=not scene.even)
     cost = scene.cost
     try:
-        box = Reference.of(model, weighted, None, order, structure.stable)
+        box = Reference.of(plant, weighted, None, order, stable)
         if any(new is not old for new, old in zip(weighted, readings, strict=True)):
             objective = Objective(structure, lines_beside(structure, weighted))
-            cost = polish(objective, inquiry.minimum.x).cost
+            cost = polish(objective, x).cost
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return []
     started = 2 * sum(len(s.free) > 0 for s in scene.seen)
-    degrees = structure.size - box.unknowns + started
+    # a rational function with few zeros chooses hardly more than the smaller black box
+    degrees = max(len(x) - box.unknowns, 2) + started
     wider = shared([(box.objective, box.solution.x)])
     below = int(min(scene.freedom / wider, scene.noise_freedom))
     if degrees < 1 or below < 10:
@@ -63,7 +70,7 @@ def in_noise(inquiry: Asking, scene: Scene) -> list[Finding]:
     if p < _CHANCE:
         return []
     modes, known = weakly_damped(poles_of(model)), weakly_damped(box.poles)
-    ghosts = [w for w in modes if not (np.abs(known / w - 1) < _ELSEWHERE).any()]
+    ghosts = _unmatched(modes, known)
     if not ghosts:
         return []
     which = ", ".join(f"{w / (2 * np.pi):.4g}" for w in ghosts)
@@ -74,3 +81,13 @@ def in_noise(inquiry: Asking, scene: Scene) -> list[Finding]:
         "fit a lower order (select_order), or excite it more"
     )
     return [Finding("order too high", text, number=float(ghosts[0] / (2 * np.pi)))]
+
+
+def _unmatched(modes: FloatArray, known: FloatArray) -> list[float]:
+    """Modes that are none of those that are known, each of which is one of them at most."""
+    left = [float(w) for w in modes]
+    for k in known:
+        near = min(left, key=lambda w: abs(w / k - 1), default=np.inf)
+        if abs(near / k - 1) < _ELSEWHERE:
+            left.remove(near)
+    return left

@@ -177,7 +177,7 @@ class Inquiry:
         scene, named = self.scene, self.named
         if scene is None:
             nothing = unheard(self.minimum, self.model, self.readings)
-            return nothing or ([] if self.minimum.exact else self._turned(None))
+            return nothing or self._turned(None)
         if found := silent(scene):
             return self._turned(scene, quiet=True) or found
         if found := leaking(scene, self.model, self._std):

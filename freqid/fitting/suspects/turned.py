@@ -21,7 +21,7 @@ from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Finding
+from freqid.fitting.findings import Finding, out_of_sight
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import Asking
@@ -33,13 +33,16 @@ from freqid.models import GreyBox
 _BETTER = 0.5
 # or what is explained to grow so many times; by no chance at this level either
 _MORE, _CHANCE = 4.0, 1e-6
-# part of what a black box explains besides that has to be explained
-_MOST = 0.7
+# part of what a black box explains besides that has to be explained, and what may be left over what
+# it leaves where channels are exchanged
+_MOST, _NEAR = 0.7, 4.0
 # the same where values alone speak against a fit: no more than so much may be left
 _AS_GOOD = 1.1
 # starts of the fits to the data turned back, channels that are turned one by one at the most, and
 # lines of a black box
 _STARTS, _CHANNELS, _LINES = 3, 8, 600
+# what a fit to data turned back must not say
+_INSANE = ("not physical", "above Nyquist")
 _SIDES = {"y": "output", "u": "input"}
 # part of an output left that may mean trouble, and that from which no black box has to say so
 _LEFT, _MOST_LEFT = 0.05, 0.3
@@ -57,18 +60,22 @@ class _Turn:
 def turned(inquiry: Asking, scene: Scene | None, unphysical: bool, quiet: bool) -> list[Finding]:
     """A finding where the plant explains the data turned back, and them alone, with sense.
 
-    Asked where values are ``unphysical``, or much is left of an output; where the fit is ``quiet``,
-    the input not heard in it, whatever is no chance is enough.
+    Asked where values are ``unphysical``, a mode has gone out of sight, or much is left of an
+    output; where the fit is ``quiet``, the input not heard in it, whatever is no chance is enough.
     """
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or isinstance(structure, PlacedStructure):
         return []
-    asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
-    trouble = unphysical or quiet or asked.shares.max() > _LEFT
-    if not isinstance(structure, GreyStructure) or not trouble:
+    if not isinstance(structure, GreyStructure):
         return []
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
+    asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
+    # the mirror image of a mode explains as much with another sign
+    hidden = _hidden(model, inquiry) and not _hidden(begun, inquiry)
+    unphysical = unphysical or (hidden and asked.share < _BETTER)
+    if not (unphysical or quiet or asked.shares.max() > _LEFT):
+        return []
     best: tuple[float, _Turn] | None = None
     for turn in _turns(model, inquiry.readings[0].data):
         try:
@@ -79,10 +86,11 @@ def turned(inquiry: Asking, scene: Scene | None, unphysical: bool, quiet: bool) 
             told = asked.explained(est, readings, turn.kind)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             continue
-        if any(w.kind == "not physical" for w in est.signs):
+        if any(w.kind in _INSANE for w in est.signs):
             continue
         left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
-        if not (told or (unphysical and left < _AS_GOOD * asked.share)):
+        as_good = est.minimum.exact or left < _AS_GOOD * asked.share
+        if not (told or (unphysical and as_good)):
             continue
         if best is None or left < best[0]:
             best = left, turn
@@ -114,6 +122,11 @@ def shares(minimum: Minimum, scene: Scene | None) -> FloatArray:
     return found
 
 
+def _hidden(model: GreyBox, inquiry: Asking) -> bool:
+    """Whether a mode lies above every hold's Nyquist frequency."""
+    return all(out_of_sight(model.poles, r.hold) for r in inquiry.readings)
+
+
 @dataclass(frozen=True)
 class _Asked:
     """What a fit leaves of its data, and what would be less."""
@@ -127,9 +140,8 @@ class _Asked:
         """Of the energy of all data."""
         return float(shares(self.inquiry.minimum, None)[0])
 
-    def _no_chance(self, left: float, unknowns: int) -> bool:
+    def _no_chance(self, left: float, unknowns: int, freedom: float) -> bool:
         """Whether a part of the energy that so many unknowns leave is less by no chance."""
-        freedom = self.inquiry.minimum.freedom
         f = (self.share - left) / max(left, 1e-300) * freedom / max(unknowns, 1)
         return bool(scipy.stats.f.sf(max(f, 0.0), max(unknowns, 1), freedom) < _CHANCE)
 
@@ -139,15 +151,21 @@ class _Asked:
         """
         left = float(shares(est.minimum, None)[0])
         box = self._boxes.get(kind)
-        if not self._no_chance(left, len(est.values)):
+        after = _scene(est.minimum, readings)
+        # where noise lies on few lines unknowns take as many of them
+        freedom = est.minimum.freedom if after is None else _room(after)
+        if not self._no_chance(left, len(est.values), freedom):
             return False
         if box is not None and self.share - left < _MOST * (self.share - box):
             return False
+        # some other plant's inverse may look like this one from far
+        if box is not None and kind == "swapped channels" and left > _NEAR * box:
+            return False
         if self.quiet or 1 - left > _MORE * max(1 - self.share, 0.0):
             return True
-        if len(self.shares) == 1:
+        own, worst = shares(est.minimum, after), np.argmax(self.shares)
+        if len(own) < 2 or len(self.shares) < 2:
             return left < _BETTER * self.share
-        own, worst = shares(est.minimum, Scene.of(est.minimum, readings)), np.argmax(self.shares)
         return bool(own[worst] < _BETTER * self.shares[worst])
 
     @cached_property
@@ -170,10 +188,24 @@ class _Asked:
         left = self._boxes[kind]
         if left is None:
             return self.quiet or bool(self.shares.max() > _MOST_LEFT)
-        if not self._no_chance(left, len(model.free_parameters)):
+        freedom = self.inquiry.minimum.freedom
+        if not self._no_chance(left, len(model.free_parameters), freedom):
             return False
         enough = len(self.shares) > 1 or self.quiet or left < _BETTER * self.share
         return enough or 1 - left > _MORE * max(1 - self.share, 0.0)
+
+
+def _scene(minimum: Minimum, readings: Sequence[Reading]) -> Scene | None:
+    """What is left at the lines; None where there are none."""
+    try:
+        return None if minimum.exact else Scene.of(minimum, readings)
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return None
+
+
+def _room(scene: Scene) -> float:
+    """Real values among which noise is spread, those where it is largest counting one each."""
+    return float(scene.variance.sum() / max(scene.variance.max(), 1e-300))
 
 
 def _turns(model: GreyBox, data: DataSet) -> list[_Turn]:
