@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
-from freqid.lti import Hold, PeriodicHold
+from freqid.checks import FloatArray
 from freqid.models import Parameter
 
 if TYPE_CHECKING:
@@ -267,14 +266,6 @@ def rounded(e: Evidence) -> Iterator[Finding]:
     lost, sentence = e.rounding
     if lost > _ROUNDED:
         yield Finding("rounding", sentence.removeprefix("rounding: "), "minor", lost)
-
-
-def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:
-    """Frequencies (Hz) of continuous poles above the Nyquist frequency of a hold."""
-    if not isinstance(hold, PeriodicHold):
-        return []
-    turning = poles.imag[poles.imag > np.pi / hold.period * (1 + 1e-6)]
-    return sorted(float(w) / (2 * np.pi) for w in turning)
 
 
 @sign

@@ -16,12 +16,13 @@ from freqid.fitting.cost.places import Place, places_of
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Evidence, findings, out_of_sight
+from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
+from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.twins import nearest_to_start
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
@@ -193,6 +194,7 @@ def _estimate(
         place = structure.names.index(HoldPeriod.name)
         held = float(values[place]), float(std[place])
         hold = ZeroOrderHold(held[0])
+    poles = np.linalg.eigvals(plant.A).astype(complex)
     evidence = Evidence(
         structure.parameters,
         values[:count],
@@ -203,7 +205,7 @@ def _estimate(
         output_dt(reading.data),
         minimum.objective.n_rows,
         len(values),
-        out_of_sight=out_of_sight(np.linalg.eigvals(plant.A).astype(complex), hold),
+        out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],

@@ -14,7 +14,6 @@ from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, best_so_far, minimise, polish
@@ -22,6 +21,7 @@ from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Search
 from freqid.fitting.search.stopping import Found
+from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.lti import Hold
 
 # lines on which the minimum is looked for, and how many times more for noise as large as the signal
@@ -151,7 +151,7 @@ def _searched(
         return guide_of(beside, structure, few, data.share)
 
     # who begins with a mode out of sight means it
-    hidden = partial(_hidden, structure, [r.hold for r in readings])
+    hidden = partial(_hidden, structure, [hold_that_changes(r.hold, r.data) for r in readings])
     aliased = (lambda x: False) if hidden(start) else hidden
     guide = guide_of(beside, structure, few, data.share)
     search = Search(scout, guide, data.floor, aliased, deepened, data.part)

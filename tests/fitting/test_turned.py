@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import freqid as fq
 
@@ -176,3 +177,33 @@ def test_what_looks_like_the_inverse_of_a_plant_from_far_is_not_exchanged(seed):
     est = fq.fit(bounded(accelerometer, m=0.5, c=1.0, k=300.0), record)
     assert not {"wrong sign", "swapped channels"} & {w.kind for w in est.warnings}
     assert not est.verdict.trusted
+
+
+def test_a_slow_output_of_the_wrong_sign_is_no_mirrored_mode():
+    """Found: trusted, with 90 times the stiffness, where the input changes only with the output."""
+
+    def speed(m, c, k):
+        A, B, _, _ = spring(m, c, k)
+        return A, B, [[0.0, 1.0]], [[0.0]]
+
+    model, rng = bounded(speed, m=2.0, c=3.0, k=900.0), np.random.default_rng(0)
+    record = fq.simulate(model, np.repeat(rng.standard_normal(400), 10), 1e-3)
+    y = record.y + 0.1 * record.y.std() * rng.standard_normal(4000)
+    for sign in (1, -1):
+        slow = fq.Record(record.u, sign * y, 1e-3).decimate(10, keep_input=True)
+        est = fq.fit(model, slow, start=begun(model))
+        assert est.verdict.trusted if sign > 0 else est.warnings[0].kind == "wrong sign"
+
+
+@pytest.mark.parametrize("times", [5.0, 1e6])
+@pytest.mark.parametrize("model", [SPRING, LAG])
+def test_slow_noise_turns_nothing(model, times):
+    """Found in 20 of 63: lines that hold most of the noise are soon explained."""
+    for seed in range(2):
+        rng = np.random.default_rng([seed, 7])
+        u = np.repeat(rng.standard_normal(15), 40)
+        y = fq.simulate(model, u, 0.01).y
+        e = scipy.signal.lfilter([1], [1, -0.98], rng.standard_normal(1100))[500:]
+        record = fq.Record(u, y + times * y.std() / e.std() * e, 0.01)
+        kinds = {w.kind for w in fq.fit(model, record, start=begun(model)).warnings}
+        assert not {"wrong sign", "swapped channels"} & kinds

@@ -10,8 +10,8 @@ import scipy
 from freqid.checks import InputError
 from freqid.data import input_dt
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.findings import out_of_sight
 from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.sight import out_of_sight
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.refits import held, late
 from freqid.fitting.suspects.scene import Scene

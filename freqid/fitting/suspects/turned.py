@@ -21,9 +21,10 @@ from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Finding, out_of_sight
+from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
+from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.minimum import Minimum
@@ -124,7 +125,9 @@ def shares(minimum: Minimum, scene: Scene | None) -> FloatArray:
 
 def _hidden(model: GreyBox, inquiry: Asking) -> bool:
     """Whether a mode lies above every hold's Nyquist frequency."""
-    return all(out_of_sight(model.poles, r.hold) for r in inquiry.readings)
+    return all(
+        out_of_sight(model.poles, hold_that_changes(r.hold, r.data)) for r in inquiry.readings
+    )
 
 
 @dataclass(frozen=True)

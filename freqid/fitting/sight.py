@@ -1,0 +1,29 @@
+"""Modes that samples show at another frequency: those above what the input's hold can tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import ComplexArray
+from freqid.data import DataSet, Record
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
+
+
+def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:
+    """Frequencies (Hz) of continuous poles above the Nyquist frequency of a hold."""
+    if not isinstance(hold, PeriodicHold):
+        return []
+    turning = poles.imag[poles.imag > np.pi / hold.period * (1 + 1e-6)]
+    return sorted(float(w) / (2 * np.pi) for w in turning)
+
+
+def hold_that_changes(hold: Hold, data: DataSet) -> Hold:
+    """The hold as slow as the input itself: one that is faster than the output, but changes only
+    with it, tells no more than the output's own samples.
+    """
+    if not isinstance(data, Record) or data.factor == 1 or type(hold) is not ZeroOrderHold:
+        return hold
+    M = data.factor
+    count = len(data.u) // M
+    steps = data.inputs[: count * M].reshape(count, M, -1)
+    return ZeroOrderHold(M * hold.period) if (steps == steps[:, :1]).all() else hold
