@@ -49,8 +49,6 @@ _WORTH, _SAID = 0.5, 3
 _SURE = 1e-6
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
-# standard errors by which a value is not physical for certain
-_CERTAIN = 2.0
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
@@ -208,20 +206,7 @@ class Inquiry:
         return [*confirmed(self, scene, said, found), *more]
 
     def _turned(self, scene: Scene | None, quiet: bool = False) -> list[Finding]:
-        return turned(self, scene, self._unphysical, quiet)
-
-    @cached_property
-    def _unphysical(self) -> bool:
-        """Whether a value is not physical by more than two standard errors."""
-        structure = self.minimum.structure
-        if not isinstance(self.model, GreyBox):
-            return False
-        scale = np.abs(getattr(structure, "scale", np.ones(len(self._std))))
-        std = np.nan_to_num(self._std * scale, posinf=0.0)
-        return any(
-            not p.physical[0] - _CERTAIN * s <= p.value <= p.physical[1] + _CERTAIN * s
-            for p, s in zip(self.model.free_parameters, std, strict=False)
-        )
+        return turned(self, scene, quiet)
 
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""

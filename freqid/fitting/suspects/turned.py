@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import scipy
@@ -42,8 +42,8 @@ _AS_GOOD = 1.1
 # starts of the fits to the data turned back, channels that are turned one by one at the most, and
 # lines of a black box
 _STARTS, _CHANNELS, _LINES = 3, 8, 600
-# what a fit to data turned back must not say
-_INSANE = ("not physical", "above Nyquist")
+# standard errors by which a value is not physical for certain
+_CERTAIN = 2.0
 _SIDES = {"y": "output", "u": "input"}
 # part of an output left that may mean trouble, and that from which no black box has to say so
 _LEFT, _MOST_LEFT = 0.05, 0.3
@@ -58,10 +58,10 @@ class _Turn:
     back: Callable[[Reading], Reading]
 
 
-def turned(inquiry: Asking, scene: Scene | None, unphysical: bool, quiet: bool) -> list[Finding]:
+def turned(inquiry: Asking, scene: Scene | None, quiet: bool) -> list[Finding]:
     """A finding where the plant explains the data turned back, and them alone, with sense.
 
-    Asked where values are ``unphysical``, a mode has gone out of sight, or much is left of an
+    Asked where values are not physical, a mode has gone out of sight, or much is left of an
     output; where the fit is ``quiet``, the input not heard in it, whatever is no chance is enough.
     """
     model, structure = inquiry.model, inquiry.minimum.structure
@@ -74,7 +74,7 @@ def turned(inquiry: Asking, scene: Scene | None, unphysical: bool, quiet: bool) 
     asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
     # the mirror image of a mode explains as much with another sign
     hidden = _hidden(model, inquiry) and not _hidden(begun, inquiry)
-    unphysical = unphysical or (hidden and asked.share < _BETTER)
+    unphysical = _unphysical(inquiry.minimum, model) or (hidden and asked.share < _BETTER)
     if not (unphysical or quiet or asked.shares.max() > _LEFT):
         return []
     best: tuple[float, _Turn] | None = None
@@ -87,7 +87,8 @@ def turned(inquiry: Asking, scene: Scene | None, unphysical: bool, quiet: bool) 
             told = asked.explained(est, readings, turn.kind)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             continue
-        if any(w.kind in _INSANE for w in est.signs):
+        mirrored = any(w.kind == "above Nyquist" for w in est.signs)
+        if mirrored or _unphysical(est.minimum, cast(GreyBox, est.model), np.inf):
             continue
         left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
         as_good = est.minimum.exact or left < _AS_GOOD * asked.share
@@ -121,6 +122,19 @@ def shares(minimum: Minimum, scene: Scene | None) -> FloatArray:
     )  # fmt: skip
     found: FloatArray = left / np.maximum(whole, 1e-300)
     return found
+
+
+def _unphysical(minimum: Minimum, model: GreyBox, untold: float = 0.0) -> bool:
+    """Whether a value is not physical by more than two standard errors, of those that the data do
+    not tell ``untold``.
+    """
+    variance = np.diag(minimum.covariance)
+    scale = np.abs(getattr(minimum.structure, "scale", np.ones(len(variance))))
+    std = np.sqrt(np.where(np.isfinite(variance), np.maximum(variance, 0), untold)) * scale
+    return any(
+        not p.physical[0] - _CERTAIN * s <= p.value <= p.physical[1] + _CERTAIN * s
+        for p, s in zip(model.free_parameters, std, strict=False)
+    )
 
 
 def _hidden(model: GreyBox, inquiry: Asking) -> bool:
