@@ -111,7 +111,7 @@ def fit(
     print(f"witness {estimate.witness.verdict}: {typed(estimate.witness.sentence)}")
     for warning in estimate.warnings:
         print(f"warning: {typed(str(warning))}")
-    for note in [*getattr(record, "notes", ()), *estimate.notes]:
+    for note in estimate.notes:
         print(f"note: {typed(note)}")
     if compared is not None and validate is not None:
         shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)

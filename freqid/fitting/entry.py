@@ -22,6 +22,7 @@ from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.clock_offset import clock_notes, with_clock_offset
 from freqid.fitting.closed_loop import through_references, with_loop_noise
+from freqid.fitting.data_notes import notes_of
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fed_back import FED_BACK, fed_back
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
@@ -205,9 +206,10 @@ def fit(
     }  # fmt: skip
     call = call_of(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings, share)
+    notes += [*est.notes, *notes_of(given_sets)]
     est = dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
-        notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes, *est.notes],
+        notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes],
     )  # fmt: skip
     if reference != "auto" or near or not fed_back(est, readings, way):
         return est

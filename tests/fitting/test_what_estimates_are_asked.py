@@ -144,3 +144,21 @@ def test_periodic_responses_know_their_channels_by_place():
     told = fq.cost_test(est)
     assert told["expected"] > 0
     assert 1e-4 < told["p_value"] <= 1
+
+
+def test_an_estimate_tells_what_was_done_to_its_data(tmp_path):
+    """Stamps that were put on a regular grid looked like a wrong hold, and nothing said so."""
+    rng = np.random.default_rng(0)
+    stamps = np.cumsum(0.01 * (1 + 0.2 * rng.random(500)))
+    path = tmp_path / "log.csv"
+    rows = np.column_stack([stamps, rng.standard_normal((500, 2))])
+    np.savetxt(path, rows, delimiter=",", header="time,u,y", comments="")
+    record = fq.read(path, resample=True)
+    est = fq.fit(fq.first_order(), record)
+    assert est.notes[-1] == f"data: {record.notes[-1]}"
+    assert "jitter" in est.notes[-1]
+    assert f"note: {est.notes[-1]}" in repr(est)
+    many = [dataclasses.replace(record, notes=(f"note {i}", "shared")) for i in range(12)]
+    told = fq.fit(fq.first_order(), many).notes
+    assert told[-1] == "data: and 5 more (record.notes)"
+    assert told.count("data: shared") == 1
