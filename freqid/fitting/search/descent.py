@@ -71,20 +71,23 @@ def minimise(
     bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
 
     most = limit or 100 * size
+    asked = np.geterr()
 
     def searched(begin: FloatArray, gain: float, most: int) -> scipy.optimize.OptimizeResult:
-        return scipy.optimize.least_squares(
-            residual,
-            np.clip(begin, lower, upper),
-            jac=jacobian,
-            bounds=(lower, upper) if bounded else (-np.inf, np.inf),
-            method="trf" if bounded else "lm",
-            x_scale="jac",
-            ftol=max(gain, 1e-15),
-            xtol=max(1e-2 * gain, 1e-12),
-            gtol=1e-15,
-            max_nfev=most,
-        )
+        # a valley without an end overflows the arithmetic of a trust region: no step is taken then
+        with np.errstate(all="ignore"):
+            return scipy.optimize.least_squares(
+                np.errstate(**asked)(residual),
+                np.clip(begin, lower, upper),
+                jac=np.errstate(**asked)(jacobian),
+                bounds=(lower, upper) if bounded else (-np.inf, np.inf),
+                method="trf" if bounded else "lm",
+                x_scale="jac",
+                ftol=max(gain, 1e-15),
+                xtol=max(1e-2 * gain, 1e-12),
+                gtol=1e-15,
+                max_nfev=most,
+            )
 
     if bounded:
         near = searched(start, max(tolerance, _NEAR), min(most, _REFLECTED * size))
