@@ -61,7 +61,7 @@ def in_noise(inquiry: Asking, scene: Scene) -> list[Finding]:
     degrees = max(len(x) - box.unknowns, 2) + started
     wider = shared([(box.objective, box.solution.x)])
     below = int(min(scene.freedom / wider, scene.noise_freedom))
-    if degrees < 1 or below < 10:
+    if below < 10:
         return []
     f = max(box.cost / cost - 1, 0.0) * scene.freedom / degrees / wider
     # it may lie at any of the lines

@@ -65,9 +65,9 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool) -> list[Finding]:
     output; where the fit is ``quiet``, the input not heard in it, whatever is no chance is enough.
     """
     model, structure = inquiry.model, inquiry.minimum.structure
-    if not isinstance(model, GreyBox) or isinstance(structure, PlacedStructure):
+    if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
         return []
-    if not isinstance(structure, GreyStructure):
+    if isinstance(structure, PlacedStructure):
         return []
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
