@@ -40,7 +40,8 @@ _FOLDED = 0.002
 
 
 class Finding(str):
-    """A sentence of ``est.warnings``: a ``str`` with ``kind``, ``severity`` and ``number``.
+    """A sentence of ``est.warnings``: a ``str`` with ``kind``, ``severity``, ``number`` and, where
+    it is a test's, the ``p_value``.
 
     >>> found = Finding("edge of a bound", "d=0 is at its bound 0", number=0.0)
     >>> found, found.kind
@@ -50,16 +51,20 @@ class Finding(str):
     kind: str
     severity: Severity
     number: float | None
+    p_value: float | None
 
     def __new__(
-        cls, kind: str, sentence: str, severity: Severity = "serious", number: float | None = None
-    ) -> Finding:
+        cls, kind: str, sentence: str, severity: Severity = "serious",
+        number: float | None = None, p_value: float | None = None,
+    ) -> Finding:  # fmt: skip
         self = super().__new__(cls, f"{kind}: {sentence}")
-        self.kind, self.severity, self.number = kind, severity, number
+        self.kind, self.severity, self.number, self.p_value = kind, severity, number, p_value
         return self
 
-    def __getnewargs__(self) -> tuple[str, str, Severity, float | None]:  # type: ignore[override]
-        return self.kind, self[len(self.kind) + 2 :], self.severity, self.number
+    def __getnewargs__(  # type: ignore[override]
+        self,
+    ) -> tuple[str, str, Severity, float | None, float | None]:
+        return self.kind, self[len(self.kind) + 2 :], self.severity, self.number, self.p_value
 
 
 class Inquired(Protocol):

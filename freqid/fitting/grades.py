@@ -20,7 +20,8 @@ _MANY = 10
 _VAGUE = 0.5
 # how often chance makes a gap to a black box as large that is next to none
 _BESIDE = 0.3
-# what makes numbers useless where it is what explains most of what is wrong
+# what makes numbers useless where it is what explains most of what is wrong, and the chance up to
+# which it is certain to
 _USELESS = frozenset(
     {
         "not converged",
@@ -31,6 +32,7 @@ _USELESS = frozenset(
         "hold rejected",
     }
 )
+_SURE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ def verdict(est: Estimate) -> Verdict:
     std = np.sqrt(np.diag(est.covariance_matrix))
     if not est.converged and not any("not converged" in r for r in reasons):
         reasons.insert(0, f"not converged: {est.message}")
-    if not est.converged or (serious and getattr(serious[0], "kind", "") in _USELESS):
+    if not est.converged or (serious and _useless(serious[0])):
         return Verdict("do not use", reasons)
     if est.witness.verdict == "lacking":
         reasons.append(est.witness.sentence)
@@ -75,6 +77,12 @@ def verdict(est: Estimate) -> Verdict:
     if reasons:
         return Verdict("doubt", reasons)
     return Verdict("trust", [_supported(est, std)])
+
+
+def _useless(warning: str) -> bool:
+    """Whether what a warning says, and is no chance, leaves numbers without a use."""
+    chance = getattr(warning, "p_value", None) or 0.0
+    return getattr(warning, "kind", "") in _USELESS and chance < _SURE
 
 
 def _spent(est: Estimate) -> list[str]:

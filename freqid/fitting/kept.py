@@ -166,7 +166,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
     est.__dict__.update(
         witness=Witness(**{**witness, "degrees": tuple(witness["degrees"])}),
         verdict=Verdict(verdict["grade"], list(verdict["reasons"])),
-        warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"])
+        warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"], w.get("p_value"))
                   for w in kept["findings"]],
         _parameters=with_tied(table, est, Z95),
         digests=[d["sha256"] for d in kept["data"]],
@@ -201,6 +201,7 @@ def _finding(warning: str) -> Written:
         "kind": kind, "sentence": warning[len(kind) + 2 :],
         "severity": getattr(warning, "severity", "serious"),
         "number": getattr(warning, "number", None),
+        "p_value": getattr(warning, "p_value", None),
     }  # fmt: skip
 
 

@@ -46,7 +46,7 @@ def test_what_is_kept(kind, tmp_path):
     assert np.array_equal(kept.covariance_matrix, est.covariance_matrix)
     assert kept.verdict == est.verdict
     assert kept.witness.verdict == est.witness.verdict
-    assert [w.kind for w in kept.warnings] == [w.kind for w in est.warnings]
+    assert [vars(w) for w in kept.warnings] == [vars(w) for w in est.warnings]
     assert (kept.hold, kept.dt, kept.band) == (est.hold, est.dt, est.band)
     data = est.data[0]
     assert np.array_equal(fq.compare(kept, data).simulated, fq.compare(est, data).simulated)

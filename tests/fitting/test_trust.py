@@ -135,6 +135,18 @@ def test_a_band_limited_input_is_not_called_decimated():
     assert "band-limited" in direct.warnings[0]
 
 
+def test_what_chance_may_say_of_a_hold_is_a_doubt_and_no_more():
+    """Found: right to one standard error and "do not use", at a p that one fit in 2,000 has."""
+    graded = {"certain": set(), "likely": set()}
+    for seed in range(12):
+        record = fq.simulate(LAG, fq.white_noise(2400, seed=seed), DT).with_noise(0.5, seed=seed)
+        est = fq.fit(LAG, record, hold=fq.ZeroOrderHold(0.85 * DT))
+        if est.warnings and est.warnings[0].kind == "hold rejected":
+            certain = est.warnings[0].p_value < 1e-6
+            graded["certain" if certain else "likely"].add(est.verdict.grade)
+    assert graded == {"certain": {"do not use"}, "likely": {"doubt"}}
+
+
 def test_a_wrong_sign_and_swapped_channels_are_named():
     record = fq.simulate(LAG, fq.white_noise(1000, seed=2), DT).with_noise(0.1)
     negated = fq.Record(record.u, -record.y, DT)
@@ -287,7 +299,7 @@ def test_error_bars_of_windowed_averages():
 def test_the_true_plant_beside_local_responses_is_trusted(method):
     grades = []
     for seed in range(6):
-        record = fq.simulate(LAG, fq.white_noise(3000, seed=seed), 5e-3).with_noise(0.3, seed=seed)
+        record = fq.simulate(LAG, fq.white_noise(3000, seed=seed), 5e-3).with_noise(0.5, seed=seed)
         frf = method(record, band=(1, 60))
         est = fq.fit(LAG, frf, weights="noise")
         assert est.witness.verdict == "complete"

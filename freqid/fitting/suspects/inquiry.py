@@ -233,7 +233,7 @@ class Inquiry:
             # halves that differ leave the mean of both where it is
             small = bool(a.unit) and abs(a.test.size) < HOLDS_GOOD
         severity: Severity = "minor" if small else "serious"
-        return Finding(a.name, text, severity, float(a.test.statistic))
+        return Finding(a.name, text, severity, float(a.test.statistic), float(a.p_value))
 
     @tuned
     def spread(self, est: Estimate) -> pd.DataFrame:
