@@ -20,7 +20,7 @@ from freqid.lti.holds import (
 )
 from freqid.lti.observability import observed, reduced
 from freqid.lti.polynomials import PolynomialBasis
-from freqid.lti.projection import directions, eliminate, triangle, triangle_of
+from freqid.lti.projection import directions, eliminate, solved, triangle, triangle_of
 from freqid.lti.quadrature import NODES, TOLERANCE, panel_nodes, resolved, unresolved
 from freqid.lti.realisation import Realisation, Timing, sampled_response
 from freqid.lti.responses import (

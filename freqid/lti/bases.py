@@ -37,7 +37,7 @@ def eigenbasis_of_many(at: StateSpace, derivative: StateSpace | None = None) -> 
     finite = np.asarray(np.all([np.isfinite(M).all(axis=(1, 2)) for M in at], axis=0))
     first = int(np.argmax(finite))
     A = np.where(finite[:, None, None], at.A, np.eye(at.A.shape[-1]))
-    scale = state_scale(StateSpace(*(np.nan_to_num(M[first]) for M in at)))
+    scale = state_scale(StateSpace(*(M[first] for M in at)))
     eigenvalues, V, inverse, good = eigenvectors_of_many(A, scale)
     others = np.flatnonzero(finite & ~good)
     if len(others):

@@ -17,6 +17,7 @@ WORST_CONDITION = 2e4
 _LOST, _NO_GAP = 1e-12, 1e-13
 # corrections that reach this are the last; so many at the most
 _CLOSE, _TIMES = 1e-14, 4
+_EPS = float(np.finfo(float).eps)
 
 Eigen = tuple[ComplexArray, ComplexArray, ComplexArray]
 
@@ -41,16 +42,17 @@ def eigenvectors(at: StateSpace) -> Eigen | None:
     if not np.abs(inverse).max(initial=0) * n < WORST_CONDITION:
         return None
     eigen = eigenvalues.astype(complex, copy=False), V, inverse
-    if doubled_where_needed() and _lost(*eigen) > _LOST:
+    if doubled_where_needed() and _lost(eigen[0], inverse) > _LOST:
         eigen = refined(A, eigen)
     return eigen[0], eigen[1] * scale[:, None], eigen[2] / scale
 
 
-def _lost(eigenvalues: ComplexArray, V: ComplexArray, inverse: ComplexArray) -> float:
+def _lost(eigenvalues: ComplexArray, inverse: ComplexArray) -> float:
     """Relative errors that a last digit of the largest rate leaves in eigenvalues and vectors.
 
     Eigenvalues move by their condition ‖v‖ ‖w‖ times that, vectors by it over the distance to the
-    next eigenvalue (Golub and Van Loan, Matrix Computations, 2013, section 7.2).
+    next eigenvalue; w are the rows of ``inverse``, and LAPACK's v of length one (Golub and
+    Van Loan, Matrix Computations, 2013, section 7.2).
     """
     size = np.abs(eigenvalues)
     largest = float(size.max(initial=0))
@@ -58,9 +60,8 @@ def _lost(eigenvalues: ComplexArray, V: ComplexArray, inverse: ComplexArray) -> 
         return 0.0
     gaps = np.abs(eigenvalues[:, None] - eigenvalues) + np.diag(size)
     gaps[gaps < _NO_GAP * largest] = largest
-    condition = np.linalg.norm(V, axis=0) * np.linalg.norm(inverse, axis=1)
-    lost = condition[:, None] * largest / gaps
-    return float(np.finfo(float).eps * lost.max())
+    condition = np.sqrt(np.einsum("ij,ij->i", inverse, inverse.conj()).real)
+    return float(_EPS * largest * (condition / gaps.min(axis=1)).max())
 
 
 def refined(A: FloatArray, eigen: Eigen) -> Eigen:

@@ -6,10 +6,11 @@ processor's cache.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
+from scipy.linalg import lapack
 
 from freqid.checks import FloatArray
 from freqid.lti.sampled import BLOCK
@@ -72,16 +73,22 @@ def inner(A: FloatArray, B: FloatArray) -> FloatArray:
 # reciprocal condition of a Gram matrix's factor below which half of the digits are gone: pivots do
 # not tell it, they may all be moderate where rows depend on one another
 _LEAST_CONDITION = 1e-5
-# so far from orthonormal after one pass, another does not mend it
-_SKEW = 0.1
+# and below which rows are made orthonormal twice; so far from that after one pass, another does not
+# mend it
+_SECOND, _SKEW = 0.03, 0.1
 
 
-def _condition(L: FloatArray) -> float:
-    """Reciprocal condition of a lower triangle, as LAPACK estimates it."""
-    if not L.size:
-        return 1.0
-    rcond, info = scipy.linalg.lapack.dtrcon(L, norm="1", uplo="L")
-    return float(rcond) if info == 0 else 0.0
+def _factor(gram: FloatArray) -> tuple[FloatArray, float]:
+    """The lower Cholesky factor of a Gram matrix, and its reciprocal condition as LAPACK estimates
+    it, 0 where there is none. Of matrices so small LAPACK's own calls take a quarter of numpy's.
+    """
+    if not gram.size:
+        return gram, 1.0
+    L, failed = lapack.dpotrf(gram, lower=1, clean=1)
+    if failed:
+        return L, 0.0
+    rcond, failed = lapack.dtrcon(L, norm="1", uplo="L")
+    return L, 0.0 if failed else float(rcond)
 
 
 def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None]]) -> FloatArray:
@@ -96,21 +103,20 @@ def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None
     for J, r, Q in blocks:
         full = inner(J, J)
         size += full.diagonal()
-        G, g, rr = G + full, g + J @ r, rr + float(r @ r)
+        G += full
+        g += J @ r
+        rr += float(r @ r)
         if Q is not None:
             seen = inner(J, Q)
-            G = G - seen @ seen.T
+            G -= seen @ seen.T
     size = np.sqrt(size)
-    if np.isfinite(G).all() and np.isfinite(rr) and (size > 0).all():
-        try:
-            L = np.linalg.cholesky(G / np.outer(size, size))
-        except np.linalg.LinAlgError:
-            L = np.zeros_like(G)
-        if _condition(L) > _LEAST_CONDITION:
+    if math.isfinite(float(G.sum()) + rr) and size.min(initial=np.inf) > 0:
+        L, told = _factor(G / (size[:, None] * size))
+        if told > _LEAST_CONDITION:
             R = np.zeros((P + 1, P + 1))
             R[:P, :P] = L.T * size
-            R[:P, P] = np.linalg.solve(L, g / size)
-            R[P, P] = np.sqrt(max(rr - float(R[:P, P] @ R[:P, P]), 0.0))
+            R[:P, P] = c = solved(L, g / size, lower=True)
+            R[P, P] = math.sqrt(max(rr - float(c @ c), 0.0))
             return R
     columns = []
     for J, r, Q in blocks:
@@ -122,6 +128,16 @@ def triangle_of(blocks: Sequence[tuple[FloatArray, FloatArray, FloatArray | None
     return triangle(stacked.T)
 
 
+def solved(T: FloatArray, b: FloatArray, lower: bool = False) -> FloatArray:
+    """T⁻¹ b of a triangle (n, n), upper unless it is ``lower``; LinAlgError where a pivot is 0."""
+    if not len(b):
+        return b
+    x, failed = lapack.dtrtrs(T, b, lower=int(lower))
+    if failed:
+        raise np.linalg.LinAlgError("a pivot of the triangle is zero")
+    return np.asarray(x)
+
+
 def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Orthonormal rows that span those of T (q, rows), and the δ that makes |r + δ T| least."""
     size = np.sqrt(np.einsum("ij,ij->i", T, T))
@@ -131,20 +147,15 @@ def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
         return np.zeros((0, len(r))), delta
     if not used.all():
         T, size = T[used], size[used]
-    gram = inner(T, T) / np.outer(size, size)
-    try:
-        L = np.linalg.cholesky(gram)
-    except np.linalg.LinAlgError:
-        L = np.zeros_like(gram)
-    told = _condition(L)
+    L, told = _factor(inner(T, T) / (size[:, None] * size))
     if told > _LEAST_CONDITION:
-        first = np.linalg.inv(L) / size
+        first = lapack.dtrtri(L, lower=1)[0] / size
         Q = first @ T
-        again = inner(Q, Q) if told < 0.03 else np.eye(len(Q))
-        if np.abs(again - np.eye(len(Q))).max() < _SKEW:
-            if told < 0.03:
+        again = inner(Q, Q) if told < _SECOND else None
+        if again is None or np.abs(again - np.eye(len(Q))).max() < _SKEW:
+            if again is not None:
                 # a second pass makes the rows orthonormal to rounding (CholeskyQR2)
-                second = np.linalg.inv(np.linalg.cholesky(again))
+                second = lapack.dtrtri(_factor(again)[0], lower=1)[0]
                 Q, first = second @ Q, second @ first
             delta[used] = -first.T @ (Q @ r)
             return Q, delta

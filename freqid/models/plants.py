@@ -186,7 +186,8 @@ def _two_mass(
 
 def _stack(rows: list[list[Array]]) -> Array:
     """A matrix of scalars, or of equally long arrays with their axis moved to the front."""
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    matrix: Array = np.array(rows)
+    return matrix if matrix.ndim == 2 else np.moveaxis(matrix, (0, 1), (-2, -1))
 
 
 PLANTS: dict[str, Callable[[], GreyBox]] = {

@@ -23,8 +23,8 @@ def as_dense(matrices: Sequence[object], dtype: type) -> list[Array]:
 
 def _numbers(name: str, M: object, dtype: type) -> Array:
     """A copy, for a function may fill the same arrays at every call."""
-    found = np.array(0 if name == "D" and M is None else M)
-    if dtype is float and np.iscomplexobj(found):
+    found = np.asarray(0 if name == "D" and M is None else M)
+    if dtype is float and found.dtype.kind == "c":
         if found.imag.any():
             raise InputError(
                 f"matrices returned complex numbers in {name}; expected real ones: write a pair "
@@ -37,23 +37,32 @@ def _numbers(name: str, M: object, dtype: type) -> Array:
 def shaped(matrices: Sequence[object], values: Mapping[str, float]) -> StateSpace:
     """Dense, finite matrices of agreeing shapes, or a ValueError that shows the shapes."""
     if not isinstance(matrices, (Sequence, np.ndarray)) or len(matrices) != 4:
-        found = f"{len(matrices)} items" if isinstance(matrices, Sized) else f"{matrices!r:.60}"
-        raise InputError(f"matrices returned {found}; expected A, B, C, D")
+        what = f"{len(matrices)} items" if isinstance(matrices, Sized) else f"{matrices!r:.60}"
+        raise InputError(f"matrices returned {what}; expected A, B, C, D")
     try:
-        shapes = [np.asarray(M, dtype=complex).shape for M in matrices if M is not None]
+        found = [np.asarray(0.0 if M is None else M) for M in matrices]
+        for M in found:
+            if M.dtype.kind not in "fiubc":
+                M.astype(complex)
     except (TypeError, ValueError):
         raise InputError("matrices returned rows of unlike length, or no numbers") from None
-    shapes = [np.asarray(M).shape for M in matrices]
-    text = f"matrices returned shapes A {shapes[0]}, B {shapes[1]}, C {shapes[2]}, D {shapes[3]}"
-    expected = "expected (n, n), (n, inputs), (outputs, n), (outputs, inputs)"
-    if any(len(shape) != 2 for shape in shapes[:3]):
-        raise InputError(f"{text}; {expected}")
-    out = StateSpace(*as_dense(matrices, float))
+    if any(M.ndim != 2 for M in found[:3]):
+        raise _unlike(found)
+    out = StateSpace(*as_dense(found, float))
     n, m, p = out.A.shape[0], out.B.shape[1], out.C.shape[0]
     wanted = ((n, n), (n, m), (p, n), (p, m))
     if any(M.shape != shape for M, shape in zip(out, wanted, strict=True)):
-        raise InputError(f"{text}; {expected}")
+        raise _unlike(found)
     if not all(np.isfinite(M).all() for M in out):
         at = ", ".join(f"{k}={v:g}" for k, v in values.items())
         raise InputError(f"matrices are not finite at {at}; change the values or the function")
     return out
+
+
+def _unlike(found: Sequence[Array]) -> InputError:
+    """What to say of shapes that do not agree."""
+    told = ", ".join(f"{name} {M.shape}" for name, M in zip("ABCD", found, strict=True))
+    return InputError(
+        f"matrices returned shapes {told}; expected (n, n), (n, inputs), (outputs, n), "
+        "(outputs, inputs)"
+    )

@@ -16,11 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.lti import PolynomialBasis, StateSpace, triangle_of
+from freqid.lti import PolynomialBasis, StateSpace, solved, triangle_of
 
 # steps of Sanathanan and Koerner at the most; a denominator that has changed by less than this,
 # relative, on the lines is the last one
@@ -248,12 +249,17 @@ def _least(R: FloatArray, damping: float = 0.0) -> FloatArray:
     if damping:
         size = np.sqrt(damping * (M**2).sum(axis=0))
         M, c = np.concatenate([M, np.diag(size)]), np.append(c, np.zeros(len(size)))
-    else:
-        pivots = np.abs(np.diag(M))
-        if pivots.min() > 1e-10 * pivots.max():
-            return np.linalg.solve(M, c)
     if not np.isfinite(M).all():
         raise np.linalg.LinAlgError("the columns are not finite")
+    if damping:
+        # columns that are damped are no others' sum
+        _, x, failed = lapack.dgels(M, c[:, None])
+        if not failed:
+            return np.asarray(x[: len(size), 0])
+    else:
+        pivots = np.abs(M.diagonal())
+        if pivots.min() > 1e-10 * pivots.max():
+            return solved(M, c)
     return np.linalg.lstsq(M, c)[0]
 
 

@@ -52,7 +52,7 @@ class SpectralEvaluation:
             self._w = self.free.output_rows(t.z, self.free_inverse)
             # (outputs, states, K) to one column for each physical state
             seen = sum_runs(self._w * t.factor, t.aliases)
-            columns = np.moveaxis(basis.to_basis.T @ seen, 0, 1)
+            columns = (basis.to_basis.T @ seen).swapaxes(0, 1)
             self.transient = e.lines.rows(columns[:, :, None, :])
         # what the plant does not move
         still = [rows for rows in (ends, e.added) if rows is not None]

@@ -19,6 +19,8 @@ from freqid.lti import PeriodicHold, eigenbasis_of_many
 
 # eigenvalues of the transients' Gram matrix below this part of the largest tell nothing of them
 _SILENT = 1e-10
+# entries of inverses up to which no eigenvalue is as small
+_PLAIN = 1e6
 
 
 @dataclass(frozen=True)
@@ -184,5 +186,11 @@ def _inverse(gram: FloatArray) -> FloatArray:
     size = np.where((size > 0) & np.isfinite(size), size, 1.0)
     scaled = gram / (size[:, :, None] * size[:, None])
     scaled = np.where(np.isfinite(scaled), scaled, np.eye(gram.shape[-1]))
-    inverse = np.linalg.pinv(scaled, rcond=_SILENT, hermitian=True)
+    try:
+        inverse = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError:
+        inverse = np.array(np.inf)
+    # where all of them tell something of every direction the plain inverse is theirs, and sooner
+    if not np.abs(inverse).max(initial=0) < _PLAIN:
+        inverse = np.linalg.pinv(scaled, rcond=_SILENT, hermitian=True)
     return np.asarray(inverse / (size[:, :, None] * size[:, None]))

@@ -11,6 +11,7 @@ import scipy
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective, Point, Structure
 from freqid.fitting.search.bounded import within_bounds
+from freqid.lti import solved
 
 # what a search says that was ended from the keyboard
 INTERRUPTED = "interrupted: this is the best point so far"
@@ -200,7 +201,7 @@ def _gauss_newton(point: Point) -> FloatArray | None:
     pivots = np.abs(R.diagonal())
     if pivots.min() <= 1e-8 * pivots.max():
         return None
-    return -np.linalg.solve(R, c)
+    return -solved(R, c)
 
 
 def _outside(structure: Structure, x: FloatArray) -> bool:

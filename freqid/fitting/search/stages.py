@@ -122,7 +122,7 @@ class Search:
         # where unknowns are left open more lines settle nothing
         doubted = rule.doubts(found) and rule.determined(found)
         if tried > 1:
-            found = dataclasses.replace(found, solution=self._anew(found.solution))
+            found = dataclasses.replace(found, solution=self._anew(found.solution, start))
         return dataclasses.replace(self._finished(found), sure=not doubted)
 
     def _done(self, found: Found, rule: StopRule) -> bool:
@@ -208,12 +208,14 @@ class Search:
         self._best_log_cost = min(walked.cost, self._best_log_cost)
         return structure.value(walked.x)
 
-    def _anew(self, solution: Solution) -> Solution:
-        """A minimum that was met in doubles, with all the digits that its plant needs."""
+    def _anew(self, solution: Solution, start: FloatArray) -> Solution:
+        """A minimum that was met in doubles, with all the digits that its plant needs; that of the
+        ``start`` where these show that there is no such plant.
+        """
         self.objective.forget()
         point = self.objective.point(solution.x)
         if point is None:
-            return solution
+            return minimise(self.objective, start, limit=_LAST_LIMIT)
         if abs(point.cost - solution.cost) <= _DIGITS * solution.cost + self.objective.rounding:
             return dataclasses.replace(solution, point=point)
         return polish(self.objective, solution.x, limit=_LAST_LIMIT)

@@ -70,7 +70,7 @@ class Bound:
     def level(self, cost: float) -> float:
         """How often noise alone makes the gap to a right model's cost as large as this one."""
         gap = max(cost / max(self.cost, 1e-300) - 1, 0.0) * max(self.freedom, 1)
-        return float(scipy.stats.chi2.sf(gap, max(self.extra, 1)))
+        return float(scipy.special.chdtrc(max(self.extra, 1), gap))
 
 
 def agreement(level: float) -> int:

@@ -14,7 +14,7 @@ from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse
 from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
-from freqid.fitting.suspects import changing, measurement, plant
+from freqid.fitting.suspects import changing, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.ghosts import in_noise
@@ -52,7 +52,7 @@ _SMALL, _HARMLESS = 0.3, 1e-3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
 # the files whose suspects are known
-_KNOWN = (changing, measurement, plant)
+_KNOWN = (changing, measurement, nonlinear, plant)
 # level at which all suspects together speak of good data
 LEVEL = 0.0065
 

@@ -23,7 +23,8 @@ _SAMPLES = (1, 2, 4)
 _AHEAD, _BEFORE = 6, 12
 
 
-def _responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
+def responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
+    """Of a model as a hold samples it at omega (rad/s), (outputs, inputs, K)."""
     return model.responses_at(omega, None if model.dt else hold)
 
 
@@ -39,7 +40,7 @@ def delay(scene: Scene, model: Model) -> list[Columns]:
     for s in scene.seen:
         omega, hold, step = s.omega_input, s.reading.hold, s.reading.sample_time
         own = s.own(model)
-        G = _responses(own, hold, omega)
+        G = responses(own, hold, omega)
         if not model.dt:
             held = isinstance(hold, PeriodicHold) and not model.late
             slope = _slope(own, hold, omega) if held else -1j * omega * G
@@ -57,7 +58,7 @@ def _slope(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
     A, B, C, D = model.state_space()
     zeros = np.zeros_like(D)
     change = SystemModel(StateSpace(A, B, C @ A, C @ B), model.inputs or (), model.outputs or ())
-    G = _responses(change, hold, omega)
+    G = responses(change, hold, omega)
     assert isinstance(hold, PeriodicHold)
     late = (1 - np.exp(-1j * omega * hold.period)) / hold.period
     return -(G + D[:, :, None] * late if (zeros != D).any() else G)
@@ -96,7 +97,7 @@ def hold_period(scene: Scene, model: Model) -> Columns | None:
         if _one_rate(s) and isinstance(h, PeriodicHold):
             step = _STEP * h.period
             up, down = (
-                _responses(s.own(model), dataclasses.replace(h, period=h.period + d), s.omega_input)
+                responses(s.own(model), dataclasses.replace(h, period=h.period + d), s.omega_input)
                 for d in (step, -step)
             )
             drawn.append(s.answered((up - down) / (2 * step))[None])
@@ -117,8 +118,8 @@ def hold(scene: Scene, model: Model) -> list[Columns]:
             other = _alternative(name, s, model.late)
             if other is None or other == s.reading.hold:
                 break
-            own = _responses(s.own(model), s.reading.hold, s.omega_input)
-            drawn.append(s.answered(_responses(s.own(model), other, s.omega_input) - own)[None])
+            own = responses(s.own(model), s.reading.hold, s.omega_input)
+            drawn.append(s.answered(responses(s.own(model), other, s.omega_input) - own)[None])
         if len(drawn) == len(scene.seen):
             kinds[name] = drawn
     return [Columns(d, "", len(kinds), name) for name, d in kinds.items()]

@@ -118,7 +118,7 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
     shift = moved / np.where(std > 0, std, np.inf)
     largest = float(np.nanmax(shift[np.isfinite(shift)], initial=0.0))
     sizes = delta / size
-    p = float(scipy.stats.f.sf(chi / q, q, freedom))
+    p = float(scipy.special.fdtrc(q, freedom, chi / q))
     biggest = float(sizes[np.argmax(np.abs(delta))])
     change = scene.relative(moved)
     return Score(chi / q, q, p, biggest, power, largest, gain, change)

@@ -68,6 +68,15 @@ class Seen:
         rows: FloatArray = lines.rows(sum_runs(y, lines.aliases))
         return rows
 
+    def driven(self, G: ComplexArray, signals: FloatArray) -> FloatArray:
+        """Rows of what a response (outputs, inputs, K) makes of other signals of the inputs
+        (c, inputs, N), (c, rows); of lines that are no other's alias.
+        """
+        lines, (N, at) = self.experiment.lines, self.grid
+        spectrum = np.fft.rfft(signals[..., :N], axis=-1)[..., at]
+        y = np.einsum("pmk,cmk->cpk", G, spectrum) * lines.scale[:, 0]
+        return np.ascontiguousarray(y.reshape(len(signals), -1)).view(float)
+
     @property
     def grid(self) -> tuple[int, IntArray]:
         """Samples of the record's outputs, and which lines of their DFT these are, (K,)."""

@@ -20,6 +20,11 @@ CURES = {
     "spikes": "look at the record there; fit with loss='huber', or mend the sample",
     "tone": "look for its source; weights='noise' counts the lines around it less",
     "saturation": "lower the excitation, or leave those samples out",
+    "friction": (
+        "give it as an input of its own, record.with_input('coulomb', the sign of the motion), "
+        "or move the plant so that it does not turn round"
+    ),
+    "nonlinear": "lower the excitation, or identify at the level at which the plant will work",
     "feedback": "the record is of a closed loop: give it its reference, or excite it by one",
     "unlike experiments": "fit them apart and compare; find out what has changed between them",
     "amplitude": "the plant is not linear: identify it at the level at which it will work",
@@ -52,6 +57,8 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "spikes": f"one sample is off by {number} {detail}",
         "tone": f"a sine of {number} {detail} is added that the input does not have",
         "saturation": f"{detail or 'an output stays at one extreme value'}, as at a limit",
+        "friction": f"a friction of {number} of the input turns round with {detail}",
+        "nonlinear": f"the plant is not linear: {detail}",
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
         "amplitude": "the parameters change with the level of the input",

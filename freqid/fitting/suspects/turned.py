@@ -92,7 +92,8 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool) -> list[Finding]:
             continue
         left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
         as_good = est.minimum.exact or left < _AS_GOOD * asked.share
-        if not (told or (unphysical and as_good)):
+        # of what is not heard values are on either side of zero by chance
+        if not (told or (unphysical and as_good and not quiet)):
             continue
         if best is None or left < best[0]:
             best = left, turn

@@ -36,7 +36,7 @@ def alike(powers: FloatArray, counts: FloatArray) -> bool:
     pooled = float(n @ s / n.sum())
     wider = 1 + (np.sum(1 / n) - 1 / n.sum()) / (3 * (k - 1))
     q = (n.sum() * np.log(pooled) - n @ np.log(s)) / wider
-    return bool(scipy.stats.chi2.sf(q, k - 1) >= _LEVEL)
+    return bool(scipy.special.chdtrc(k - 1, q) >= _LEVEL)
 
 
 def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:

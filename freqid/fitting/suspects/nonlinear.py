@@ -1,0 +1,146 @@
+"""Suspects that are not linear: friction that only changes its sign, a gain that bends.
+
+What is linear is free beside them: of a Gaussian signal the cube, less what goes with the signal
+itself, goes together with nothing linear (Price, IRE Trans. Information Theory 4, 1958), and of a
+sweep it stands where the sweep is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.fitting.suspects.plant import responses
+from freqid.fitting.suspects.register import Columns, suspect
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.seen import Seen
+from freqid.models import Model
+
+# inputs times outputs that are asked at the most
+_PAIRS = 9
+# part of a signal's range that its values differ by where they are levels, and how many levels are
+# no more than a cube can be told from
+_LEVEL, _LEVELS = 1e-6, 3
+
+
+@suspect("friction")
+def friction(scene: Scene, model: Model) -> list[Columns]:
+    """What acts on an input against the direction of motion, however fast that is: Coulomb's.
+
+    An output is taken for the velocity, and for the position. Of as many inputs as outputs each
+    has its own.
+    """
+    if not _asked(scene, model):
+        return []
+    ways: dict[str, Callable[[FloatArray], FloatArray]] = {
+        "the output": _direction,
+        "the slope of the output": lambda y: _direction(np.gradient(y, axis=-1)),
+    }
+    drawn = {
+        text: [_against(s, model, direction(_fitted(s))) for s in scene.seen]
+        for text, direction in ways.items()
+    }
+    return [
+        Columns(rows, _unit(scene), len(ways), text, onesided=True) for text, rows in drawn.items()
+    ]
+
+
+@suspect("nonlinear")
+def nonlinear(scene: Scene, model: Model) -> list[Columns]:
+    """A gain that bends: the drive's, the sensor's, or a spring's."""
+    if not _asked(scene, model):
+        return []
+    kinds: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
+    for s in scene.seen:
+        u, y = s.record.inputs[: s.grid[0]].T, _fitted(s)  # type: ignore[union-attr]
+        pairs = _pairs(model)
+        if all(_more_than_levels(each) for each in u):
+            drive = _onto(s, model, u, [(i, i) for i in range(model.n_inputs)])
+            straight = _onto(s, model, u, [(i, i) for i in range(model.n_inputs)], 1)
+            kinds.setdefault("the input's gain changes with its size", []).append((drive, straight))
+        spring = _onto(s, model, y, pairs)
+        kinds.setdefault("a force bends with the output", []).append(
+            (spring, _onto(s, model, y, pairs, 1))
+        )
+        each = np.eye(len(y))[:, :, None]
+        sensor = s.sampled(each * _cube(y)), s.sampled(each * y)
+        kinds.setdefault("the sensor's gain changes with the output's size", []).append(sensor)
+    told = {text: rows for text, rows in kinds.items() if len(rows) == len(scene.seen)}
+    return [
+        Columns([bent for bent, _ in rows], "", len(told), text, [linear for _, linear in rows])
+        for text, rows in told.items()
+    ]
+
+
+def _asked(scene: Scene, model: Model) -> bool:
+    """Whether the data can show it: records whose outputs are as fast as their inputs."""
+    alike = all(s.record is not None and s.experiment.lines.aliases == 1 for s in scene.seen)
+    return alike and len(_pairs(model)) <= _PAIRS
+
+
+def _pairs(model: Model) -> list[tuple[int, int]]:
+    """Inputs and the outputs that tell their motion: its own, or any."""
+    if model.n_inputs == model.n_outputs:
+        return [(i, i) for i in range(model.n_inputs)]
+    return [(i, o) for i in range(model.n_inputs) for o in range(model.n_outputs)]
+
+
+def _fitted(s: Seen) -> FloatArray:
+    """The outputs as the model has them, (outputs, N), of which noise changes no sign."""
+    lines = s.experiment.lines
+    rows = lines.rows(lines.Y) + s.left
+    return s.signals(s.unweighted(rows[None])[0])
+
+
+def _direction(velocity: FloatArray) -> FloatArray:
+    """The mean over each sample of a velocity's sign, the velocity a straight line within it."""
+    after = np.concatenate([velocity[..., 1:], velocity[..., -1:]], axis=-1)
+    size = np.abs(velocity) + np.abs(after)
+    turns = velocity * after < 0
+    mean = (velocity + after) / np.where(size > 0, size, 1)
+    found: FloatArray = np.where(turns, mean, np.sign(velocity + after))
+    return found
+
+
+def _against(s: Seen, model: Model, direction: FloatArray) -> FloatArray:
+    """Rows of each input that is less by the sign of an output, (pairs, rows)."""
+    signals = np.zeros((len(_pairs(model)), model.n_inputs, direction.shape[-1]))
+    for row, (i, o) in enumerate(_pairs(model)):
+        signals[row, i] = -direction[o]
+    return _driven(s, model, signals)
+
+
+def _onto(
+    s: Seen, model: Model, signal: FloatArray, pairs: list[tuple[int, int]], power: int = 3
+) -> FloatArray:
+    """Rows of each input with a signal (channels, N), or its cube, beside it."""
+    bent = signal if power == 1 else _cube(signal)
+    signals = np.zeros((len(pairs), model.n_inputs, signal.shape[-1]))
+    for row, (i, o) in enumerate(pairs):
+        signals[row, i] = bent[o]
+    return _driven(s, model, signals)
+
+
+def _driven(s: Seen, model: Model, signals: FloatArray) -> FloatArray:
+    return s.driven(responses(s.own(model), s.reading.hold, s.omega_input), signals)
+
+
+def _cube(signal: FloatArray) -> FloatArray:
+    """The cube, in the signal's own size."""
+    size = np.sqrt(np.mean(signal**2, axis=-1, keepdims=True))
+    found: FloatArray = signal * (signal / np.where(size > 0, size, 1)) ** 2
+    return found
+
+
+def _more_than_levels(signal: FloatArray) -> bool:
+    """Whether a signal has more than so few levels that a straight line meets all cubes."""
+    steps = np.round((signal - signal.min()) / max(_LEVEL * float(np.ptp(signal)), 1e-300))
+    return len(np.unique(steps)) > _LEVELS
+
+
+def _unit(scene: Scene) -> str:
+    record = scene.seen[0].record
+    unit = dict(record.units).get(record.input_names[0], "") if record is not None else ""
+    return f" {unit}" if unit else ""
