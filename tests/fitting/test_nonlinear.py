@@ -69,10 +69,11 @@ def inputs(kind, seed=0):
 def test_friction_that_only_changes_its_sign_is_named_with_its_size(model, kind):
     """Found: trusted with a damping 63 % off under white inputs, "hold rejected" under a chirp."""
     est = fq.fit(model, measured(model, inputs(kind), "friction", 0.1))
-    assert est.warnings[0].kind == "friction"
+    assert "friction" in [w.kind for w in est.warnings]
     assert est.verdict.grade == "doubt"
     # what has come to rest is held by less than its friction
     if (model, kind) != (SPRING, "steps"):
+        assert est.warnings[0].kind == "friction"
         assert abs(est.suspects.loc["friction", "size"] - 0.1) < 0.02
 
 
@@ -82,8 +83,8 @@ def test_friction_that_only_changes_its_sign_is_named_with_its_size(model, kind)
         (LAG, "white", "drive", 0.5, "input's gain"),
         (SPRING, "chirp", "drive", 0.5, "input's gain"),
         (SPRING, "chirp", "dead zone", 0.2, ""),
-        (SPRING, "chirp", "spring", 0.2, "force bends"),
-        (SPRING, "steps", "spring", 0.2, "force bends"),
+        (SPRING, "chirp", "spring", 0.2, "k changes"),
+        (SPRING, "steps", "spring", 0.2, "k changes"),
     ],
 )
 def test_a_gain_that_bends_is_named(model, kind, fault, size, what):
@@ -114,6 +115,44 @@ def test_linear_plants_are_called_neither(model):
             said = [w.kind for w in fq.fit(model, late).warnings]
             assert said[0] == "delay"
             assert not {"friction", "nonlinear"} & set(said)
+
+
+AXIS = fq.two_mass(fm=0.01, d=100.0)
+
+
+def geared(u, bends=0.0, gap=0.0, noise=0.02):
+    """The two-mass axis, its gear a spring that bends or has a gap; eight steps a sample."""
+    plant, dt = AXIS, 1e-3
+    Jm, k, Ja, fm, d, r = (plant[n] for n in ("Jm", "k", "Ja", "fm", "d", "gear"))
+
+    def moves(x, u):
+        twist = x[0] - np.clip(x[0], -gap, gap)
+        torque = k * twist * (1 + bends * (twist / 1e-4) ** 2) + d * (r * x[1] - x[2])
+        return np.array([r * x[1] - x[2], (u - fm * x[1] - r * torque) / Jm, torque / Ja])
+
+    x, y, h = np.zeros(3), np.empty(len(u)), dt / 8
+    for i, held in enumerate(u):
+        y[i] = x[1]
+        for _ in range(8):
+            a = moves(x, held)
+            b = moves(x + h / 2 * a, held)
+            c = moves(x + h / 2 * b, held)
+            x = x + h / 6 * (a + 2 * b + 2 * c + moves(x + h * c, held))
+    e = np.random.default_rng(3).standard_normal(len(u))
+    return fq.Record(u, y + noise * y.std() * e, dt)
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault"), [("binary", {"bends": 0.067}), ("chirp", {"gap": 1e-5})]
+)
+def test_a_gear_that_bends_inside_of_the_plant_is_named(kind, fault):
+    """Found: trusted with a stiffness up to 18 times too large, 25 standard errors off."""
+    held = np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 1334), 3)[:4000]
+    u = held if kind == "binary" else fq.chirp(10, 80, 2.0, 1e-3)
+    est = fq.fit(AXIS, geared(u, **fault))
+    assert est.warnings[0].kind == "nonlinear"
+    assert "k changes with its motion" in est.warnings[0]
+    assert fq.fit(AXIS, geared(u)).verdict.trusted
 
 
 def turning(velocity):

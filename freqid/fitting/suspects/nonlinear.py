@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from freqid.checks import FloatArray
+from freqid.fitting.suspects.elements import Element, elements
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
@@ -27,13 +28,15 @@ _LEVEL, _LEVELS = 1e-6, 3
 
 @suspect("friction")
 def friction(scene: Scene, model: Model) -> list[Columns]:
-    """What acts on an input against the direction of motion, however fast that is: Coulomb's.
+    """What acts against the direction of motion, however fast that is: Coulomb's.
 
-    An output is taken for the velocity, and for the position. Of as many inputs as outputs each
-    has its own.
+    On an input, an output being the velocity, or the position; of as many inputs as outputs each
+    has its own. Beside each damper of a grey box, with what that one answers to.
     """
     if not _asked(scene, model):
         return []
+    dampers = [each for each in _elements(scene, model) if each[0].damps]
+    count = 2 + len(dampers)
     ways: dict[str, Callable[[FloatArray], FloatArray]] = {
         "the output": _direction,
         "the slope of the output": lambda y: _direction(np.gradient(y, axis=-1)),
@@ -42,17 +45,27 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
         text: [_against(s, model, direction(_fitted(s))) for s in scene.seen]
         for text, direction in ways.items()
     }
-    return [
-        Columns(rows, _unit(scene), len(ways), text, onesided=True) for text, rows in drawn.items()
+    found = [
+        Columns(rows, _unit(scene), count, text, onesided=True) for text, rows in drawn.items()
     ]
+    for each in dampers:
+        rows = []
+        for e, s in zip(each, scene.seen, strict=True):
+            own = s.own(model)
+            rows.append(e.answers_input(s, own, _direction(e.moves(s, own))))
+        found.append(Columns(rows, "", count, f"what {each[0].name} damps", onesided=True))
+    return found
 
 
 @suspect("nonlinear")
 def nonlinear(scene: Scene, model: Model) -> list[Columns]:
-    """A gain that bends: the drive's, the sensor's, or a spring's."""
+    """A gain that bends: the drive's, the sensor's, a spring's at the output, or that of any spring
+    or damper of a grey box.
+    """
     if not _asked(scene, model):
         return []
     kinds: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
+    springs = _elements(scene, model)
     for s in scene.seen:
         u, y = s.record.inputs[: s.grid[0]].T, _fitted(s)  # type: ignore[union-attr]
         pairs = _pairs(model)
@@ -60,13 +73,18 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
             drive = _onto(s, model, u, [(i, i) for i in range(model.n_inputs)])
             straight = _onto(s, model, u, [(i, i) for i in range(model.n_inputs)], 1)
             kinds.setdefault("the input's gain changes with its size", []).append((drive, straight))
-        spring = _onto(s, model, y, pairs)
-        kinds.setdefault("a force bends with the output", []).append(
-            (spring, _onto(s, model, y, pairs, 1))
-        )
-        each = np.eye(len(y))[:, :, None]
-        sensor = s.sampled(each * _cube(y)), s.sampled(each * y)
+        if all(each[0].damps for each in springs):
+            spring, straight = _onto(s, model, y, pairs), _onto(s, model, y, pairs, 1)
+            kinds.setdefault("a force bends with the output", []).append((spring, straight))
+        alone = np.eye(len(y))[:, :, None]
+        sensor = s.sampled(alone * _cube(y)), s.sampled(alone * y)
         kinds.setdefault("the sensor's gain changes with the output's size", []).append(sensor)
+    for each in springs:
+        for e, s in zip(each, scene.seen, strict=True):
+            own = s.own(model)
+            motion = e.moves(s, own)
+            bent, straight = (e.answers(s, own, shape) for shape in (_cube(motion), motion))
+            kinds.setdefault(f"{e.name} changes with its motion", []).append((bent, straight))
     told = {text: rows for text, rows in kinds.items() if len(rows) == len(scene.seen)}
     return [
         Columns([bent for bent, _ in rows], "", len(told), text, [linear for _, linear in rows])
@@ -78,6 +96,13 @@ def _asked(scene: Scene, model: Model) -> bool:
     """Whether the data can show it: records whose outputs are as fast as their inputs."""
     alike = all(s.record is not None and s.experiment.lines.aliases == 1 for s in scene.seen)
     return alike and len(_pairs(model)) <= _PAIRS
+
+
+def _elements(scene: Scene, model: Model) -> list[tuple[Element, ...]]:
+    """Springs and dampers, each as every experiment met it."""
+    met = [elements(s.own(model)) for s in scene.seen]
+    same = all([e.name for e in found] == [e.name for e in met[0]] for found in met)
+    return list(zip(*met, strict=True)) if same else []
 
 
 def _pairs(model: Model) -> list[tuple[int, int]]:

@@ -68,6 +68,17 @@ class Seen:
         rows: FloatArray = lines.rows(sum_runs(y, lines.aliases))
         return rows
 
+    def moved(self, G: ComplexArray) -> FloatArray:
+        """Signals (c, N) that a response (c, inputs, K) makes of the input, of lines that are no
+        other's alias.
+        """
+        lines = self.experiment.lines
+        x: ComplexArray = np.einsum("pmk,mck->pck", G, lines.U)[:, 0]
+        if lines.inside:
+            one = lines.scale[0, 0]
+            x = np.divide(x, one, out=np.zeros_like(x), where=one > 0)
+        return self.signals(x)
+
     def driven(self, G: ComplexArray, signals: FloatArray) -> FloatArray:
         """Rows of what a response (outputs, inputs, K) makes of other signals of the inputs
         (c, inputs, N), (c, rows); of lines that are no other's alias.

@@ -1,0 +1,103 @@
+"""Elements of a plant: parameters that make one force of one motion, as springs and dampers do.
+
+Such a parameter p enters A alone, as p b cᵀ: c'x is the motion it answers to, b where its force
+acts. What is not linear in it is a force of another shape at the same place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.suspects.plant import responses
+from freqid.fitting.suspects.seen import Seen
+from freqid.lti import StateSpace
+from freqid.models import GreyBox, Model, SystemModel
+
+# second singular value, as a part of the first, of a derivative that is of one force and one motion
+_ONE = 1e-9
+# part of its change by which A is off a straight line in a parameter
+_BENT = 1e-6
+# part of its own size by which a force is not along an input
+_ALONG = 1e-9
+# elements that are asked at the most
+_MOST = 16
+
+
+@dataclass(frozen=True)
+class Element:
+    """A parameter's force per motion: ``name``, ``force`` b (n,) and ``motion`` c (n,).
+
+    The largest part of the motion counts once. ``damps`` says that the force answers to a velocity;
+    ``along`` is the input (n,) that acts at the same place, where one does.
+    """
+
+    name: str
+    force: FloatArray
+    motion: FloatArray
+    damps: bool
+    along: FloatArray | None
+
+    def moves(self, s: Seen, model: Model) -> FloatArray:
+        """The motion as the fit has it, (1, N)."""
+        A, B, _, _ = model.state_space()
+        return s.moved(self._response(s, StateSpace(A, B, self.motion[None], 0 * B[:1])))
+
+    def answers(self, s: Seen, model: Model, shape: FloatArray) -> FloatArray:
+        """Rows (1, rows) of a force of another shape (1, N), in units of the parameter."""
+        return self._driven(s, model, self.force, shape)
+
+    def answers_input(self, s: Seen, model: Model, shape: FloatArray) -> FloatArray:
+        """The same where an input acts as well in that one's unit, its sign kept."""
+        if self.along is None:
+            return self.answers(s, model, shape)
+        return self._driven(s, model, np.sign(self.force @ self.along) * self.along, shape)
+
+    def _driven(self, s: Seen, model: Model, at: FloatArray, shape: FloatArray) -> FloatArray:
+        A, _, C, D = model.state_space()
+        G = self._response(s, StateSpace(A, at[:, None], C, 0 * D[:, :1]))
+        return s.driven(G, shape[None])
+
+    @staticmethod
+    def _response(s: Seen, plant: StateSpace) -> ComplexArray:
+        names = [f"u{i}" for i in range(plant.B.shape[1])], [f"y{i}" for i in range(len(plant.C))]
+        return responses(SystemModel(plant, *names), s.reading.hold, s.omega_input)
+
+
+def elements(model: Model) -> list[Element]:
+    """Those of a grey box in continuous time, its springs and dampers."""
+    if not isinstance(model, GreyBox) or model.dt or model.late:
+        return []
+    names = [p.name for p in model.parameters if p.name not in model.ties]
+    at, by = model.linearise(model.values, names)
+    found = []
+    for name, dA, others in zip(names, by.A, zip(by.B, by.C, by.D, strict=True), strict=True):
+        if not dA.any() or any(M.any() for M in others):
+            continue
+        scale = np.maximum(np.abs(dA).max(axis=1, keepdims=True), 1e-300)
+        U, sizes, Vt = np.linalg.svd(dA / scale)
+        if (len(sizes) > 1 and sizes[1] > _ONE * sizes[0]) or not _straight(model, name, at.A, dA):
+            continue
+        most = Vt[0][np.argmax(np.abs(Vt[0]))]
+        force, motion = U[:, 0] * sizes[0] * scale[:, 0] * most, Vt[0] / most
+        along = [B for B in at.B.T if _parallel(force, B)]
+        damps = float(force @ motion) < 0
+        found.append(Element(name, force, motion, damps, along[0] if along else None))
+    return found if len(found) <= _MOST else []
+
+
+def _straight(model: GreyBox, name: str, A: FloatArray, dA: FloatArray) -> bool:
+    """Whether A is a straight line in a parameter, which it is in no inertia."""
+    step = model.values[name] or 1.0
+    try:
+        moved = model.state_space(**{name: model.values[name] + step}).A
+    except InputError:
+        return False
+    return bool((np.abs(moved - A - step * dA) <= _BENT * np.abs(step * dA).max()).all())
+
+
+def _parallel(a: FloatArray, b: FloatArray) -> bool:
+    size = np.linalg.norm(a) * np.linalg.norm(b)
+    return bool(size > 0 and abs(abs(a @ b) - size) <= _ALONG * size)
