@@ -100,6 +100,9 @@ def _lonely(est: Estimate) -> list[str]:
     """Many starts of which one alone ended here, where no black box can say that it is best."""
     if est.witness.verdict != "absent" or est.n_starts < _MANY or est.n_agreed > 1:
         return []
+    if est.minimum.exact:
+        # nothing better can be left
+        return []
     return [
         f"not settled: of {est.n_starts} starts this one alone ended here, and no black box says "
         f"that nothing better is left ({est.witness.sentence}); begin from better values, start="

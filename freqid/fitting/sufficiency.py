@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
+from freqid.data import DataSet, Record
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 
 # sums of squares below this have lost their digits
@@ -48,3 +49,11 @@ def told_apart(experiments: Sequence[Experiment]) -> None:
         f"inputs {', '.join(map(str, held))} depend on one another: their effects cannot be told "
         "apart; leave one out, or excite them differently"
     )
+
+
+def moving(sets: Sequence[DataSet]) -> None:
+    """ValueError for an output that stands still in all records, in which no plant shows."""
+    records = [d for d in sets if isinstance(d, Record)]
+    for i, name in enumerate(sets[0].output_names if len(records) == len(sets) else ()):
+        if all(np.ptp(d.outputs[:, i]) == 0 for d in records):
+            raise InputError(f"output {name!r} is constant: nothing of a plant shows in it")

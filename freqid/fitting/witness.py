@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse, Record, StampedRecord
 from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
 from freqid.fitting.black_box.reference import Reference
@@ -46,6 +46,9 @@ _TOUCHES = 1e-3
 _OPEN, _WANTED, _RARE = 0.5, 4, 0.2
 # part of the data's energy from which on noise outweighs what is explained, and makes many minima
 _DROWNED = 0.5
+# part of the lines that are left out on either side, and the factor between the others' variances
+# from which these are unlike by more than the scatter of a few averages
+_FEW, _UNEVEN = 0.05, 30.0
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
@@ -234,14 +237,20 @@ def weighted_by(
             r = readings[i]
             if not r.noise.plain or r.both_ends:
                 continue
-            known = isinstance(r.data, FrequencyResponse) and r.data.variance is not None
-            if every and known:
+            known = r.data.variance if isinstance(r.data, FrequencyResponse) else None
+            if known is not None and (every or _uneven(known)):
                 weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
             left = errors_of(model, r) if isinstance(r.data, Record) else None
             # weights that are not needed would add their own scatter
             if left is not None and (every or not evenly_spread(left.error)):
                 weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))
     return weighted
+
+
+def _uneven(variance: FloatArray) -> bool:
+    """Whether variances that are told differ by more than their own scatter may make them."""
+    low, high = np.quantile(variance, [_FEW, 1 - _FEW])
+    return bool(high > _UNEVEN * low)
 
 
 def excess(

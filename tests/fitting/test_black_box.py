@@ -187,3 +187,21 @@ def test_a_stable_start_lies_inside_of_the_unit_circle():
     chart = Chart(inside, False, Plane(), 1e-3, stable=True)
     lines = Reading.of(record).lines(Plane())
     assert np.isfinite(Objective(chart, [lines]).point(np.zeros(chart.size)).cost)
+
+
+def test_an_output_that_stands_still_is_told_by_its_name():
+    """Found: "the model cannot be computed at poles ..., give another start"."""
+    u = fq.white_noise(300, seed=1)
+    record = fq.Record(u, np.column_stack([u, np.ones(300)]), 1.0, output_names=("a", "b"))
+    with pytest.raises(ValueError, match="'b' is constant"):
+        fq.fit(fq.OutputError(2), record)
+
+
+def test_a_delay_that_is_none_is_no_reason_for_doubt_without_noise():
+    """Found: "not settled", of a cost that is rounding."""
+    plant = fq.GreyBox(
+        lambda w, z, g: ([[0, w], [-w, -2 * z * w]], [[0], [w * g]], [[1.0, 0]], None),
+        [fq.Parameter("w", 0.2 * np.pi), fq.Parameter("z", 0.02), fq.Parameter("g", 1.0)],
+    )
+    record = fq.simulate(plant, fq.white_noise(300, seed=1), 1.0)
+    assert fq.fit(fq.TransferFunction(0, 2, delay="estimate"), record).verdict.trusted

@@ -198,3 +198,26 @@ def test_a_black_box_without_a_residual_speaks_against_a_model_that_leaves_one()
         assert est.witness.verdict == "lacking"
         assert est.verdict.grade != "trust"
         assert "lacking" in repr(est)
+
+
+def _resonance(w, z, g):
+    return [[0, w], [-w, -2 * z * w]], [[0], [w * g]], [[1.0, 0]], None
+
+
+RESONANCE = fq.GreyBox(
+    _resonance,
+    [fq.Parameter("w", 0.2 * np.pi), fq.Parameter("z", 0.02), fq.Parameter("g", 1.0)],
+)
+
+
+def test_variances_that_are_told_are_the_witness_own():
+    """Found: errors of a twentieth of a response, all lines fitted alike, 56 of 100 "lacking"."""
+    f = np.linspace(0.01, 0.3, 100)
+    G = RESONANCE.frequency_response(2 * np.pi * f).response[0, 0]
+    p = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        e = 0.05 * np.abs(G) * (rng.normal(size=100) + 1j * rng.normal(size=100)) / np.sqrt(2)
+        frf = fq.FrequencyResponse(f, G + e, variance=(0.05 * np.abs(G)) ** 2)
+        p.append(fq.fit(RESONANCE, frf).witness.p_value)
+    assert scipy.stats.kstest(p, "uniform").pvalue > 0.01

@@ -28,7 +28,7 @@ from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.sight import out_of_sight
-from freqid.fitting.sufficiency import enough_rows, told_apart
+from freqid.fitting.sufficiency import enough_rows, moving, told_apart
 from freqid.fitting.uncertainty.error_bars import pole_scatter
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.lti import Hold, Plane, StateSpace
@@ -63,6 +63,7 @@ def fit_output_error(
     """The work of ``fit`` for OutputError."""
     first = readings[0]
     shape = channel_counts(first.data)
+    moving([r.data for r in readings])
     lines, plane = lines_in_plane(readings)
     n_parameters = spec.order * sum(shape) + spec.feedthrough * shape[0] * shape[1]
     enough_rows(lines, n_parameters)
