@@ -13,7 +13,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.seen import Seen
-from freqid.lti import StateSpace
+from freqid.lti import Hold, InputHolds, StateSpace
 from freqid.models import GreyBox, Model, SystemModel
 
 # second singular value, as a part of the first, of a derivative that is of one force and one motion
@@ -43,7 +43,8 @@ class Element:
     def moves(self, s: Seen, model: Model) -> FloatArray:
         """The motion as the fit has it, (1, N)."""
         A, B, _, _ = model.state_space()
-        return s.moved(self._response(s, StateSpace(A, B, self.motion[None], 0 * B[:1])))
+        plant = StateSpace(A, B, self.motion[None], 0 * B[:1])
+        return s.moved(self._response(s, plant, s.reading.hold))
 
     def answers(self, s: Seen, model: Model, shape: FloatArray) -> FloatArray:
         """Rows (1, rows) of a force of another shape (1, N), in units of the parameter."""
@@ -57,13 +58,15 @@ class Element:
 
     def _driven(self, s: Seen, model: Model, at: FloatArray, shape: FloatArray) -> FloatArray:
         A, _, C, D = model.state_space()
-        G = self._response(s, StateSpace(A, at[:, None], C, 0 * D[:, :1]))
+        # what acts inside is held as the first input is
+        hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
+        G = self._response(s, StateSpace(A, at[:, None], C, 0 * D[:, :1]), hold)
         return s.driven(G, shape[None])
 
     @staticmethod
-    def _response(s: Seen, plant: StateSpace) -> ComplexArray:
+    def _response(s: Seen, plant: StateSpace, hold: Hold) -> ComplexArray:
         names = [f"u{i}" for i in range(plant.B.shape[1])], [f"y{i}" for i in range(len(plant.C))]
-        return responses(SystemModel(plant, *names), s.reading.hold, s.omega_input)
+        return responses(SystemModel(plant, *names), hold, s.omega_input)
 
 
 def elements(model: Model) -> list[Element]:
