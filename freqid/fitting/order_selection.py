@@ -59,7 +59,8 @@ def select_order(
     with n real values and k parameters and initial states (Ljung, 1999, section 16.4), of responses
     as many as have noise of their own: what leaks into ``etfe`` and ``h1``, and what a polynomial
     misses, is no noise and asks for more orders than the plant has; take the record, or
-    ``local_rational``. Cross-validation is the cost per real value on each quarter of the lines of
+    ``local_rational``. Noise that is far from white is described by more orders, too, which
+    cross-validation takes for less: it is the cost per real value on each quarter of the lines of
     the model and the initial state fitted to the other three. ``feedthrough=None`` tries both;
     ``delays`` are whole samples by which the inputs may come late. An order that cannot be fitted
     has its reason in ``error``. ``attrs["best"]`` is the order with the least ``criterion``:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import FrequencyResponse, Record, as_records, that_estimates
+from freqid.data import AveragedResponse, FrequencyResponse, Record, as_records, that_estimates
 from freqid.frf.measured import measured
+from freqid.frf.segments import memory
 from freqid.frf.spectra import spectra
 
 
@@ -22,7 +23,8 @@ def etfe(
     solved line by line for the response; ``band`` in Hz, None for all lines above zero. Lines at
     which the input has no energy are left out. Where the input is faster than the output, the input
     is taken at the output's lines. Returns a FrequencyResponse (outputs, inputs, K) that keeps the
-    record's hold and the energy |U|²; more experiments than inputs give a variance. Raises
+    record's hold and the energy |U|²; more experiments than inputs give a variance, and remember
+    what they cut off of a plant that rings on. Raises
     ValueError for fewer experiments than inputs or an empty band.
 
     Source: Ljung, System Identification, 1999, section 6.3.
@@ -71,4 +73,10 @@ def etfe(
             noise = (np.abs(Y - G @ U) ** 2).sum(axis=-1) / (count - first.n_inputs)
             spread = np.einsum("kmm->km", inverse).real
             variance = noise[:, :, None] * spread[:, None, :]
-    return measured(first, s.frequency[keep], G, variance, None, power[keep].T)
+    frf = measured(first, s.frequency[keep], G, variance, None, power[keep].T)
+    if count == first.n_inputs:
+        return frf
+    # a mean over experiments lacks what each cuts off, as one over segments does
+    N = first.n_samples
+    told = memory("boxcar", N, N, [r.inputs[:: r.factor][:N].T for r in sets])
+    return AveragedResponse(**frf.__dict__, memory=told)

@@ -86,3 +86,19 @@ def test_memory_goes_with_selections_and_conditions():
         np.testing.assert_array_equal(other.memory, frf.memory)
     assert not frf.memory.flags.writeable
     assert fq.h2(record(5), SEGMENT).memory is not None
+
+
+def test_experiments_that_cut_a_plant_off_say_so_in_their_ratio():
+    """Found: six records of 500 samples each, the damping 2.7 standard errors off, trusted."""
+    cut = fq.etfe([record(seed, samples=500) for seed in range(6)])
+    est = fq.fit(RESONANCE, cut, weights="noise")
+    assert est.warnings[0].kind == "short segments"
+    quiet = [
+        np.concatenate([np.random.default_rng(100 + seed).standard_normal(500), np.zeros(1500)])
+        for seed in range(6)
+    ]
+    whole = fq.etfe([record(seed, u=u) for seed, u in enumerate(quiet)], band=(1, 20))
+    assert fq.fit(RESONANCE, whole, weights="noise").verdict.trusted
+    swept = fq.chirp(2, 12, 10.0, DT)
+    same = fq.etfe([record(seed, u=swept) for seed in range(6)], band=(3, 11))
+    assert same.memory is None

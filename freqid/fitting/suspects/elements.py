@@ -1,6 +1,6 @@
-"""Elements of a plant: parameters that make one force of one motion, as springs and dampers do.
+"""Elements of a plant: free parameters that make one force of one motion, as a spring does.
 
-Such a parameter p enters A alone, as p b cᵀ: c'x is the motion it answers to, b where its force
+Such a parameter p enters A alone, as p b cᵀ: cᵀx is the motion it answers to, b where its force
 acts. What is not linear in it is a force of another shape at the same place.
 """
 
@@ -73,7 +73,8 @@ def elements(model: Model) -> list[Element]:
     """Those of a grey box in continuous time, its springs and dampers."""
     if not isinstance(model, GreyBox) or model.dt or model.late:
         return []
-    names = [p.name for p in model.parameters if p.name not in model.ties]
+    # a user's function need not know how to move what is fixed
+    names = [p.name for p in model.free_parameters]
     at, by = model.linearise(model.values, names)
     found = []
     for name, dA, others in zip(names, by.A, zip(by.B, by.C, by.D, strict=True), strict=True):

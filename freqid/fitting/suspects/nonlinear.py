@@ -38,8 +38,10 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     dampers = [each for each in _elements(scene, model) if each[0].damps]
     count = 2 + len(dampers)
     ways: dict[str, Callable[[FloatArray], FloatArray]] = {
-        "the output": _direction,
-        "the slope of the output": lambda y: _direction(np.gradient(y, axis=-1)),
+        "of the input turns round with the output": _direction,
+        "of the input turns round with the slope of the output": lambda y: _direction(
+            np.gradient(y, axis=-1)
+        ),
     }
     drawn = {
         text: [_against(s, model, direction(_fitted(s))) for s in scene.seen]
@@ -53,7 +55,11 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
         for e, s in zip(each, scene.seen, strict=True):
             own = s.own(model)
             rows.append(e.answers_input(s, own, _direction(e.moves(s, own))))
-        found.append(Columns(rows, "", count, f"what {each[0].name} damps", onesided=True))
+        name, along = each[0].name, each[0].along is not None
+        text = f"of the input turns round with what {name} damps"
+        text = text if along else f"beside {name} turns round with what that one damps"
+        unit = _unit(scene) if along else ""
+        found.append(Columns(rows, unit, count, text, onesided=True))
     return found
 
 

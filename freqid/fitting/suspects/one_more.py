@@ -134,7 +134,11 @@ def _weighed(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> Ask
     more = max(scene.cost - box.cost, 0.0) / max(scene.moving, 1e-300)
     moved = modes_moved(poles_of(inquiry.model), [box.poles])
     order = observed_order(inquiry.model) + 2
-    words = f"a black box of order {order} explains another {100 * more:.2g} % of the data"
+    # where all lines count alike it may have gained nothing
+    share = (
+        f"another {100 * more:.2g} % of the data" if more > 0 else "more where the noise is weak"
+    )
+    words = f"a black box of order {order} explains {share}"
     return dataclasses.replace(found, detail=words, harm=np.inf if moved > HOLDS_GOOD else more)
 
 
