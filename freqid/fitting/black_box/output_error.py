@@ -63,10 +63,10 @@ def fit_output_error(
     """The work of ``fit`` for OutputError."""
     first = readings[0]
     shape = channel_counts(first.data)
-    moving([r.data for r in readings])
     lines, plane = lines_in_plane(readings)
     n_parameters = spec.order * sum(shape) + spec.feedthrough * shape[0] * shape[1]
     enough_rows(lines, n_parameters)
+    moving([r.data for r in readings])
     _enough_lines(spec, lines, n_parameters)
     dt = first.sample_time
     more, seed = (options.n_starts or 1, options.seed) if options else (1, 0)
