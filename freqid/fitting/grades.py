@@ -127,7 +127,7 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
     vague = [n for n, r in zip(est.names, relative, strict=True) if r > _VAGUE]
     outside = [w for w in est.warnings if getattr(w, "kind", "") == "not physical"]
     # of values that are off by so much error bars are no more than their order of magnitude
-    most = np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2)
+    most = bool(np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2))
     most = most or len(vague) > max(len(relative) / 2, 1)
     if not most and (not outside or len(vague) < 2):
         return []
