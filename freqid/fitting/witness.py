@@ -46,9 +46,9 @@ _TOUCHES = 1e-3
 _OPEN, _WANTED, _RARE = 0.5, 4, 0.2
 # part of the data's energy from which on noise outweighs what is explained, and makes many minima
 _DROWNED = 0.5
-# part of the lines that are left out on either side, and the factor between the others' variances
-# from which these are unlike by more than the scatter of a few averages
-_FEW, _UNEVEN = 0.05, 30.0
+# part of the lines that are left out on either side, the factor between the others' variances from
+# which these are unlike, and the neper from one line to the next up to which they are no scatter
+_FEW, _UNEVEN, _SMOOTH = 0.05, 30.0, 0.25
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
@@ -248,9 +248,13 @@ def weighted_by(
 
 
 def _uneven(variance: FloatArray) -> bool:
-    """Whether variances that are told differ by more than their own scatter may make them."""
+    """Whether variances that are told, (outputs, inputs, K), differ by more than their own scatter,
+    which shows from line to line: those of a few averages are no weights.
+    """
     low, high = np.quantile(variance, [_FEW, 1 - _FEW])
-    return bool(high > _UNEVEN * low)
+    if not (variance > 0).all() or high <= _UNEVEN * low:
+        return False
+    return bool(np.median(np.abs(np.diff(np.log(variance)))) < _SMOOTH)
 
 
 def excess(

@@ -299,7 +299,7 @@ def test_error_bars_of_windowed_averages():
 def test_the_true_plant_beside_local_responses_is_trusted(method):
     grades = []
     for seed in range(6):
-        record = fq.simulate(LAG, fq.white_noise(3000, seed=seed), 5e-3).with_noise(0.5, seed=seed)
+        record = fq.simulate(LAG, fq.white_noise(3000, seed=seed), 5e-3).with_noise(0.3, seed=seed)
         frf = method(record, band=(1, 60))
         est = fq.fit(LAG, frf, weights="noise")
         assert est.witness.verdict == "complete"

@@ -221,3 +221,18 @@ def test_variances_that_are_told_are_the_witness_own():
         frf = fq.FrequencyResponse(f, G + e, variance=(0.05 * np.abs(G)) ** 2)
         p.append(fq.fit(RESONANCE, frf).witness.p_value)
     assert scipy.stats.kstest(p, "uniform").pvalue > 0.01
+
+
+def test_variances_of_two_experiments_are_no_weights():
+    """Found: taken for weights, right models were "lacking" in 11 of 25, and without them in 1."""
+    lacking = 0
+    for seed in range(20):
+        runs = []
+        for k in range(2):
+            rng = np.random.default_rng([seed, k])
+            u = np.concatenate([rng.normal(size=400), np.zeros(100)])
+            run = fq.simulate(RESONANCE.with_values(z=0.1), u, 1.0)
+            runs.append(run.with_noise(0.1 * run.y.std(), seed=7000 * seed + k))
+        est = fq.fit(RESONANCE.with_values(z=0.1), fq.etfe(runs, band=(0.02, 0.3)))
+        lacking += est.witness.verdict == "lacking"
+    assert lacking <= 2

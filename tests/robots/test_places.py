@@ -79,14 +79,17 @@ def test_what_ignores_the_posture_is_wrong_and_says_so():
 
 
 def test_intervals_and_witness_over_postures():
+    grades = []
+    for seed in range(0, 50, 10):
+        est = fq.fit(joint(**START), records(noise=0.05, seed=seed))
+        grades.append(est.verdict.grade)
+        assert est.witness.verdict == "complete"
+        table = est.parameters
+        for name in table.index:
+            assert abs(table.value[name] - joint()[name]) < 4 * table["std"][name]
+        assert list(table.index) == ["J", "k", "d"]
     # the noise of seed 0 is one of the two thousand of which a suspect speaks by chance
-    est = fq.fit(joint(**START), records(noise=0.05, seed=10))
-    assert est.witness.verdict == "complete"
-    assert est.verdict.grade == "trust", est.verdict.reasons
-    table = est.parameters
-    for name in table.index:
-        assert abs(table.value[name] - joint()[name]) < 4 * table["std"][name]
-    assert list(table.index) == ["J", "k", "d"]
+    assert grades[1:] == ["trust"] * 4
 
 
 def test_a_better_plant_over_postures_is_missed_by_the_witness():
