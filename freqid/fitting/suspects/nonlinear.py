@@ -76,12 +76,11 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
         u, y = s.record.inputs[: s.grid[0]].T, _fitted(s)  # type: ignore[union-attr]
         pairs = _pairs(model)
         if all(_more_than_levels(each) for each in u):
-            drive = _onto(s, model, u, [(i, i) for i in range(model.n_inputs)])
-            straight = _onto(s, model, u, [(i, i) for i in range(model.n_inputs)], 1)
-            kinds.setdefault("the input's gain changes with its size", []).append((drive, straight))
+            kinds.setdefault("the input's gain changes with its size", []).append(
+                _bent(s, model, u, [(i, i) for i in range(model.n_inputs)])
+            )
         if all(each[0].damps for each in springs):
-            spring, straight = _onto(s, model, y, pairs), _onto(s, model, y, pairs, 1)
-            kinds.setdefault("a force bends with the output", []).append((spring, straight))
+            kinds.setdefault("a force bends with the output", []).append(_bent(s, model, y, pairs))
         alone = np.eye(len(y))[:, :, None]
         sensor = s.sampled(alone * _cube(y)), s.sampled(alone * y)
         kinds.setdefault("the sensor's gain changes with the output's size", []).append(sensor)
@@ -137,24 +136,21 @@ def _direction(velocity: FloatArray) -> FloatArray:
 
 def _against(s: Seen, model: Model, direction: FloatArray) -> FloatArray:
     """Rows of each input that is less by the sign of an output, (pairs, rows)."""
-    signals = np.zeros((len(_pairs(model)), model.n_inputs, direction.shape[-1]))
-    for row, (i, o) in enumerate(_pairs(model)):
-        signals[row, i] = -direction[o]
-    return _driven(s, model, signals)
+    return _onto(s, model, -direction, _pairs(model))
 
 
-def _onto(
-    s: Seen, model: Model, signal: FloatArray, pairs: list[tuple[int, int]], power: int = 3
-) -> FloatArray:
-    """Rows of each input with a signal (channels, N), or its cube, beside it."""
-    bent = signal if power == 1 else _cube(signal)
+def _bent(
+    s: Seen, model: Model, signal: FloatArray, pairs: list[tuple[int, int]]
+) -> tuple[FloatArray, FloatArray]:
+    """Rows of each input with a signal's cube beside it, and with the signal itself."""
+    return _onto(s, model, _cube(signal), pairs), _onto(s, model, signal, pairs)
+
+
+def _onto(s: Seen, model: Model, signal: FloatArray, pairs: list[tuple[int, int]]) -> FloatArray:
+    """Rows (pairs, rows) of each input with a signal (channels, N) beside it."""
     signals = np.zeros((len(pairs), model.n_inputs, signal.shape[-1]))
     for row, (i, o) in enumerate(pairs):
-        signals[row, i] = bent[o]
-    return _driven(s, model, signals)
-
-
-def _driven(s: Seen, model: Model, signals: FloatArray) -> FloatArray:
+        signals[row, i] = signal[o]
     return s.driven(responses(s.own(model), s.reading.hold, s.omega_input), signals)
 
 
@@ -173,5 +169,5 @@ def _more_than_levels(signal: FloatArray) -> bool:
 
 def _unit(scene: Scene) -> str:
     record = scene.seen[0].record
-    unit = dict(record.units).get(record.input_names[0], "") if record is not None else ""
+    unit = record.units.get(record.input_names[0], "") if record is not None else ""
     return f" {unit}" if unit else ""
