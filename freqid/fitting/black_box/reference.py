@@ -111,11 +111,11 @@ class Reference:
             raise InputError(f"no black box with a mode more has a start: {error}") from None
 
     @classmethod
-    def _descended(cls, objective: Objective, bilinear: bool) -> Reference:
+    def _descended(cls, objective: Objective, bilinear: bool, worth: float = np.inf) -> Reference:
         chart = objective.structure
         assert isinstance(chart, Chart)
         start = np.zeros(chart.size)
-        found = polish(objective, start, limit=_LIMIT, tolerance=_TOLERANCE)
+        found = polish(objective, start, limit=_LIMIT, tolerance=_TOLERANCE, worth=worth)
         return cls(objective, found, bilinear)
 
     @property
@@ -134,9 +134,11 @@ class Reference:
         """How many numbers it could choose, initial states left out."""
         return self.chart.size
 
-    def on(self, readings: Sequence[Reading]) -> Reference:
-        """The same followed to the minimum on all lines of other readings of the same data."""
-        return self._from(self.chart.moved(self.solution.x), readings)
+    def on(self, readings: Sequence[Reading], worth: float = np.inf) -> Reference:
+        """The same followed to the minimum on all lines of other readings of the same data, as
+        long as it may come below a cost that makes it ``worth`` the way.
+        """
+        return self._from(self.chart.moved(self.solution.x), readings, worth)
 
     def deepened(self, model: GreyBox, readings: Sequence[Reading]) -> Reference | None:
         """One that leaves less, begun from the model or with modes exchanged; None where none does.
@@ -180,13 +182,13 @@ class Reference:
         W, X = observed(model.state_space(), len(self.chart.centre.A))
         return to_plane(reduced(in_z, W, X), self.chart.plane)
 
-    def _from(self, chart: Chart, readings: Sequence[Reading]) -> Reference:
+    def _from(self, chart: Chart, readings: Sequence[Reading], worth: float = np.inf) -> Reference:
         """The minimum next to the centre of a chart, on all lines or means."""
         seen = [r.beside() for r in readings]
         if self.bilinear:
             seen = [r.on_circle(chart.dt) for r in seen]
         experiments = [r.experiment(chart.plane) for r in seen]
-        return self._descended(Objective(chart, experiments), self.bilinear)
+        return self._descended(Objective(chart, experiments), self.bilinear, worth)
 
     def beside(self, model: GreyBox, readings: Sequence[Reading]) -> Reference:
         """One that begins from a model: it leaves no more than the model does."""
@@ -200,9 +202,15 @@ class Reference:
         return DiscreteModel(in_z, self.chart.dt, hold, like.inputs or (), like.outputs or ())
 
     def with_mode(
-        self, model: GreyBox | DiscreteModel, readings: Sequence[Reading], mode: StateSpace
+        self,
+        model: GreyBox | DiscreteModel,
+        readings: Sequence[Reading],
+        mode: StateSpace,
+        worth: float = np.inf,
     ) -> Reference:
-        """One that begins from a model of an order less and a sampled mode beside it."""
+        """One that begins from a model of an order less and a sampled mode beside it; ``worth`` as
+        it is for ``on``.
+        """
         chart, own = self.chart, _held(model, readings[0].hold)
         W, X = observed(model.state_space(), len(chart.centre.A) - len(mode.A))
         own = reduced(own, W, X)
@@ -211,7 +219,7 @@ class Reference:
             np.concatenate([own.C, mode.C], axis=1), own.D + mode.D,
         )  # fmt: skip
         centre = to_plane(both, chart.plane)
-        return self._from(chart.around(centre), readings)
+        return self._from(chart.around(centre), readings, worth)
 
     @property
     def poles(self) -> ComplexArray:

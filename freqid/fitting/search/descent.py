@@ -11,6 +11,7 @@ import scipy
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective, Point, Structure
 from freqid.fitting.search.bounded import within_bounds
+from freqid.fitting.search.worth import Worth, WorthlessError
 from freqid.lti import solved
 
 # what a search says that was ended from the keyboard
@@ -44,12 +45,16 @@ _WALL = 1e100
 
 
 def minimise(
-    objective: Objective, start: FloatArray, tolerance: float = 1e-14, limit: int | None = None
+    objective: Objective,
+    start: FloatArray,
+    tolerance: float = 1e-14,
+    limit: int | None = None,
+    worth: float = np.inf,
 ) -> Solution:
     """Least squares from one start: Levenberg-Marquardt, within bounds where there are any.
 
-    ``limit`` is the most evaluations. Raises ValueError when the model cannot be computed at the
-    start.
+    ``limit`` is the most evaluations. A way that will end above ``worth`` is left.
+    Raises ValueError when the model cannot be computed at the start.
     """
     first = objective.point(start)
     if first is None:
@@ -57,8 +62,22 @@ def minimise(
             f"the model cannot be computed at {objective.structure.describe(start)}: "
             f"{objective.failure}; give another start"
         )
-    size = len(start) + 1
     objective.failure = None
+    try:
+        return _descended(objective, start, first, tolerance, limit, worth)
+    except WorthlessError as end:
+        return Solution(end.x, end.point, False, str(end))
+
+
+def _descended(
+    objective: Objective,
+    start: FloatArray,
+    first: Point,
+    tolerance: float,
+    limit: int | None,
+    worth: float,
+) -> Solution:
+    size, way = len(start) + 1, Worth(worth)
 
     def residual(x: FloatArray) -> FloatArray:
         point = objective.point(x)
@@ -66,7 +85,11 @@ def minimise(
 
     def jacobian(x: FloatArray) -> FloatArray:
         point = objective.point(x)
-        return np.zeros((size, size - 1)) if point is None else _padded(point.jacobian, size)
+        if point is None:
+            return np.zeros((size, size - 1))
+        # asked only where a step has led
+        way.meet(x, point)
+        return _padded(point.jacobian, size)
 
     lower, upper = objective.structure.lower, objective.structure.upper
     bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
@@ -129,14 +152,16 @@ def polish(
     last_step: float = _LAST_STEP,
     limit: int | None = None,
     tolerance: float = 1e-14,
+    worth: float = np.inf,
 ) -> Solution:
     """A few Gauss-Newton steps from a point close to the minimum; a full search where they fail
     or would leave the bounds.
 
     The unknowns are of order one. A step below ``last_step`` is taken without a second look.
+    ``worth`` is that of ``minimise``.
     """
     end, x = _straight_down(objective, x, last_step, tolerance)
-    return minimise(objective, x, tolerance, limit) if end is None else end
+    return minimise(objective, x, tolerance, limit, worth) if end is None else end
 
 
 def straight_down(objective: Objective, x: FloatArray) -> Solution | None:

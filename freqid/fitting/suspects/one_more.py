@@ -88,8 +88,13 @@ class _Comparison:
         # the mode's own initial state is free, too
         started = 2 * sum(len(s.free) > 0 for s in scene.seen) - len(scene.absorbed)
         lines = thinned_to(lines_beside(structure, [r.at_lines() for r in ways]), _LINES)
+        # the minimum of the readings themselves is known
+        own = self.plain or ways is self.readings
+        costs = [] if own else [self._least(weighted)]
+        whole = costs[0] if costs else grey.cost
         some = Objective(structure, lines).point(grey.x)
-        boxes = _boxes(self.model, scene, ways, _Worth(some, started, scene.freedom, places))
+        worth = _Worth(some, whole, started, scene.freedom, places)
+        boxes = _boxes(self.model, scene, ways, worth)
         if not boxes:
             return None
         begun = min(boxes, key=lambda b: b.cost)
@@ -102,10 +107,9 @@ class _Comparison:
             told = [(grey.cost / box.cost - 1, places if scene.even else places**2)]
         else:
             again = _weighed_again(begun, readings, weighted)
-            seen = (Objective(structure, lines_beside(structure, of)) for of in (weighted, again))
-            costs = [polish(objective, grey.x).cost for objective in seen]
+            costs = costs or [self._least(weighted)]
             # where the black box tells the noise its shape is as uncertain as the mode's place
-            more_again = costs[1] / box.on(again).cost - 1
+            more_again = self._least(again) / box.on(again).cost - 1
             told = [(costs[0] / box.cost - 1, places), (more_again, places**2)]
         wider = shared([(box.objective, box.solution.x)])
         if inquiry.share is not None and isinstance(structure, GreyStructure):
@@ -125,6 +129,12 @@ class _Comparison:
         if isinstance(inquiry.model, GreyBox):
             return found
         return _weighed(found, inquiry, scene, begun.on(inquiry.readings))
+
+    def _least(self, readings: Sequence[Reading]) -> float:
+        """What the model leaves of readings that are weighted in another way."""
+        minimum = self.inquiry.minimum
+        seen = lines_beside(minimum.structure, readings)
+        return polish(Objective(minimum.structure, seen), minimum.solution.x).cost
 
 
 def _weighed(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> Asked:
@@ -195,22 +205,37 @@ def _weighed_again(
 
 @dataclass(frozen=True)
 class _Worth:
-    """What a black box has to leave of some lines to be worth following to its minimum.
+    """What a black box has to leave to be worth following to its minimum: of so many unknowns,
+    most of the gain that would be no chance.
 
-    ``grey`` is the model's own point on them; ``started`` are unknowns beside the box's own.
+    ``few`` is the model's own point on some lines, ``whole`` what it leaves on all of them;
+    ``started`` are unknowns beside the box's own.
     """
 
-    grey: Point | None
+    few: Point | None
+    whole: float
     started: int
     freedom: int
     places: float
 
-    def cost(self, unknowns: int) -> float:
-        """Of a box of so many unknowns: most of the gain that would be no chance."""
+    def of_some(self, unknowns: int) -> float:
+        """Of the lines from which it begins."""
+        return self._less(np.inf if self.few is None else self.few.cost, unknowns)
+
+    def of_all(self, unknowns: int) -> float:
+        """Of all lines, where chance gains less."""
+        return self._less(self.whole, unknowns)
+
+    def not_left(self, boxes: Sequence[Reference]) -> list[Reference]:
+        """Those that were followed to their end: in weights by what they leave they may tell more
+        than in those by what the model leaves.
+        """
+        return [b for b in boxes if b.solution.converged or b.cost <= self.of_all(b.unknowns)]
+
+    def _less(self, cost: float, unknowns: int) -> float:
         degrees = max(unknowns + self.started, 1)
         freedom = max(self.freedom - degrees, 1)
         f = scipy.stats.f.isf(_RARE / self.places, degrees, freedom)
-        cost = np.inf if self.grey is None else self.grey.cost
         return float(cost / (1 + _PART * f * degrees / freedom))
 
 
@@ -224,19 +249,24 @@ def _boxes(
     # what is stable by request is compared with the like
     stable = isinstance(scene.structure, Chart) and scene.structure.stable
     mode = None
+
+    def followed(box: Reference) -> Reference:
+        return box.on(readings, worth.of_all(box.unknowns))
+
     try:
         single = all(s.experiment.single and s.experiment.one_to_one for s in scene.seen)
         if single and (model.dt or not all(r.unheld for r in readings)):
             mode = lacking_mode(scene, model.dt or readings[0].sample_time)
             pole = None if mode is None else complex(*mode.A[:, 0])
-            own, _ = Reference.larger(model, readings, _LINES, pole, worth.cost(2 * order), stable)
-            return [] if own is None else [own.on(readings)]
+            some = worth.of_some(2 * order)
+            own, _ = Reference.larger(model, readings, _LINES, pole, some, stable)
+            return [] if own is None else worth.not_left([followed(own)])
         own = Reference.of(model, readings, _LINES, order, stable)
-        found = [own.on(readings)]
+        found = [followed(own)]
     except (InputError, np.linalg.LinAlgError):
         return []
     mode = None if own.bilinear else lacking_mode(scene, own.chart.dt)
     if mode is not None:
         with contextlib.suppress(InputError, np.linalg.LinAlgError, ArithmeticError):
-            found.append(own.with_mode(model, readings, mode))
-    return found
+            found.append(own.with_mode(model, readings, mode, worth.of_all(own.unknowns)))
+    return worth.not_left(found)
