@@ -10,6 +10,7 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
 from freqid.fitting.black_box.refinement import (
+    LINES,
     first_model,
     identified_models,
     nested_model,
@@ -58,9 +59,12 @@ _LIKE = 1.001
 
 @fits(OutputError, black_box=True)
 def fit_output_error(
-    spec: OutputError, readings: Sequence[Reading], options: SearchOptions | None = None
+    spec: OutputError,
+    readings: Sequence[Reading],
+    options: SearchOptions | None = None,
+    count: int = LINES,
 ) -> Estimate:
-    """The work of ``fit`` for OutputError."""
+    """The work of ``fit`` for OutputError, begun on about ``count`` lines."""
     first = readings[0]
     shape = channel_counts(first.data)
     lines, plane = lines_in_plane(readings)
@@ -71,7 +75,7 @@ def fit_output_error(
     dt = first.sample_time
     more, seed = (options.n_starts or 1, options.seed) if options else (1, 0)
     told_apart(lines)
-    chart, solution, objective = _nested(spec, lines, plane, dt, more - 1, seed)
+    chart, solution, objective = _nested(spec, lines, plane, dt, (more - 1, seed, count))
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
@@ -105,20 +109,23 @@ def _nested(
     lines: Sequence[SpectralExperiment],
     plane: Plane,
     dt: float,
-    more: int,
-    seed: int,
+    begin: tuple[int, int, int],
 ) -> Descent:
-    """The minimum of an order, not above that of the order below with one pole more."""
+    """The minimum of an order, not above that of the order below with one pole more.
+
+    ``begin`` are the starts beyond the first, their seed, and on about how many lines they begin.
+    """
 
     def begun(start: StateSpace) -> Descent:
         start = within_circle(start) if spec.stable else start
         return _descend(Chart(start, spec.feedthrough, plane, dt, stable=spec.stable), lines)
 
     options = spec.feedthrough, spec.stable
-    own = begun(nested_model(lines, spec.order, *options, more, seed))
+    more, seed, count = begin
+    own = begun(nested_model(lines, spec.order, *options, *begin))
     if not spec.stable and _unstable(own):
         # motions that grow explain noise, and lead away from what stable ones explain better
-        tame = nested_model(lines, spec.order, spec.feedthrough, True, more, seed)
+        tame = nested_model(lines, spec.order, spec.feedthrough, True, *begin)
         own = min([own, begun(tame)], key=lambda t: t[1].cost)
     chained = all(e.single and e.one_to_one for e in lines)
     if not chained:
@@ -133,7 +140,7 @@ def _nested(
         own = min([own, *others], key=lambda t: t[1].cost)
     if chained or not 1 < spec.order <= _HIGH:
         return own
-    below, less, _ = begun(nested_model(lines, spec.order - 1, *options))
+    below, less, _ = begun(nested_model(lines, spec.order - 1, *options, count=count))
     if own[1].cost <= less.cost:
         return own
     A, _, C, _ = below.matrices(less.x)

@@ -33,11 +33,13 @@ from freqid.lti import StateSpace
 # believed; in more noise than that there may be a better one a little below
 _BELIEVED = 0.03
 # lines that are enough to come next to the minimum
-_LINES = 20000
+LINES = 20000
 # poles of larger models beyond those that are wanted
 _LARGER = (2, 4)
 # highest order that begins with all those below
 _CHAIN = 12
+# starts with random poles where none of the others is believed
+_SCATTERED = 5
 # where one more real pole is tried
 _REAL_PLACES = (-0.95, -0.7, -0.3, 0.05, 0.3, 0.7, 0.9, 0.98)
 
@@ -56,7 +58,7 @@ def first_model(
     if not all(e.rational for e in experiments):
         return identify(experiments, order, feedthrough)
     # of very many lines a part will do: its minimum is next to that of all
-    few = thinned_to(experiments, _LINES)
+    few = thinned_to(experiments, LINES)
     lines = RationalLines(few, feedthrough, gain=gain)
     best = best_of(lines, _begun(lines, order))
     if best is not None and few is not experiments:
@@ -71,7 +73,7 @@ def roughly(
     """What the minimum below the likeliest poles alone leaves; None where there is none."""
     if not all(e.single and e.one_to_one for e in experiments):
         return None
-    lines = RationalLines(thinned_to(experiments, _LINES), feedthrough)
+    lines = RationalLines(thinned_to(experiments, LINES), feedthrough)
     found = lines.minimum(next(iter(_begun(lines, order))))
     return None if found is None else found.cost
 
@@ -104,7 +106,7 @@ def with_a_pair(
     ``options`` are feedthrough and stable. None where a short way shows that they do not come below
     a cost ``worth`` more of it. Raises LinAlgError where the polynomials vanish.
     """
-    lines = RationalLines(thinned_to(experiments, _LINES), *options, gain=gain)
+    lines = RationalLines(thinned_to(experiments, LINES), *options, gain=gain)
     own, unit = lines.below(poles), lines.sizes[0] ** 2
     if own is None:
         raise np.linalg.LinAlgError("the poles stand for no model")
@@ -140,8 +142,12 @@ def nested_model(
     stable: bool,
     more: int = 0,
     seed: int = 0,
+    count: int = LINES,
 ) -> StateSpace:
-    """As ``first_model``, never above the model of the order below, with so many starts more.
+    """As ``first_model``, never above the model of the order below, with so many starts ``more``,
+    and on about ``count`` lines until the minimum is near.
+
+    Where they are not counted a few more are tried as long as noise leaves none believed.
 
     Every order begins on its own and from the poles of the one before with one more; so the cost
     does not rise from one order to the next. ``stable`` models have their poles inside of the unit
@@ -149,7 +155,7 @@ def nested_model(
     """
     if not all(e.single and e.one_to_one for e in experiments):
         return identified_models(experiments, order, feedthrough, stable)[0]
-    few = thinned_to(experiments, _LINES)
+    few = thinned_to(experiments, count)
     lines = RationalLines(few, feedthrough, stable)
     rng = np.random.default_rng(seed)
     best: Fitted | None = None
@@ -160,9 +166,9 @@ def nested_model(
             return lines.state_space(first)
     # of a high order only the last few: the chain from one on would take longer than it is worth
     for n in range(1 if order <= _CHAIN else order - 2, order + 1):
-        extra = more if n == order else 0
-        scattered = (_random_poles(n, rng) for _ in range(extra))
-        found = best_of(lines, chain(_begun(lines, n), scattered), every=extra > 0)
+        last = n == order
+        scattered = (_random_poles(n, rng) for _ in range((more or _SCATTERED) * last))
+        found = best_of(lines, chain(_begun(lines, n), scattered), every=last and more > 0)
         if best is not None and (found is None or found.cost > best.cost):
             found = min(_one_more(lines, best, n), key=lambda f: f.cost, default=found)
         if found is None:
@@ -174,7 +180,8 @@ def nested_model(
             break
     if best is None or len(best.poles) < order:
         return identify(experiments, order, feedthrough)
-    if not _believed(lines, best):
+    if order > FEW or not _believed(lines, best):
+        # a way that was straight may have led to a mode that is worth less than another
         best = exchanged(lines, best)
     if few is not experiments:
         lines = RationalLines(experiments, feedthrough, stable)

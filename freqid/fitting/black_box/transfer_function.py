@@ -219,7 +219,9 @@ def _starting_poles(
         if delay:
             sampled = _first_guess(spec.poles, readings, delay)
         else:
-            sampled = fit_output_error(OutputError(spec.poles, True), readings).model.poles
+            # a plant that takes its time lets through what its hold lets through
+            direct = spec.zeros >= spec.poles or readings[0].hold.reaches_next
+            sampled = fit_output_error(OutputError(spec.poles, direct), readings).model.poles
         dt = readings[0].sample_time
         z = np.where(np.abs(sampled) < 1e-6, 1e-6, sampled)
         s = np.log(np.abs(z)) / dt + 1j * np.angle(z) / dt

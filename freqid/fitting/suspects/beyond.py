@@ -31,8 +31,8 @@ _SURELY, _APART, _NOISY = 1e-6, 40, 1.3
 # level from which a change midway is worth separate fits, and that from which halves that were
 # fitted apart say more than the step between them
 _HINT, _SEEN = 0.05, 0.01
-# the highest order of a black box beside which feedback is asked
-_BOX = 8
+# the highest order of a black box beside which feedback is asked, and lines from which it begins
+_BOX, _LINES = 8, 3000
 
 
 def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
@@ -47,7 +47,7 @@ def looped(inquiry: Asking, scene: Scene, limit: float) -> Asked | None:
     order = min(observed_order(inquiry.model) + 2, _BOX)
     try:
         spec = OutputError(order, True, stable=True)
-        box = fit_output_error(spec, [r.at_lines() for r in inquiry.readings])
+        box = fit_output_error(spec, [r.at_lines() for r in inquiry.readings], count=_LINES)
         beside = Scene.of(box.minimum, inquiry.readings)
         ways = plant.feedback(beside, box.model)
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
