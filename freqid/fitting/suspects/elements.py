@@ -40,28 +40,30 @@ class Element:
     damps: bool
     along: FloatArray | None
 
-    def moves(self, s: Seen, model: Model) -> FloatArray:
-        """The motion as the fit has it, (1, N)."""
+    def moves(self, s: Seen, model: Model) -> ComplexArray:
+        """The lines (K,) of the motion as the fit has it."""
         A, B, _, _ = model.state_space()
         plant = StateSpace(A, B, self.motion[None], 0 * B[:1])
-        return s.moved(self._response(s, plant, s.reading.hold))
+        return s.moved(self._response(s, plant, s.reading.hold))[0]
 
-    def answers(self, s: Seen, model: Model, shape: FloatArray) -> FloatArray:
-        """Rows (1, rows) of a force of another shape (1, N), in units of the parameter."""
+    def answers(self, s: Seen, model: Model, shape: ComplexArray) -> FloatArray:
+        """Rows (1, rows) of a force of another shape, by its lines (K,), in units of the
+        parameter.
+        """
         return self._driven(s, model, self.force, shape)
 
-    def answers_input(self, s: Seen, model: Model, shape: FloatArray) -> FloatArray:
+    def answers_input(self, s: Seen, model: Model, shape: ComplexArray) -> FloatArray:
         """The same where an input acts as well in that one's unit, its sign kept."""
         if self.along is None:
             return self.answers(s, model, shape)
         return self._driven(s, model, np.sign(self.force @ self.along) * self.along, shape)
 
-    def _driven(self, s: Seen, model: Model, at: FloatArray, shape: FloatArray) -> FloatArray:
+    def _driven(self, s: Seen, model: Model, at: FloatArray, shape: ComplexArray) -> FloatArray:
         A, _, C, D = model.state_space()
         # what acts inside is held as the first input is
         hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
         G = self._response(s, StateSpace(A, at[:, None], C, 0 * D[:, :1]), hold)
-        return s.driven(G, shape[None])
+        return s.driven(G, shape[None, None])
 
     @staticmethod
     def _response(s: Seen, plant: StateSpace, hold: Hold) -> ComplexArray:

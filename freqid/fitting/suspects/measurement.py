@@ -77,11 +77,10 @@ def spikes(scene: Scene, model: Model) -> list[Columns]:
     _, where, o, k = best
     drawn = []
     for number, s in enumerate(scene.seen):
-        p, N = s.n_outputs, s.record.n_samples  # type: ignore[union-attr]
-        pulse = np.zeros((1, p, N))
+        pulse = np.zeros((1, s.n_outputs, s.experiment.n_lines), complex)
         if number == where:
-            pulse[0, o, k] = 1
-        drawn.append(s.sampled(pulse))
+            pulse[0, o] = s.lines_of_pulses(np.array([k]))
+        drawn.append(s.rows_of(pulse))
     record = scene.seen[where].record
     assert record is not None
     where_in_time = f"at {k * record.dt:.6g} s"
@@ -119,12 +118,13 @@ def tone(scene: Scene, model: Model) -> Columns | None:
     above, omega = max(candidates)
     drawn, at = [], 0
     for s in scene.seen:
-        signals = np.zeros((2 * outputs, s.n_outputs, len(s.record.time)))  # type: ignore[union-attr]
-        wave = np.exp(1j * omega * s.record.time)  # type: ignore[union-attr]
-        for o in range(s.n_outputs):
-            signals[at, o], signals[at + 1, o] = wave.real, wave.imag
+        p, (N, _) = s.n_outputs, s.grid
+        waves = np.zeros((2 * outputs, p, s.experiment.n_lines), complex)
+        both = s.lines_of_wave(omega * N * s.record.dt / (2 * np.pi))  # type: ignore[union-attr]
+        for o in range(p):
+            waves[at : at + 2, o] = both
             at += 2
-        drawn.append(s.sampled(signals))
+        drawn.append(s.rows_of(waves))
     # between the lines there are as many places again; beside its neighbours it is but this one
     chance = float(scipy.stats.f.sf(above, 2, 2 * _NEIGHBOURS))
     return Columns(drawn, "", rows, f"at {omega / (2 * np.pi):.4g} Hz", chance=chance)
@@ -172,18 +172,19 @@ def saturation(scene: Scene, model: Model) -> list[Columns]:
         rows = []
         for o, signal in enumerate(y):
             near = _NEAR * max(float(np.ptp(signal)), 1e-300)
+            # the same limit either way, too, is one
+            either = _clipped(np.abs(signal))
             for extreme, sign in ((signal.max(), 1.0), (signal.min(), -1.0)):
-                at = np.abs(signal - extreme) <= near
-                pulse = np.zeros((1, *y.shape))
-                # the same limit either way, too, is one
-                clipped = _clipped(sign * signal) or _clipped(np.abs(signal))
-                if clipped or at.sum() >= _AT_LIMIT:
+                at = np.flatnonzero(np.abs(signal - extreme) <= near)
+                pulse = np.zeros((1, len(y), s.experiment.n_lines), complex)
+                clipped = either or _clipped(sign * signal)
+                if clipped or len(at) >= _AT_LIMIT:
                     found, certain = True, certain or clipped
-                    pulse[0, o] = sign * at
-                rows.append(s.sampled(pulse)[0])
-                pulse[0, o] = -sign * at
+                pulse[0, o] = sign * s.lines_of_pulses(at)
+                both = s.rows_of(pulse)
+                rows.append(both[0] * (clipped or len(at) >= _AT_LIMIT))
                 alone = [np.zeros((1, len(other.left))) for other in scene.seen]
-                alone[number] = s.sampled(pulse)
+                alone[number] = -both
                 ends.append(alone)
         drawn.append(np.array(rows))
     if found:
@@ -201,9 +202,11 @@ def _clipped(signal: FloatArray) -> bool:
     rest = signal[signal < signal.max()]
     at = len(signal) - len(rest)
     near = (rest > signal.max() - _REST * np.ptp(signal)).sum()
+    if at < min(count for _, count in _SHARED) or near > at:
+        return False
     distinct = len(np.unique(rest)) / max(len(rest), 1)
     wanted = next((count for part, count in _SHARED if distinct >= part), np.inf)
-    return bool(at >= wanted and near <= at)
+    return bool(at >= wanted)
 
 
 @suspect("amplitude")

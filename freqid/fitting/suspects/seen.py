@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import Array, ComplexArray, FloatArray, IntArray
+from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.data import Record
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.noise_ends import noise_ends
@@ -16,6 +16,10 @@ from freqid.models import Model
 
 # parts of a signal that are but the rounding of its transform
 _ROUNDING = 1e-13
+# pulses whose lines take less time one by one
+_FEW = 4
+# sine of half the angle of a sample between frequencies that are the same
+_AT_LINE = 1e-14
 # directions below this part of the largest are none
 _SAME = 1e-7
 
@@ -68,25 +72,28 @@ class Seen:
         rows: FloatArray = lines.rows(sum_runs(y, lines.aliases))
         return rows
 
-    def moved(self, G: ComplexArray) -> FloatArray:
-        """Signals (c, N) that a response (c, inputs, K) makes of the input, of lines that are no
-        other's alias.
+    def moved(self, G: ComplexArray) -> ComplexArray:
+        """Lines (c, K) of what a response (c, inputs, K) makes of the input, which are no other's
+        alias.
         """
-        lines = self.experiment.lines
-        x: ComplexArray = np.einsum("pmk,mck->pck", G, lines.U)[:, 0]
-        if lines.inside:
-            one = lines.scale[0, 0]
-            x = np.divide(x, one, out=np.zeros_like(x), where=one > 0)
-        return self.signals(x)
+        x: ComplexArray = np.einsum("pmk,mck->pck", G, self.lines_of_input[:, None])[:, 0]
+        return x
 
-    def driven(self, G: ComplexArray, signals: FloatArray) -> FloatArray:
-        """Rows of what a response (outputs, inputs, K) makes of other signals of the inputs
-        (c, inputs, N), (c, rows); of lines that are no other's alias.
+    @property
+    def lines_of_input(self) -> ComplexArray:
+        """The input's lines (inputs, K) without weights, which are no other's alias."""
+        lines = self.experiment.lines
+        U: ComplexArray = lines.U[:, 0]
+        if not lines.inside:
+            return U
+        one = lines.scale[0, 0]
+        return np.divide(U, one, out=np.zeros_like(U), where=one > 0)
+
+    def driven(self, G: ComplexArray, inputs: ComplexArray) -> FloatArray:
+        """Rows of what a response (outputs, inputs, K) makes of the lines of other inputs
+        (c, inputs, K), (c, rows); of lines that are no other's alias.
         """
-        lines, (N, at) = self.experiment.lines, self.grid
-        spectrum = np.fft.rfft(signals[..., :N], axis=-1)[..., at]
-        y = np.einsum("pmk,cmk->cpk", G, spectrum) * lines.scale[:, 0]
-        return np.ascontiguousarray(y.reshape(len(signals), -1)).view(float)
+        return self.rows_of(np.einsum("pmk,cmk->cpk", G, inputs))
 
     @property
     def grid(self) -> tuple[int, IntArray]:
@@ -130,14 +137,54 @@ class Seen:
         found: ComplexArray = np.divide(each, scale, out=np.zeros_like(each), where=scale > 0)
         return found
 
-    def sampled(self, signals: Array) -> FloatArray:
-        """Rows of signals of the outputs (…, outputs, N) in time, (…, rows)."""
-        lines, (N, at) = self.experiment.lines, self.grid
-        spectrum = np.fft.rfft(signals[..., :N], axis=-1)[..., at]
+    def lines_of(self, signals: FloatArray) -> ComplexArray:
+        """The lines (…, K) of signals (…, N) in time."""
+        N, at = self.grid
+        signals = signals[..., :N]
+        spectrum = np.fft.rfft(signals, axis=-1)[..., at]
         # a constant has no line but that at zero: what rounding leaves at others is nothing
-        most = np.abs(signals[..., :N]).sum(axis=-1, keepdims=True)
-        weighted = np.where(np.abs(spectrum) < _ROUNDING * most, 0, spectrum) * lines.scale[:, 0]
+        spectrum[np.abs(spectrum) < _ROUNDING * np.abs(signals).sum(axis=-1, keepdims=True)] = 0
+        found: ComplexArray = spectrum
+        return found
+
+    def lines_of_pulses(self, samples: IntArray) -> ComplexArray:
+        """The lines (K,) of a signal that is one at some samples and zero elsewhere."""
+        N, at = self.grid
+        if len(samples) > _FEW:
+            signal = np.zeros(N)
+            signal[samples] = 1
+            return self.lines_of(signal)
+        # in whole numbers, for the angle of a late sample has many turns
+        turns = [(at * int(k)) % N for k in samples if k < N]
+        return np.sum([np.exp(-2j * np.pi / N * each) for each in turns], axis=0) + 0j * at
+
+    def lines_of_wave(self, line: float) -> tuple[ComplexArray, ComplexArray]:
+        """The lines (K,) of a cosine and a sine whose frequency is that of a ``line`` of the DFT,
+        which need not be a whole number.
+        """
+        N, at = self.grid
+
+        def turning(line: float) -> ComplexArray:
+            # the sum of exp(2πj (line − at) n/N) over n, that of a geometric series
+            half = np.pi * (line - at) / N
+            near = np.abs(np.sin(half)) < _AT_LINE
+            # as the limit has it, whose sign is that of the turns between them
+            limit = N * np.cos(N * half) / np.cos(half)
+            size = np.where(near, limit, np.sin(N * half) / np.where(near, 1, np.sin(half)))
+            turned: ComplexArray = size * np.exp(1j * (N - 1) * half)
+            return turned
+
+        up, down = turning(line), turning(-line)
+        return (up + down) / 2, (up - down) / 2j
+
+    def rows_of(self, each: ComplexArray) -> FloatArray:
+        """Rows (…, rows) of lines (…, outputs, K) in their weights."""
+        weighted = each * self.experiment.lines.scale[:, 0]
         return np.ascontiguousarray(weighted.reshape(*weighted.shape[:-2], -1)).view(float)
+
+    def sampled(self, signals: FloatArray) -> FloatArray:
+        """Rows of signals of the outputs (…, outputs, N) in time, (…, rows)."""
+        return self.rows_of(self.lines_of(signals))
 
     def without_free(self, columns: FloatArray) -> FloatArray:
         """Columns (c, rows) less what an initial state explains of them."""
