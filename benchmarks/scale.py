@@ -104,6 +104,24 @@ def fits(counts):
     show("fit after the FFT stage, by samples", told, "within 20 % of one time")
 
 
+def asked(counts):
+    """What a verdict takes on top of its fit: of a chirp's band, and of white noise at all lines."""
+    for what, band in (("a band of 4 %", BAND), ("all lines", None)):
+        told = []
+        for count in counts:
+            record = chirp(count)
+            if band is None:
+                record = fq.simulate(PLANT, fq.white_noise(count, seed=1), T1)
+                record = record.with_noise(0.01 * float(record.y.std()), seed=2)
+            begin = time.perf_counter()
+            est = fq.fit(PLANT, record, band=band, start=START)
+            fitted, begin = time.perf_counter() - begin, time.perf_counter()
+            grade = est.verdict.grade
+            taken = time.perf_counter() - begin
+            told.append(f"{count:.0e}: {taken:.2f} s beside {fitted:.2f} ({grade})")
+        show(f"the verdict of a fit beside it, {what}, by samples", ", ".join(told), "")
+
+
 def everything(count):
     record = chirp(count)
     copies = iter([fresh(record) for _ in range(ROUNDS)])
@@ -356,6 +374,7 @@ def main():
     reading()
     cluster()
     fits([20_000, 200_000, 2_000_000])
+    asked([20_000, 200_000, 2_000_000])
     fft_stage(10_000_000)
     averages(10_000_000)
     streamed(100_000_000 if large else 10_000_000)

@@ -28,7 +28,7 @@ from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import Asked, of_several, score
+from freqid.fitting.suspects.scores import Asked, Glance, of_several, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import silent, unheard
 from freqid.fitting.suspects.spread import compared
@@ -99,11 +99,11 @@ class Inquiry:
         scene = self.scene
         if scene is None or scene.freedom < 10:
             return []
-        found = []
+        found, glance = [], Glance(scene)
         for name, draw in SUSPECTS.items():
             drawn = draw(scene, self.model)
             several = [] if drawn is None else [drawn] if isinstance(drawn, Columns) else [*drawn]
-            tried = [(c, score(scene, c, self._std)) for c in several]
+            tried = [(c, score(scene, c, self._std, glance)) for c in several]
             told = [(c, t) for c, t in tried if t and (t.size > 0 or not c.onesided)]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))

@@ -18,6 +18,7 @@ from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.seen import Seen
+from freqid.fitting.suspects.weighing import Weighing
 from freqid.fitting.uncertainty.evenness import (
     alike,
     channel_power,
@@ -82,15 +83,18 @@ class Scene:
         return cls(structure, x, seen, sum(e.energy for e in experiments), known, held, share)
 
     share: InputNoise | None = None
-    # rows of columns that are free beside the parameters
+    # rows of columns that are free beside the parameters, and the scene where they were not
     more: FloatArray | None = None
+    before: Scene | None = None
 
     def with_free(self, columns: Sequence[FloatArray]) -> Scene:
         """The same where columns (c, rows) of each experiment are free, too."""
         clear = self.clear(columns)
         size = np.linalg.norm(clear, axis=1)
         kept = clear[size > 0] / size[size > 0, None]
-        return dataclasses.replace(self, more=directions(kept, LOOSE)[2])
+        own = directions(kept, LOOSE)[2]
+        more = own if self.more is None else np.concatenate([self.more, own])
+        return dataclasses.replace(self, more=more, before=self.before or self)
 
     @cached_property
     def moving(self) -> float:
@@ -113,19 +117,23 @@ class Scene:
     @cached_property
     def jacobian(self) -> FloatArray:
         """Of all rows by the unknowns that are free to move, (P, rows)."""
+        if self.before is not None:
+            return self.before.jacobian
         J = np.concatenate([*(s.jacobian for s in self.seen), self.known[:, :-1].T], axis=1)
         return J * ~self.held[:, None]
 
     @cached_property
     def _parts(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Left vectors, sizes of the directions that the data tell, and rows that span them."""
+        if self.before is not None:
+            return self.before._parts
         J = self.jacobian
         size = np.linalg.norm(J, axis=1)
         size[size == 0] = 1
         U, s, Vt = directions(J / size[:, None], LOOSE)
         return U / s / size[:, None], s, Vt
 
-    @property
+    @cached_property
     def absorbed(self) -> FloatArray:
         """Orthonormal rows of what the parameters can absorb."""
         own = self._parts[2]
@@ -218,31 +226,10 @@ class Scene:
         count = len(columns[0])
         return np.concatenate([*columns, np.zeros((count, len(self.known)))], axis=1)
 
-    def weighed(
-        self, columns: Sequence[FloatArray], variance: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Columns, what is left, and the part of each row's noise that is (R,), in units of the
-        noise, less what is absorbed of them there.
-
-        Parameters that were fitted without these weights are off by what their directions take
-        out of both (Neyman's C(alpha), 1959).
-        """
-        w = 1 / np.sqrt(np.maximum(variance, 1e-300))
+    def weighing(self, variance: FloatArray) -> Weighing:
+        """All rows in units of a noise of this variance (R,), less what is absorbed there."""
         own = [self.jacobian] if self.more is None else [self.jacobian, self.more]
-        rows, at = np.concatenate([self.stacked(columns), self.left[None], *own]), 0
-        kept = np.ones(len(variance))
-        for s in self.seen:
-            part = slice(at, at := at + len(s.left))
-            Q = s.taken(variance[part])
-            rows[:, part] *= w[part]
-            rows[:, part] -= (rows[:, part] @ Q.T) @ Q
-            kept[part] -= (Q**2).sum(axis=0)
-        rows[:, at:] *= w[at:]
-        drawn, left, J = np.split(rows, [len(columns[0]), len(columns[0]) + 1])
-        size = np.linalg.norm(J, axis=1)
-        B = directions(J[size > 0] / size[size > 0, None], LOOSE)[2]
-        kept -= (B**2).sum(axis=0)
-        return drawn - (drawn @ B.T) @ B, (left - (left @ B.T) @ B)[0], kept
+        return Weighing.of(self.seen, np.concatenate(own), self.left, variance)
 
     def clear(self, columns: Sequence[FloatArray]) -> FloatArray:
         """Columns of each experiment less what initial states and parameters absorb, stacked."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -16,6 +17,7 @@ import scipy
 from freqid.checks import FloatArray
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.weighing import Weighing
 from freqid.lti import directions
 
 # a suspect of which the parameters leave no more than this part cannot be told
@@ -26,6 +28,8 @@ _SAME = 1e-9
 _ROUNDED = 1e-9
 # part of a line's noise that is left at least
 _LEAST = 0.1
+# p above which nobody asks further, and rows from which one look is worth it
+_GLANCE, _MANY = 0.05, 4000
 
 
 @dataclass(frozen=True)
@@ -78,10 +82,13 @@ def of_several(p: float, trials: int) -> float:
     return 1 - (1 - p) ** trials if p > _ROUNDED else p * trials
 
 
-def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
+def score(
+    scene: Scene, drawn: Columns, std: FloatArray, glance: Glance | None = None
+) -> Score | None:
     """The test of what was drawn; None where the parameters absorb it.
 
-    ``std`` (P,) are the standard errors of the unknowns.
+    ``std`` (P,) are the standard errors of the unknowns. What a ``glance`` shows to be next to
+    nothing is not weighed by a noise of its own.
     """
     columns = drawn.columns
     if drawn.beside is not None:
@@ -110,7 +117,10 @@ def score(scene: Scene, drawn: Columns, std: FloatArray) -> Score | None:
         spread = (Vt * scene.variance_of(rest)) @ Vt.T
         chi = float(along @ np.linalg.solve(spread, along))
     else:
-        chi = _weighed(scene, columns, scene.variance_of(rest), freedom)
+        seen = None if glance is None else glance.explained(drawn, freedom)
+        if seen is None or scipy.special.fdtrc(q, freedom, seen / q) < _GLANCE:
+            seen = _weighed(scene, columns, scene.variance_of(rest), freedom)
+        chi = seen
     wider = scene.together(rest) * scene.tied(rest, scene.parted(Vt))
     chi, freedom = chi / wider, max(int(min(freedom / wider, scene.noise_freedom)), 1)
     delta = -(U / s) @ along
@@ -130,19 +140,54 @@ def _weighed(
     """What columns explain in units of the noise where lines count by its variance at each, of
     which ``variance`` (R,) is the first guess.
     """
-    _, rest, kept = _told(scene, columns, variance)
+    _, rest, kept = _told(scene.weighing(variance), scene.stacked(columns))
     # lines of which more was absorbed have shown less of their noise
     variance = scene.variance_of(rest * np.sqrt(variance / np.maximum(kept, _LEAST)))
-    told, rest, _ = _told(scene, columns, variance)
+    told, rest, _ = _told(scene.weighing(variance), scene.stacked(columns))
     return told / (float(rest @ rest) / freedom)
 
 
 def _told(
-    scene: Scene, columns: Sequence[FloatArray], variance: FloatArray
+    weighing: Weighing, columns: FloatArray, beside: FloatArray | None = None
 ) -> tuple[float, FloatArray, FloatArray]:
-    """What columns explain, what they leave (R,), and the part of each row's noise in that."""
-    seen, left, kept = scene.weighed(columns, variance)
-    size = np.linalg.norm(seen, axis=1)
-    ways = directions(seen[size > 0] / size[size > 0, None], _SAME, _ABSORBED)[2]
+    """What columns (c, R) explain, what they leave (R,), and the part of each row's noise in that;
+    other columns ``beside`` them being free.
+    """
+    seen, left = weighing.clear(columns), weighing.left
+    if beside is not None:
+        free = directions(_unit(weighing.clear(beside)), _SAME)[2]
+        seen, left = seen - (seen @ free.T) @ free, left - (free @ left) @ free
+    ways = directions(_unit(seen), _SAME, _ABSORBED)[2]
     along = ways @ left
-    return float(along @ along), left - along @ ways, kept - (ways**2).sum(axis=0)
+    return float(along @ along), left - along @ ways, weighing.kept - (ways**2).sum(axis=0)
+
+
+def _unit(rows: FloatArray) -> FloatArray:
+    """Rows of length one, those that are nothing left out."""
+    size = np.linalg.norm(rows, axis=1)
+    return rows[size > 0] / size[size > 0, None]
+
+
+class Glance:
+    """A look in weights that all suspects share, by what is left of all of them.
+
+    A suspect of few lines lifts the noise there and hides in it; but then it still explains many
+    times what noise does, for its spectrum is a mean over many more.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    @cached_property
+    def _weighing(self) -> Weighing:
+        first, variance = self.scene.weighing(self.scene.variance), self.scene.variance
+        kept = np.maximum(first.kept, _LEAST)
+        return self.scene.weighing(self.scene.variance_of(first.left * np.sqrt(variance / kept)))
+
+    def explained(self, drawn: Columns, freedom: int) -> float | None:
+        """What columns explain in units of the noise; None where that takes no time anyway."""
+        if len(self.scene.left) < _MANY:
+            return None
+        beside = None if drawn.beside is None else self.scene.stacked(drawn.beside)
+        told, rest, _ = _told(self._weighing, self.scene.stacked(drawn.columns), beside)
+        return told / (float(rest @ rest) / freedom)
