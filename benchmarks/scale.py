@@ -105,7 +105,7 @@ def fits(counts):
 
 
 def asked(counts):
-    """What a verdict takes on top of its fit: of a chirp's band, and of white noise at all lines."""
+    """What a verdict takes beside its fit: of a chirp's band, and of white noise at all lines."""
     for what, band in (("a band of 4 %", BAND), ("all lines", None)):
         told = []
         for count in counts:

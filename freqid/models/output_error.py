@@ -40,7 +40,10 @@ class OutputError:
 
 @dataclass(frozen=True, eq=False)
 class DiscreteModel(MatrixModel):
-    """A sampled model x(k+1) = Φ x + Γ u, y = C x + D u at the period of its hold (s)."""
+    """A sampled model x(k+1) = Φ x + Γ u, y = C x + D u at the period of its hold (s).
+
+    ``stable`` says that it was asked for without a motion that grows.
+    """
 
     delay = 0.0
 
@@ -49,6 +52,7 @@ class DiscreteModel(MatrixModel):
     hold: Hold
     input_names: Sequence[str]
     output_names: Sequence[str]
+    stable: bool = False
 
     @property
     def own_hold(self) -> Hold:
@@ -57,8 +61,8 @@ class DiscreteModel(MatrixModel):
 
     @property
     def spec(self) -> OutputError:
-        """The black box of which this is one: order and feedthrough."""
-        return OutputError(self.order, bool(self.matrices.D.any()))
+        """The black box of which this is one: order, feedthrough, whether it has to be stable."""
+        return OutputError(self.order, bool(self.matrices.D.any()), self.stable)
 
     @property
     def order(self) -> int:

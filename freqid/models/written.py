@@ -54,6 +54,7 @@ def model_to_dict(model: Model) -> Written:
             "matrices": matrices,
             "dt": model.dt,
             "hold": hold,
+            "stable": model.stable,
             **names,
         }
     return {
@@ -80,7 +81,9 @@ def model_of_dict(written: Given, given: GreyBox | None = None) -> Model:
     sizes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}
     matrices = StateSpace(*(np.array(own[x], dtype=float).reshape(sizes[x]) for x in "ABCD"))
     if kind == "DiscreteModel":
-        return DiscreteModel(matrices, float(written["dt"]), hold_of_dict(written["hold"]), **names)
+        stable = bool(written.get("stable", False))
+        hold = hold_of_dict(written["hold"])
+        return DiscreteModel(matrices, float(written["dt"]), hold, **names, stable=stable)
     return ContinuousModel(
         matrices, np.array(written["denominator"]), np.array(written["numerators"]), **names,
         delay=float(written["delay"]),

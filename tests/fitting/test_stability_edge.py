@@ -1,5 +1,7 @@
 """Stable black boxes of data that want to grow: a minimum on the unit circle, that says so."""
 
+import json
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -9,7 +11,9 @@ import scipy.signal
 import freqid as fq
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.held_charts import HeldChart
+from freqid.fitting.suspects.parts import confirming
 from freqid.lti import Plane, StateSpace
+from freqid.models.written import model_of_dict, model_to_dict
 
 DT = 0.01
 
@@ -179,3 +183,13 @@ def test_motions_that_do_not_fade_in_data_without_noise():
     est = fq.fit(fq.OutputError(4, stable=True), fq.Record(u, y, DT))
     poles = np.sort(np.abs(np.angle(est.model.poles)))[::2]
     assert poles == pytest.approx([w * DT, v * DT], rel=1e-4)
+
+
+def test_halves_of_what_is_stable_by_request_are_asked_for_the_same():
+    # they were fitted without, and met modes that grow where the whole has none
+    est = fq.fit(fq.OutputError(3, stable=True), growing(2))
+    assert est.model.spec == fq.OutputError(3, stable=True)
+    back = model_of_dict(json.loads(json.dumps(model_to_dict(est.model))))
+    assert back.spec == est.model.spec
+    for half in est.inquiry.apart(confirming(est.inquiry.readings)):
+        assert np.abs(half.model.poles).max() <= 1

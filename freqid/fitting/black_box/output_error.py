@@ -87,7 +87,8 @@ def fit_output_error(
         edge = at_the_edge(chart, solution.x, objective.experiments)
     if edge is not None:
         chart, solution, objective = edge
-    model = DiscreteModel(chart.in_z(solution.x), dt, first.hold, *common_names([first.data]))
+    at = chart.in_z(solution.x)
+    model = DiscreteModel(at, dt, first.hold, *common_names([first.data]), spec.stable)
     est = coefficient_estimate(
         model,
         model.coefficients()[0],

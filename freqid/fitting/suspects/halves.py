@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,9 +14,10 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.parts import Parting, confirming
-from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import CURES
 from freqid.fitting.suspects.spread import ELSEWHERE, LEVEL, compared, loudest
@@ -27,6 +29,8 @@ _APART, HOLDS_GOOD = 4.0, 0.01
 # part of the data's energy that a black box may lack, a response off by 5 %; and that it may where
 # halves and a larger black box have the same modes
 LITTLE, _MUCH = 2.5e-3, 0.01
+# evaluations of a half's own minimum next to the whole's
+_LIMIT = 60
 # poles with more damping than this are no modes
 _DAMPED = 0.5
 
@@ -57,8 +61,15 @@ def confirmed(
     halves = confirming(inquiry.readings)
     if halves is None:
         return list(found)
-    parts = [None if f is None else poles_of(f.model) for f in inquiry.apart(halves)]
-    moved = modes_moved(poles_of(inquiry.model), parts)
+    whole, apart = poles_of(inquiry.model), inquiry.apart(halves)
+    parts = [None if f is None else poles_of(f.model) for f in apart]
+    if any(modes_moved(whole, [p]) < HOLDS_GOOD for p in parts):
+        # where one half agrees the other may have a mode in its noise that is worth next to nothing
+        parts = [
+            p if f is None or modes_moved(whole, [p]) < HOLDS_GOOD else _as_good(inquiry, part, f)
+            for p, f, part in zip(parts, apart, halves.parts, strict=True)
+        ]
+    moved = modes_moved(whole, parts)
     if not moved < HOLDS_GOOD:
         return list(found)
     text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
@@ -67,6 +78,20 @@ def confirmed(
         else Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number)
         for f, a in zip(found, said, strict=True)
     ]  # fmt: skip
+
+
+def _as_good(inquiry: Asking, part: Sequence[Reading], half: Estimate) -> ComplexArray:
+    """Poles of a part's minimum next to the whole's model, where that leaves next to nothing more
+    than the part's own fit, which has others; else those.
+    """
+    chart = inquiry.minimum.structure
+    if isinstance(chart, Chart):
+        objective = Objective(chart, lines_beside(chart, [r.at_lines() for r in part]))
+        with contextlib.suppress(InputError, ArithmeticError):
+            found = polish(objective, inquiry.minimum.x, limit=_LIMIT)
+            if found.cost - half.cost < LITTLE * objective.energy:
+                return _in_s(np.linalg.eigvals(chart.in_z(found.x).A), chart.dt)
+    return poles_of(half.model)
 
 
 def modes_differ(
@@ -117,8 +142,12 @@ def _elsewhere(est: Estimate, part: Sequence[Reading], half: Estimate) -> bool:
 
 def poles_of(model: Model) -> ComplexArray:
     """Poles of a black box in rad/s."""
-    z = model.poles
-    return np.log(np.where(z == 0, 1e-300, z)) / model.dt if model.dt else z
+    return _in_s(model.poles, model.dt) if model.dt else model.poles
+
+
+def _in_s(z: ComplexArray, dt: float) -> ComplexArray:
+    found: ComplexArray = np.log(np.where(z == 0, 1e-300, z).astype(complex)) / dt
+    return found
 
 
 def weakly_damped(poles: ComplexArray) -> FloatArray:

@@ -15,7 +15,7 @@ from freqid.data import Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
-from freqid.fitting.cost.objective import EstimatedStructure, Objective, Point
+from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.noise_models import MeasuredNoise
@@ -24,12 +24,12 @@ from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved, poles_of
 from freqid.fitting.suspects.lacking_mode import lacking_mode
-from freqid.fitting.suspects.scene import LOOSE, Scene
+from freqid.fitting.suspects.scene import LOOSE, Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.fitting.witness import weighted_by
-from freqid.lti import Plane, directions
+from freqid.lti import directions
 from freqid.models import DiscreteModel, GreyBox, observed_order
 
 # lines from which a black box begins: what they miss begins where the model is lacking
@@ -162,15 +162,6 @@ def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:
     if isinstance(structure, GreyStructure):
         return structure.at(minimum.x, 0)
     return model if isinstance(model, DiscreteModel) else None
-
-
-def lines_beside(
-    structure: EstimatedStructure, readings: Sequence[Reading]
-) -> list[SpectralExperiment]:
-    """Lines in the plane of a structure."""
-    if not isinstance(structure, Chart):
-        return [r.lines() for r in readings]
-    return [r.lines(Plane()).in_plane(structure.plane) for r in readings]
 
 
 def _weighed_again(

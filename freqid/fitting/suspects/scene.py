@@ -63,12 +63,9 @@ class Scene:
         if chart is not None and any(r.own_cost for r in readings):
             raise InputError("a black box fitted to samples leaves no lines")
         at_lines = [r.at_lines().with_(delayed=chart is None) for r in readings]
-        if chart is None:
-            experiments = [r.lines() for r in at_lines]
-            if any(r.own_cost for r in readings):
-                x = polish(Objective(structure, experiments), x).x
-        else:
-            experiments = [r.lines(Plane()).in_plane(chart.plane) for r in at_lines]
+        experiments = lines_beside(structure, at_lines)
+        if chart is None and any(r.own_cost for r in readings):
+            x = polish(Objective(structure, experiments), x).x
         realisation = structure.realise(x)
         for reading, e in zip(at_lines, experiments, strict=True):
             evaluation = e.at(realisation)
@@ -236,6 +233,15 @@ class Scene:
         alone = self.stacked([s.without_free(c) for s, c in zip(self.seen, columns, strict=True)])
         B = self.absorbed
         return alone - (alone @ B.T) @ B
+
+
+def lines_beside(
+    structure: EstimatedStructure, readings: Sequence[Reading]
+) -> list[SpectralExperiment]:
+    """Lines in the plane of a structure."""
+    if not isinstance(structure, Chart):
+        return [r.lines() for r in readings]
+    return [r.lines(Plane()).in_plane(structure.plane) for r in readings]
 
 
 def _power_at(rows: FloatArray, e: SpectralExperiment) -> FloatArray:
