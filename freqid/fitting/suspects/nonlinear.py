@@ -177,14 +177,12 @@ def _cube(signal: FloatArray) -> FloatArray:
 
 def _more_than_levels(signal: FloatArray) -> bool:
     """Whether a signal has more than so few levels that a straight line meets all cubes."""
-    # most have within a few samples
-    some = signal[:: max(len(signal) // _GLANCED, 1)]
-    return _differ(some) or (len(some) < len(signal) and _differ(signal))
-
-
-def _differ(signal: FloatArray) -> bool:
-    steps = np.round((signal - signal.min()) / max(_LEVEL * float(np.ptp(signal)), 1e-300))
-    return len(np.unique(steps)) > _LEVELS
+    low, step = signal.min(), max(_LEVEL * float(np.ptp(signal)), 1e-300)
+    # most have within a few samples, next to one another or far apart
+    middle = len(signal) // 2
+    some = np.append(signal[:: middle // _GLANCED + 1], signal[middle : middle + _GLANCED])
+    counts = (len(np.unique(np.round((each - low) / step))) for each in (some, signal))
+    return any(count > _LEVELS for count in counts)
 
 
 def _unit(scene: Scene) -> str:
