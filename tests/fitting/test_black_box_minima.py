@@ -5,6 +5,7 @@ import pytest
 import scipy.signal
 
 import freqid as fq
+from freqid.fitting.black_box import refinement
 
 MODES = ("wa", "wb", "wc", "za", "zb", "zc", "ga", "gb", "gc")
 
@@ -50,3 +51,20 @@ def test_no_black_box_of_a_short_record_in_coloured_noise_does(seed, spec):
     record = fq.Record(u, y + 0.15 * y.std() * e / e.std(), 1.0)
     own = fq.fit(plant, record, n_starts=1)
     assert fq.fit(spec, record).cost <= own.cost * (1 + 1e-6)
+
+
+def test_starts_that_were_counted_are_not_added_to(monkeypatch):
+    tried = []
+    own = refinement._random_poles
+    monkeypatch.setattr(refinement, "_random_poles", lambda n, rng: tried.append(n) or own(n, rng))
+    plant = random_plant(np.random.default_rng(0), signs=True)
+    record = fq.simulate(plant, fq.white_noise(400, seed=0), 1.0)
+    record = record.with_noise(0.5 * float(record.y.std()), seed=1)
+    counted = {}
+    for n_starts in ("auto", 1, 4):
+        tried.clear()
+        fq.fit(fq.OutputError(5), record, n_starts=n_starts)
+        counted[n_starts] = len(tried)
+    assert counted[1] == 0
+    assert counted[4] > 0
+    assert counted["auto"] > counted[4]

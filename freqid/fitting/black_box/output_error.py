@@ -73,9 +73,10 @@ def fit_output_error(
     moving([r.data for r in readings])
     _enough_lines(spec, lines, n_parameters)
     dt = first.sample_time
-    more, seed = (options.n_starts or 1, options.seed) if options else (1, 0)
+    asked, seed = (options.n_starts, options.seed) if options else (None, 0)
+    more = None if asked is None else asked - 1
     told_apart(lines)
-    chart, solution, objective = _nested(spec, lines, plane, dt, (more - 1, seed, count))
+    chart, solution, objective = _nested(spec, lines, plane, dt, (more, seed, count))
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
@@ -99,7 +100,7 @@ def fit_output_error(
     )
     if edge is not None:
         est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution)])
-    return dataclasses.replace(est, n_starts=more)
+    return dataclasses.replace(est, n_starts=asked or 1)
 
 
 Descent = tuple[Chart, Solution, Objective]
@@ -110,11 +111,12 @@ def _nested(
     lines: Sequence[SpectralExperiment],
     plane: Plane,
     dt: float,
-    begin: tuple[int, int, int],
+    begin: tuple[int | None, int, int],
 ) -> Descent:
     """The minimum of an order, not above that of the order below with one pole more.
 
-    ``begin`` are the starts beyond the first, their seed, and on about how many lines they begin.
+    ``begin`` are the starts beyond the first where they were counted, their seed, and on about how
+    many lines they begin.
     """
 
     def begun(start: StateSpace) -> Descent:
@@ -123,10 +125,10 @@ def _nested(
 
     options = spec.feedthrough, spec.stable
     more, seed, count = begin
-    own = begun(nested_model(lines, spec.order, *options, *begin))
+    own = begun(nested_model(lines, spec.order, *options, more, seed, count))
     if not spec.stable and _unstable(own):
         # motions that grow explain noise, and lead away from what stable ones explain better
-        tame = nested_model(lines, spec.order, spec.feedthrough, True, *begin)
+        tame = nested_model(lines, spec.order, spec.feedthrough, True, more, seed, count)
         own = min([own, begun(tame)], key=lambda t: t[1].cost)
     chained = all(e.single and e.one_to_one for e in lines)
     if not chained:

@@ -140,14 +140,14 @@ def nested_model(
     order: int,
     feedthrough: bool,
     stable: bool,
-    more: int = 0,
+    more: int | None = None,
     seed: int = 0,
     count: int = LINES,
 ) -> StateSpace:
     """As ``first_model``, never above the model of the order below, with so many starts ``more``,
     and on about ``count`` lines until the minimum is near.
 
-    Where they are not counted a few more are tried as long as noise leaves none believed.
+    Where these are not counted a few are tried as long as noise leaves no other believed.
 
     Every order begins on its own and from the poles of the one before with one more; so the cost
     does not rise from one order to the next. ``stable`` models have their poles inside of the unit
@@ -167,8 +167,9 @@ def nested_model(
     # of a high order only the last few: the chain from one on would take longer than it is worth
     for n in range(1 if order <= _CHAIN else order - 2, order + 1):
         last = n == order
-        scattered = (_random_poles(n, rng) for _ in range((more or _SCATTERED) * last))
-        found = best_of(lines, chain(_begun(lines, n), scattered), every=last and more > 0)
+        extra = _SCATTERED if more is None else more
+        scattered = (_random_poles(n, rng) for _ in range(extra * last))
+        found = best_of(lines, chain(_begun(lines, n), scattered), every=last and bool(more))
         if best is not None and (found is None or found.cost > best.cost):
             found = min(_one_more(lines, best, n), key=lambda f: f.cost, default=found)
         if found is None:

@@ -17,9 +17,10 @@ from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.suspects import plant
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.parts import Parting, each, record_halves, widths
-from freqid.fitting.suspects.scene import LOOSE, Scene
+from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score, of_several, score
 from freqid.fitting.suspects.spread import difference, told_by
+from freqid.fitting.suspects.weighing import LOOSE
 from freqid.lti import directions
 from freqid.models import GreyBox, OutputError, observed_order
 

@@ -24,8 +24,9 @@ from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved, poles_of
 from freqid.fitting.suspects.lacking_mode import lacking_mode
-from freqid.fitting.suspects.scene import LOOSE, Scene, lines_beside
+from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
+from freqid.fitting.suspects.weighing import LOOSE
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.shared_noise import shared
 from freqid.fitting.witness import weighted_by

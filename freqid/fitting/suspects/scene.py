@@ -18,7 +18,7 @@ from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.seen import Seen
-from freqid.fitting.suspects.weighing import Weighing
+from freqid.fitting.suspects.weighing import LOOSE, Weighing
 from freqid.fitting.uncertainty.evenness import (
     alike,
     channel_power,
@@ -32,9 +32,6 @@ from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import shaped_power
 from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom
 from freqid.lti import Plane, directions
-
-# singular values of the Jacobian below this part of the largest are directions left open
-LOOSE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from freqid.fitting.suspects.seen import Seen
 from freqid.lti import directions
 
 # singular values below this part of the largest are directions left open
-_LOOSE = 1e-7
+LOOSE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Weighing:
         _taken_off(rows, taken)
         J = rows[1:]
         size = np.linalg.norm(J, axis=1)
-        B = directions(J[size > 0] / size[size > 0, None], _LOOSE)[2]
+        B = directions(J[size > 0] / size[size > 0, None], LOOSE)[2]
         own = np.concatenate([*((Q**2).sum(axis=0) for Q in taken), np.zeros(len(parts[-1]))])
         kept = 1 - own - (B**2).sum(axis=0)
         return cls(w, taken, B, rows[0] - (B @ rows[0]) @ B, kept)
