@@ -373,3 +373,16 @@ def test_an_offset_of_the_input_takes_no_lines_away(offset, referred):
     found = fq.periodic(moved, 1.0)
     assert found.frequency.tolist() == list(range(1, 200))
     assert found.response == pytest.approx(fq.periodic(record, 1.0).response, rel=0.05)
+
+
+def test_single_periods_are_told_where_they_belong():
+    whole = measured(0, 4)
+    n = len(PERIOD)
+    parts = [slice(i * n, (i + 1) * n) for i in range(4)]
+    single = [fq.Record(whole.u[part], whole.y[part], DT, hold="bl") for part in parts]
+    with pytest.raises(ValueError, match=r"join periods that followed .* by etfe"):
+        fq.periodic(single, 1.0)
+    joined = fq.Record(*(np.concatenate([getattr(r, x) for r in single]) for x in "uy"), DT)
+    together, averaged = fq.periodic(joined, 1.0), fq.etfe(single)
+    at = np.searchsorted(averaged.frequency, together.frequency - 1e-9)
+    np.testing.assert_allclose(together.response, averaged.response[..., at], rtol=0.05)
