@@ -90,13 +90,14 @@ def periodic(
     skip = whole("skip", skip, least=0)
     counts = [_count(r) // n - skip for r in sets]
     if min(counts) < 2:
-        several = len(sets) > first.n_inputs and not skip
+        join = (
+            "; join periods that followed on one another to one record, and average experiments "
+            "that each began anew by etfe"
+        )
         raise InputError(
             f"records hold {min(counts) + skip} periods of {n * first.dt:g} s, {skip} of them "
             "skipped; two are needed to tell the noise"
-            + several
-            * "; join periods that followed on one another to one record, and average experiments "
-            "that each began anew by etfe"
+            + (join if len(sets) > first.n_inputs and not skip else "")
         )
     if len(sets) < first.n_inputs:
         raise InputError(

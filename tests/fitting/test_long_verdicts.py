@@ -6,7 +6,7 @@ import scipy.signal
 
 import freqid as fq
 from freqid.fitting.cost.evaluation import SpectralEvaluation
-from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.search.descent import minimise
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
@@ -43,10 +43,11 @@ def evaluations(monkeypatch):
     return counted
 
 
-def test_a_verdict_on_good_data_asks_all_lines_a_few_times_only(evaluations):
-    # a black box with a mode more followed a valley of the noise in 50 evaluations of all lines
+@pytest.mark.parametrize("seed", [3, 5, 6])
+def test_a_verdict_on_good_data_asks_all_lines_a_few_times_only(evaluations, seed):
+    # a black box with a mode more followed a valley of the noise: 38, 28 and 27 evaluations
     n = 100_000
-    est = fq.fit(MODE, record(n, 3))
+    est = fq.fit(MODE, record(n, seed))
     evaluations.clear()
     assert est.verdict.grade == "trust"
     whole = sum(lines > n // 4 for lines in evaluations)
@@ -62,13 +63,8 @@ def test_a_mode_that_long_records_show_plainly_is_still_named():
 class Valley:
     """Rosenbrock's, of any height: 100 (y − x²)² + (1 − x)² + height."""
 
-    n_rows, energy = 3, 1e4
-
     def __init__(self, height):
         self.height = height
-
-    def at(self, x):
-        return self.residual(x)
 
     def rows(self, x):
         return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0], np.sqrt(self.height)])
@@ -89,8 +85,6 @@ class Descending(Objective):
         super().__init__(self.structure, [])
 
     def _compute(self, x):
-        from freqid.fitting.cost.objective import Point
-
         rows = np.vstack([self.valley.slopes(x), self.valley.rows(x)]).T
         R = np.linalg.qr(rows, mode="r")
         return Point(R, [], [float(R[:, -1] @ R[:, -1])])

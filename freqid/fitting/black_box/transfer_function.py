@@ -219,8 +219,10 @@ def _starting_poles(
         if delay:
             sampled = _first_guess(spec.poles, readings, delay)
         else:
-            # a plant that takes its time lets through what its hold lets through
-            direct = spec.zeros >= spec.poles or readings[0].hold.reaches_next
+            # a plant that takes its time lets through what its hold does, and without one anything
+            hold = readings[0].hold
+            held = isinstance(hold, PeriodicHold) and not hold.reaches_next
+            direct = spec.zeros >= spec.poles or not held
             sampled = fit_output_error(OutputError(spec.poles, direct), readings).model.poles
         dt = readings[0].sample_time
         z = np.where(np.abs(sampled) < 1e-6, 1e-6, sampled)

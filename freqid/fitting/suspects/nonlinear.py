@@ -7,7 +7,7 @@ sweep it stands where the sweep is not.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -45,13 +45,16 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
             np.gradient(y, axis=-1)
         ),
     }
-    outputs = [s.signals(_fitted(s)) for s in scene.seen]
-    drawn = {
-        text: [_against(s, model, way(y)) for s, y in zip(scene.seen, outputs, strict=True)]
-        for text, way in ways.items()
-    }
+    drawn = []
+    for s in scene.seen:
+        y = s.signals(_fitted(s))
+        # an input is less by the sign
+        drawn.append(
+            _onto(s, model, _pairs(model), *(-s.lines_of(way(y)) for way in ways.values()))
+        )
     found = [
-        Columns(rows, _unit(scene), count, text, onesided=True) for text, rows in drawn.items()
+        Columns(rows, _unit(scene), count, text, onesided=True)
+        for text, rows in zip(ways, zip(*drawn, strict=True), strict=True)
     ]
     for each in dampers:
         rows = []
@@ -74,7 +77,7 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
     """
     if not _asked(scene, model):
         return []
-    kinds: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
+    kinds: dict[str, list[Sequence[FloatArray]]] = {}
     springs = _elements(scene, model)
     pairs, alike = _pairs(model), [(i, i) for i in range(model.n_inputs)]
     for s in scene.seen:
@@ -82,13 +85,12 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
         y = _fitted(s)
         bent = s.lines_of(_cube(s.signals(y)))
         if all(_more_than_levels(each) for each in u):
-            both = s.lines_of(_cube(u)), s.lines_of_input
             kinds.setdefault("the input's gain changes with its size", []).append(
-                _onto_both(s, model, both, alike)
+                _onto(s, model, alike, s.lines_of(_cube(u)), s.lines_of_input)
             )
         if all(each[0].damps for each in springs):
             kinds.setdefault("a force bends with the output", []).append(
-                _onto_both(s, model, (bent, y), pairs)
+                _onto(s, model, pairs, bent, y)
             )
         alone = np.eye(len(y))[:, :, None]
         sensor = s.rows_of(alone * bent), s.rows_of(alone * y)
@@ -144,28 +146,19 @@ def _direction(velocity: FloatArray) -> FloatArray:
     return found
 
 
-def _against(s: Seen, model: Model, direction: FloatArray) -> FloatArray:
-    """Rows of each input that is less by the sign of an output, (pairs, rows)."""
-    return _onto(s, model, -s.lines_of(direction), _pairs(model))
-
-
-def _onto_both(
-    s: Seen,
-    model: Model,
-    shapes: tuple[ComplexArray, ComplexArray],
-    pairs: list[tuple[int, int]],
-) -> tuple[FloatArray, FloatArray]:
-    """Rows of each input with what bends beside it, and with what does not."""
-    bent, straight = shapes
-    return _onto(s, model, bent, pairs), _onto(s, model, straight, pairs)
-
-
-def _onto(s: Seen, model: Model, each: ComplexArray, pairs: list[tuple[int, int]]) -> FloatArray:
-    """Rows (pairs, rows) of each input with a signal of these lines (channels, K) beside it."""
-    inputs = np.zeros((len(pairs), model.n_inputs, each.shape[-1]), complex)
-    for row, (i, o) in enumerate(pairs):
-        inputs[row, i] = each[o]
-    return s.driven(responses(s.own(model), s.reading.hold, s.omega_input), inputs)
+def _onto(
+    s: Seen, model: Model, pairs: list[tuple[int, int]], *signals: ComplexArray
+) -> list[FloatArray]:
+    """Rows (pairs, rows) of each input with a signal beside it, for each of several signals of
+    these lines (channels, K).
+    """
+    G, rows = responses(s.own(model), s.reading.hold, s.omega_input), []
+    for each in signals:
+        inputs = np.zeros((len(pairs), model.n_inputs, each.shape[-1]), complex)
+        for row, (i, o) in enumerate(pairs):
+            inputs[row, i] = each[o]
+        rows.append(s.driven(G, inputs))
+    return rows
 
 
 def _cube(signal: FloatArray) -> FloatArray:
