@@ -74,10 +74,10 @@ class Part:
     first: SpectralExperiment
 
     @classmethod
-    def of(cls, first: SpectralExperiment, part: float, evenly: bool = False) -> Part:
-        """A ``part`` of the lines, ``evenly`` spread or where the energy is."""
-        lines, weight = first.lines.spread(part, evenly)
-        return cls(lines, np.sqrt(weight), first.thinned(part, evenly))
+    def of(cls, first: SpectralExperiment, part: float) -> Part:
+        """A ``part`` of the lines, where the energy is."""
+        lines, weight = first.lines.spread(part, evenly=False)
+        return cls(lines, np.sqrt(weight), first.thinned(part))
 
 
 class ManyCosts:

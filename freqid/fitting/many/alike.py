@@ -21,8 +21,8 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.sufficiency import enough_rows
 from freqid.models import GreyBox
 
-# lines of the first steps, and those that are enough for error bars and doubts
-_LINES, _ENOUGH = 300, 4000
+# lines of the first steps
+_LINES = 300
 
 
 class Alike:
@@ -55,16 +55,8 @@ class Alike:
     @cached_property
     def few(self) -> Part | None:
         """Lines of the first steps, where they are fewer; where the input's energy is."""
-        return self._part(_LINES, evenly=False)
-
-    @cached_property
-    def enough(self) -> Part | None:
-        """Lines for error bars and doubts, where they are fewer; evenly spread."""
-        return self._part(_ENOUGH, evenly=True)
-
-    def _part(self, count: int, evenly: bool) -> Part | None:
-        part = count / self.first.n_lines
-        return Part.of(self.first, part, evenly) if part <= 0.5 else None
+        part = _LINES / self.first.n_lines
+        return Part.of(self.first, part) if part <= 0.5 else None
 
     def _lines_of(
         self, record: Record, like: SpectralExperiment | None = None

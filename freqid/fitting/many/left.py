@@ -23,9 +23,7 @@ _SAME = 1e-9
 
 
 class Left:
-    """What is left at minima ``x`` (S, P) of S records, on lines that may be a ``share``
-    of all; ``inverse`` is that of JᵀJ (S, P, P) on all.
-    """
+    """What is left at minima ``x`` (S, P) of S records; ``inverse`` is that of JᵀJ (S, P, P)."""
 
     @np.errstate(all="ignore")
     def __init__(
@@ -34,10 +32,8 @@ class Left:
         x: FloatArray,
         at: ManyPoints,
         inverse: FloatArray,
-        share: float,
     ) -> None:
         self.costs, self.x, self.at, self.inverse, self.e = costs, x, at, inverse, costs.first
-        self.share = share
         self.jacobian = at.without_transients()
         # real values that neither parameters nor initial states have taken
         self.rows = 2 * self.e.n_lines * costs.Y.shape[1]
@@ -52,7 +48,7 @@ class Left:
         taken = np.minimum(taken.reshape(S, -1, 2).mean(axis=-1), MOST_LEVERAGE)
         power = smoothed_power(self._lines() / np.sqrt(1 - taken).reshape(S, -1, self.e.n_lines))
         each = np.repeat(power.reshape(S, -1) / 2, 2, axis=-1)
-        score = (J * each[:, None]) @ J.swapaxes(-1, -2) * (self.rows / self.freedom * self.share)
+        score = (J * each[:, None]) @ J.swapaxes(-1, -2) * (self.rows / self.freedom)
         return np.asarray(np.sqrt(np.einsum("spp->sp", self.inverse @ score @ self.inverse)))
 
     @cached_property
@@ -107,19 +103,10 @@ class Left:
         if hold.reaches_next or s.model.state_space().D.any():
             shapes.append(np.ones((len(phi), 1, len(z)), complex))
         gain, count = self._explained(np.concatenate(shapes, axis=1))
-        # on a part of the lines the parameters themselves are not at their least
-        gain = np.maximum(gain - self._own_gain(), 0.0)
         more = np.maximum(count - self.x.shape[1], 0)
         below = np.maximum(self.freedom - more, 1)
         f = gain / np.maximum(more, 1) / ((self.at.cost - gain) / below)
         return np.where(more > 0, scipy.stats.f.sf(f, np.maximum(more, 1), below), 1.0)
-
-    def _own_gain(self) -> FloatArray:
-        """What the parameters would still explain of what is left on these lines, (S,)."""
-        J, r = self.jacobian, self.at.residual
-        g = (J @ r[..., None])[..., 0]
-        inverse, _ = inverse_of(J @ J.swapaxes(-1, -2))
-        return np.asarray(np.einsum("sp,spq,sq->s", g, inverse, g))
 
     def _explained(self, ways: ComplexArray) -> tuple[FloatArray, FloatArray]:
         """What responses (S, C, K) from each input to each output explain of what is left (S,), and

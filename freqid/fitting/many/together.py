@@ -149,11 +149,11 @@ def _looked(
     try:
         every = alike.costs(which)
         if near is not None:
-            found = _minima(every, alike.enough, np.tile(near, (len(which), 1)))
+            found = _minima(every, np.tile(near, (len(which), 1)))
         left = np.array([i for i, each in enumerate(found) if each is None], dtype=int)
         if start and len(left):
             some = every.some(left)
-            ends = _minima(some, alike.enough, _from_start(some, alike.few))
+            ends = _minima(some, _from_start(some, alike.few))
             for i, each in zip(left, ends, strict=True):
                 found[i] = each
     except (Exception, SystemExit):
@@ -181,12 +181,10 @@ def _from_start(every: ManyCosts, few: Part | None) -> FloatArray:
 
 
 @np.errstate(all="ignore")
-def _minima(every: ManyCosts, enough: Part | None, x: FloatArray) -> list[Done | None]:
-    """Those next to points (S, P), error bars and doubts on ``enough`` of the lines."""
-    few = every if enough is None else every.thinned(enough)
+def _minima(every: ManyCosts, x: FloatArray) -> list[Done | None]:
+    """Those next to points (S, P)."""
     x = x.copy()
     done: list[Done | None] = [None] * len(x)
-    share = few.first.n_lines / every.first.n_lines
     near, on = np.zeros(len(x), bool), np.arange(len(x))
     for _ in range(_STEPS):
         # a record that has ended stays where it is, whatever its neighbours do
@@ -204,8 +202,7 @@ def _minima(every: ManyCosts, enough: Part | None, x: FloatArray) -> list[Done |
         near[on] = told & (np.abs(step) <= np.maximum(_LAST_STEP, _OF_STD * std)).all(axis=1)
         if len(ended):
             which, last = on[ended], at.some(ended).moved(step[ended])
-            seen = last if few.first is every.first else few.at(x[which], which)
-            left = Left(few.some(which), x[which], seen, inverse[ended], share)
+            left = Left(every.some(which), x[which], last, inverse[ended])
             for i, each in zip(which, _told(left, last.cost, every.energy[which]), strict=True):
                 done[i] = each
         on = np.delete(on, ended)

@@ -14,8 +14,6 @@ from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.uncertainty.noise_spectrum import local_mean, local_power, smoothed_power
 from freqid.lti import Realisation, eliminate, tuned
 
-# lines of an experiment that are enough for a covariance
-_LINES = 4000
 # means for each unknown from which they tell their own noise
 _MEANS = 5
 # leverage that is believed at the most
@@ -49,18 +47,18 @@ def score_covariance(
     total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
     with np.errstate(all="ignore"):
         for e in lines:
-            step = 1 if e.reach else max(e.n_lines // _LINES, 1)
-            few = e.thinned(1 / step, evenly=True) if step > 1 else e
-            evaluation = few.at(realisation)
+            # all of its lines: those few that an input has, or that tell a parameter, are not to be
+            # missed
+            evaluation = e.at(realisation)
             r, Q, delta = projected(evaluation)
             J = evaluation.jacobian(delta)
             J = J - (J @ Q.T) @ Q
-            left = r if noise_at is realisation else projected(few.at(noise_at))[0]
+            left = r if noise_at is realisation else projected(e.at(noise_at))[0]
             if e.response:
-                total += _of_response(J, left, few) / step
+                total += _of_response(J, left, e)
             else:
                 left = left / np.sqrt(1 - leverage(J, Q))
-                total += (J * local_power(left, few)) @ J.T / step
+                total += (J * local_power(left, e)) @ J.T
             rows += e.n_rows
             unknown += 0 if delta is None else len(delta)
         for log in stamped:
