@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import InputError, unknown
 from freqid.data import Record, input_dt, output_dt, rate_factor
+from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -170,9 +171,12 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
     return values
 
 
-def _rounding(plant: StateSpace, hold: Hold, reading: Reading) -> tuple[float, str]:
+def _rounding(
+    plant: StateSpace, hold: Hold, reading: Reading, fitted: Experiment
+) -> tuple[float, str]:
     """How far rounding of the matrices moves what was fitted, and the sentence on it."""
-    omega = reading.at_lines().lines().lines.omega
+    lines = fitted if isinstance(fitted, SpectralExperiment) else reading.at_lines().lines()
+    omega = lines.lines.omega
     if isinstance(hold, InputHolds) or not len(omega):
         return 0.0, ""
     low = omega[omega > 0].min(initial=np.inf)
@@ -207,7 +211,7 @@ def _estimate(
         len(values),
         out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
-        rounding=_rounding(plant, hold, reading),
+        rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
     )
     return Estimate(

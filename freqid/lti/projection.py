@@ -21,16 +21,16 @@ def triangle(matrix: FloatArray) -> FloatArray:
 
     A tall matrix is reduced in blocks of rows, whose triangles are reduced again: as stable as
     Householder's on the whole (TSQR: Demmel, Grigori, Hoemmen and Langou, SIAM J. Scientific
-    Computing 34, 2012), and in pieces that stay in the cache (see BLOCK).
+    Computing 34, 2012), and in pieces that stay in the cache (see BLOCK). LAPACK's own call takes
+    rows that are the columns of a longer matrix's transpose as they are; numpy copies them.
     """
-    rows, columns = matrix.shape
-    tall = 8 * columns
-    if rows >= 4 * tall:
-        whole = rows - rows % tall
-        blocks = np.ascontiguousarray(matrix[:whole]).reshape(-1, tall, columns)
-        reduced = np.asarray(np.linalg.qr(blocks, mode="r")).reshape(-1, columns)
-        return triangle(np.concatenate([reduced, matrix[whole:]]))
-    return np.asarray(np.linalg.qr(matrix, mode="r"))
+    rows = len(matrix)
+    if rows > 2 * BLOCK:
+        parts = [triangle(matrix[start : start + BLOCK]) for start in range(0, rows, BLOCK)]
+        return triangle(np.concatenate(parts))
+    if not matrix.size:
+        return np.zeros((0, matrix.shape[1]))
+    return np.triu(lapack.dgeqrf(matrix)[0][: min(matrix.shape)])
 
 
 def directions(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,10 +99,11 @@ class Lines:
         """
         # weights may leave out lines with a period of their own
         counted = np.flatnonzero(self.counted)
-        driven = np.zeros(len(counted), bool) if evenly else self._driven()[counted]
-        if evenly or driven.sum() >= _FEW * len(counted):
+        driven = None if evenly else self._few_driven(len(counted))
+        if driven is None:
             groups, wanted = [counted], part * len(counted)
         else:
+            driven = driven[counted]
             groups, wanted = [counted[driven], counted[~driven]], part * len(counted) / 2
         steps = [max(int(len(group) / wanted * (1 + 1e-9)), 1) for group in groups]
         kept = [group[::step] for group, step in zip(groups, steps, strict=True)]
@@ -110,14 +112,24 @@ class Lines:
         order = np.argsort(lines)
         return lines[order], weight[order]
 
-    def _driven(self) -> BoolArray:
-        """Which of the lines that count are the strongest, that hold the input's energy, (K,)."""
+    def _few_driven(self, n_counted: int) -> BoolArray | None:
+        """Which of the lines that count are the strongest, that hold the input's energy, (K,).
+
+        None where these are no few of the ``n_counted``.
+        """
         power = (np.abs(self.U) ** 2).sum(axis=(0, 1)).reshape(-1, self.aliases).sum(axis=1)
         power = np.where(self.counted, power, 0.0)
-        strongest = np.sort(power)[::-1]
-        energy = np.cumsum(strongest)
-        least = strongest[int(np.searchsorted(energy, _ENERGY * energy[-1]))]
-        return np.asarray((power >= least) & self.counted)
+        few = max(math.ceil(_FEW * n_counted) - 1, 0)
+        # to know that they are more takes a part of the time that it takes to sort them
+        strong = np.partition(power, len(power) - few)[len(power) - few :] if few else power[:0]
+        energy = float(power.sum())
+        if not strong.sum() >= _ENERGY * energy > 0:
+            return None
+        strong = np.sort(strong)[::-1]
+        enough = int(np.searchsorted(np.cumsum(strong), _ENERGY * energy))
+        least = strong[min(enough, few - 1)]
+        driven = np.asarray((power >= least) & self.counted)
+        return driven if driven.sum() <= few else None
 
     def some(self, lines: IntArray, factor: FloatArray) -> Lines:
         """Some of the lines, the data multiplied (lines,) so that costs stay comparable."""

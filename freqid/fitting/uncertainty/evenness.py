@@ -64,7 +64,7 @@ def levels_of_evenness(error: ComplexArray) -> FloatArray:
     total = power.sum(axis=-1, keepdims=True)
     share = np.cumsum(power, axis=-1) / np.where(total > 0, total, 1)
     gap = np.abs(share - np.arange(1, K + 1) / K).max(axis=-1) * (total[..., 0] > 0)
-    return np.asarray(scipy.stats.kstwobign.sf(np.sqrt(K) * gap))
+    return np.asarray(scipy.special.kolmogorov(np.sqrt(K) * gap))
 
 
 def may_be_tied(e: SpectralExperiment) -> bool:
