@@ -1,10 +1,14 @@
 """Searches within bounds, beside scipy's own on the same residuals."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy
 
 import freqid as fq
+from freqid.fitting.cost.objective import Point
+from freqid.fitting.search.bounded import within_bounds
 
 DT = 4e-3
 
@@ -106,3 +110,29 @@ def test_an_estimate_on_its_bound_is_within_it(seed):
     est = fq.fit(model, record, start={n: v * rng.uniform(0.1, 1) for n, v in top.items()})
     assert (est.values <= list(top.values())).all()
     assert np.isclose(est.values, list(top.values()), rtol=1e-6).any()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_step_ends_a_last_digit_beyond_its_bound(seed):
+    """From 90 to 1/30 a step's own digits end where the bound's go on: the fit was an error."""
+    rng = np.random.default_rng(seed)
+    A, wanted = rng.standard_normal((6, 3)), rng.uniform(-900, -1, 3)
+    begin, lower = rng.uniform(10, 900, 3), rng.uniform(0.001, 0.1, 3)
+
+    class Straight:
+        """|A (x − wanted)|², whose minimum lies beyond the bounds."""
+
+        rounding, n_evaluations, failure = 0.0, 0, None
+        structure = SimpleNamespace(lower=lower, upper=np.full(3, np.inf))
+
+        def point(self, x):
+            assert (x >= lower).all(), (x - lower).tolist()
+            left = A @ (x - wanted)
+            R = np.linalg.qr(np.column_stack([A, left]), mode="r")
+            return Point(R, [None], [float(left @ left)])
+
+    x, _, how = within_bounds(Straight(), begin, 100)
+    exact = scipy.optimize.lsq_linear(A, A @ wanted, (lower, np.inf), method="bvls")
+    assert how == "minimum"
+    assert x == pytest.approx(exact.x, rel=1e-6)
+    assert (x == lower).any()

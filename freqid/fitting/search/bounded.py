@@ -63,9 +63,10 @@ def within_bounds(
             step, gain = _step(R, c, _LEAST * _sizes(scale), box)
             small = _small(step, gain, least * point.cost)
         if small and gain > least * point.cost:
-            last = objective.point(x + step)
+            beyond = np.clip(x + step, lower, upper)
+            last = objective.point(beyond)
             better = last is not None and last.cost < point.cost
-            at, end = (x + step, last) if better and last is not None else (x, point)
+            at, end = (beyond, last) if better and last is not None else (x, point)
             return at, end, "minimum"
         if small or idle >= _IDLE or damping > _MOST:
             # on the way to a bound that it may not reach it is no minimum
@@ -74,11 +75,13 @@ def within_bounds(
                 return None
             at, there = _onto(objective, x, point, step)
             return at, there, "minimum" if ends else "edge"
-        trial = objective.point(x + step)
+        # from far away a step to a bound ends some last digits beside it
+        moved = np.clip(x + step, lower, upper)
+        trial = objective.point(moved)
         won = -np.inf if trial is None else point.cost - trial.cost
         if trial is not None and won > _TAKEN * gain:
             idle = idle + 1 if won <= (least if reach == 1 else _COARSE) * point.cost else 0
-            x, point, growth, taken = x + step, trial, _GROWTH, True
+            x, point, growth, taken = moved, trial, _GROWTH, True
             # Nielsen's rule: less where the promise was kept, more where it was not
             kept = max(_FALL, 1 - (2 * won / gain - 1) ** 3)
             damping = max(damping * kept, _LEAST)
