@@ -16,6 +16,8 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.bent_modes import DAMPED, PULLED, pulled
+from freqid.fitting.suspects.order import BENT
 from freqid.fitting.suspects.parts import Parting, confirming
 from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked
@@ -31,8 +33,6 @@ _APART, HOLDS_GOOD = 4.0, 0.01
 LITTLE, _MUCH = 2.5e-3, 0.01
 # evaluations of a half's own minimum next to the whole's
 _LIMIT = 60
-# poles with more damping than this are no modes
-_DAMPED = 0.5
 
 
 def modes_moved(own: ComplexArray, others: Sequence[ComplexArray | None]) -> float:
@@ -56,7 +56,8 @@ def confirmed(
     """What was said of a black box, minor where the modes of both halves of its data agree.
 
     Its unknowns have no standard errors that mean anything: its modes have. What it lacks much of
-    halves lack alike, and a gain that changes leaves modes where they are.
+    halves lack alike, a gain that changes leaves modes where they are, and what is not linear pulls
+    both halves' alike.
     """
     halves = confirming(inquiry.readings)
     if halves is None:
@@ -72,12 +73,21 @@ def confirmed(
     moved = modes_moved(whole, parts)
     if not moved < HOLDS_GOOD:
         return list(found)
-    text = f"the modes of both halves agree to {100 * moved:.2g} %, so that this harms little"
-    return [
-        f if a.harm >= _MUCH or (a.name == "unsteady" and a.test.gain >= _MUCH * scene.moving)
-        else Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {text}", "minor", f.number)
-        for f, a in zip(found, said, strict=True)
-    ]  # fmt: skip
+    agree = f"the modes of both halves agree to {100 * moved:.2g} %"
+
+    def judged(f: Finding, a: Asked) -> Finding:
+        changes = a.name == "unsteady" and a.test.gain >= _MUCH * scene.moving
+        pull = pulled(inquiry, scene, a) if a.name in BENT else 0.0
+        if a.harm >= _MUCH or changes or pull >= PULLED:
+            return f
+        so = (
+            f"; it moves a mode's decay by {100 * pull:.2g} %"
+            if pull
+            else ", so that this harms little"
+        )
+        return Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {agree}{so}", "minor", f.number)
+
+    return [judged(f, a) for f, a in zip(found, said, strict=True)]
 
 
 def _as_good(inquiry: Asking, part: Sequence[Reading], half: Estimate) -> ComplexArray:
@@ -154,5 +164,5 @@ def weakly_damped(poles: ComplexArray) -> FloatArray:
     """Natural frequencies (rad/s) of weakly damped poles."""
     upper = poles[poles.imag > 0]
     size = np.abs(upper)
-    modes: FloatArray = size[-upper.real < _DAMPED * size]
+    modes: FloatArray = size[-upper.real < DAMPED * size]
     return modes

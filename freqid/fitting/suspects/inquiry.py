@@ -16,6 +16,7 @@ from freqid.fitting.findings import Finding, Severity, between_parts
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import changing, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
+from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
@@ -171,7 +172,12 @@ class Inquiry:
 
     @tuned
     def findings(self) -> list[Finding]:
-        """Sentences on the strongest suspects."""
+        """Sentences on the strongest suspects, or that there has to be one."""
+        found = self._on_suspects()
+        serious = any(f.severity == "serious" for f in found)
+        return found if serious else [*beyond_noise(self.minimum), *found]
+
+    def _on_suspects(self) -> list[Finding]:
         scene, named = self.scene, self.named
         if scene is None:
             nothing = unheard(self.minimum, self.model, self.readings)

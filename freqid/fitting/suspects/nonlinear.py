@@ -17,7 +17,7 @@ from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
-from freqid.models import Model
+from freqid.models import GreyBox, Model
 
 # inputs times outputs that are asked at the most
 _PAIRS = 9
@@ -46,6 +46,8 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
         ),
     }
     drawn = []
+    # only who names a sensor's direction knows which way friction acts
+    signed = isinstance(model, GreyBox)
     for s in scene.seen:
         y = s.signals(_fitted(s))
         # an input is less by the sign
@@ -53,7 +55,7 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
             _onto(s, model, _pairs(model), *(-s.lines_of(way(y)) for way in ways.values()))
         )
     found = [
-        Columns(rows, _unit(scene), count, text, onesided=True)
+        Columns(rows, _unit(scene), count, text, onesided=signed)
         for text, rows in zip(ways, zip(*drawn, strict=True), strict=True)
     ]
     for each in dampers:

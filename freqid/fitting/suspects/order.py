@@ -21,7 +21,7 @@ _CLEAR = 1e-3
 _AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
-_BENT, _HALF = ("friction", "nonlinear"), 0.5
+BENT, _HALF = ("friction", "nonlinear"), 0.5
 _SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
 # what a sharp mode looks like from near: it has to explain more
 _NARROW = ("unsteady", "tone")
@@ -76,7 +76,7 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         ranked = [a for a in ranked if a.name != "unsteady"]
     if ranked[0].name not in _SENSOR:
         least = _HALF * max(a.test.gain for a in asked)
-        bent = [a for a in ranked if a.name in _BENT and a.test.gain >= least]
+        bent = [a for a in ranked if a.name in BENT and a.test.gain >= least]
         ranked = [*bent, *(a for a in ranked if a not in bent)]
     # what the data themselves show, and what explains much besides, needs no weighing
     shown = [a for a in ranked if a.certain and evidence(scene, a) > 0]

@@ -57,7 +57,8 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "spikes": f"one sample is off by {number} {detail}",
         "tone": f"a sine of {number} {detail} is added that the input does not have",
         "saturation": f"{detail or 'an output stays at one extreme value'}, as at a limit",
-        "friction": f"a friction of {number} {detail}",
+        # a sensor that looks the other way makes it negative
+        "friction": f"a friction of {abs(size):.3g}{unit} {detail}",
         "nonlinear": f"the plant is not linear: {detail}",
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
