@@ -9,6 +9,7 @@ import scipy
 import freqid as fq
 from freqid.fitting.cost.objective import Point
 from freqid.fitting.search.bounded import within_bounds
+from freqid.fitting.search.descent import minimise
 
 DT = 4e-3
 
@@ -136,3 +137,25 @@ def test_no_step_ends_a_last_digit_beyond_its_bound(seed):
     assert how == "minimum"
     assert x == pytest.approx(exact.x, rel=1e-6)
     assert (x == lower).any()
+
+
+def test_where_nothing_can_be_computed_next_to_a_bound_the_start_is_what_ends():
+    """A search pushed off its bound, where there is no plant, came back with the place it had been
+    pushed to and the cost of the start: error bars met numbers that are none.
+    """
+
+    class Edge:
+        """(x − 1)² + 1 at 0 and beyond 0.1, nothing in between."""
+
+        rounding, n_evaluations, failure = 0.0, 0, ArithmeticError("no plant")
+        structure = SimpleNamespace(lower=np.zeros(1), upper=np.full(1, np.inf))
+
+        def point(self, x):
+            if 0 < x[0] < 0.1:
+                return None
+            left = np.array([x[0] - 1, 1.0])
+            R = np.linalg.qr(np.column_stack([[1.0, 0.0], left]), mode="r")
+            return Point(R, [None], [float(left @ left)])
+
+    found = minimise(Edge(), np.zeros(1))
+    assert found.point.cost == Edge().point(found.x).cost

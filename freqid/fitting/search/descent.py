@@ -113,6 +113,7 @@ def _descended(
                 max_nfev=most,
             )
 
+    begin = start
     if bounded:
         near = searched(start, max(tolerance, _NEAR), min(most, _REFLECTED * size))
         ended = within_bounds(objective, near.x, most, tolerance)
@@ -125,8 +126,8 @@ def _descended(
             }
             return Solution(x, end, how == "minimum", said[how])
         # where no such step gains anything, next to what cannot be computed, reflective ones may
-        start, tolerance = near.x, max(tolerance, _BOUNDED)
-    result = searched(start, tolerance, most)
+        begin, tolerance = near.x, max(tolerance, _BOUNDED)
+    result = searched(begin, tolerance, most)
     point = objective.point(result.x)
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
