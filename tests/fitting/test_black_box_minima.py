@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import scipy.signal
+import scipy
 
 import freqid as fq
 from freqid.fitting.black_box import refinement
@@ -68,3 +68,37 @@ def test_starts_that_were_counted_are_not_added_to(monkeypatch):
     assert counted[1] == 0
     assert counted[4] > 0
     assert counted["auto"] > counted[4]
+
+
+# numerators and poles of fourth-order plants; of 40 seeds the third ended 1 to 11 % above for ten
+# white inputs and nine chirps, the first for five chirps, trusted with modes 12 standard errors off
+FOURTH = [
+    ([-0.36074413, 1.0148385, -0.99426503, 0.33728907],
+     [0.934289 + 0.344922j, 0.934289 - 0.344922j, 0.920833, 0.7241]),
+    ([-0.064865851, 0.14730184, -0.1529539, 0.043272302],
+     [-0.137557 + 0.913915j, -0.137557 - 0.913915j, 0.954185 + 0.1368j, 0.954185 - 0.1368j]),
+    ([0.21702886, -0.30397003, 0.18639092, -0.03633352],
+     [-0.214244 + 0.75468j, -0.214244 - 0.75468j, 0.770746, 0.617088]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [13, 17, 20, 29])
+@pytest.mark.parametrize("plant", FOURTH)
+@pytest.mark.parametrize("kind", ["white", "chirp"])
+def test_two_modes_are_exchanged_as_well(plant, kind, seed):
+    """Against scipy's least squares on samples, begun at the truth; little noise was no reason."""
+    num, den = plant[0], np.real(np.poly(plant[1]))
+    rng = np.random.default_rng(seed)
+    n = 3000 if seed % 2 else 1000
+    u = rng.standard_normal(n)
+    if kind == "chirp":
+        u = fq.chirp(0.5, 45, n / 100, 0.01)
+    y = scipy.signal.lfilter([0, *num], den, u)
+    e = scipy.signal.lfilter([1], [1, -0.9], rng.standard_normal(n + 300))[300:]
+    y = y + 0.1 * y.std() * e / e.std()
+    at_truth = scipy.optimize.least_squares(
+        lambda x: scipy.signal.lfilter([0, *x[:4]], [1, *x[4:]], u) - y,
+        [*num, *den[1:]], method="lm", x_scale="jac",
+    )  # fmt: skip
+    est = fq.fit(fq.OutputError(4), fq.Record(u, y, 0.01))
+    assert est.cost <= 2 * at_truth.cost * (1 + 1e-6)

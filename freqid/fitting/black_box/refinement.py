@@ -38,6 +38,8 @@ LINES = 20000
 _LARGER = (2, 4)
 # highest order that begins with all those below
 _CHAIN = 12
+# poles of one mode, which takes the place that is worth most
+_ONE_MODE = 2
 # starts with random poles where none of the others is believed
 _SCATTERED = 5
 # where one more real pole is tried
@@ -163,7 +165,7 @@ def nested_model(
         # few poles that explain nearly all need no others below them
         first = best_of(lines, _begun(lines, order))
         if first is not None and _believed(lines, first) and few is experiments:
-            return lines.state_space(first)
+            return lines.state_space(exchanged(lines, first) if order > _ONE_MODE else first)
     # of a high order only the last few: the chain from one on would take longer than it is worth
     for n in range(1 if order <= _CHAIN else order - 2, order + 1):
         last = n == order
@@ -181,7 +183,7 @@ def nested_model(
             break
     if best is None or len(best.poles) < order:
         return identify(experiments, order, feedthrough)
-    if order > FEW or not _believed(lines, best):
+    if order > _ONE_MODE or not _believed(lines, best):
         # a way that was straight may have led to a mode that is worth less than another
         best = exchanged(lines, best)
     if few is not experiments:
