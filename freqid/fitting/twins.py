@@ -19,7 +19,8 @@ from freqid.checks import FloatArray
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
-from freqid.fitting.search.descent import Solution
+from freqid.fitting.matched_twins import matched
+from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.models import GreyBox
 
@@ -47,6 +48,11 @@ def nearest_to_start(
     # of three that may be exchanged one exchange leads to the next
     while nearer is not None:
         solution, nearer = nearer, _nearer(objective, structure, nearer)
+    other = matched(structure, solution.x)
+    if other is not None:
+        found = polish(objective, other)
+        if _same_cost(objective, solution.cost, found.cost):
+            return found
     return solution
 
 

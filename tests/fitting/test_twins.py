@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.matched_twins import matched
 
 DT = 2.0
 
@@ -181,3 +183,43 @@ def test_three_that_may_be_exchanged_end_nearest_to_the_start():
         est = fq.fit(model, data, start=dict(zip(true, begin, strict=True)), n_starts=15)
         assert np.argsort(est.values).tolist() == np.argsort(begin).tolist()
         assert sorted(est.values) == pytest.approx(sorted(true.values()), rel=0.1)
+
+
+def roll(b, a, tau):
+    """(b/τ)/((s + 1/τ)(s + a)): 1/τ and a may stand for one another, with another b in front."""
+    return [[-1 / tau, 0], [b, -a]], [[1 / tau], [0]], [[0, 1]], None
+
+
+ROLL = fq.GreyBox(
+    roll, [fq.Parameter("b", 120.0), fq.Parameter("a", 0.8), fq.Parameter("tau", 0.045)]
+)
+OTHER = {"b": 120 / 0.045 / 0.8, "a": 1 / 0.045, "tau": 1 / 0.8}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("n_starts", ["auto", 20])
+def test_twins_that_no_exchange_tells_are_told_by_the_start(seed, n_starts):
+    """Trusted ten times as far from the start as the other answer, where a search had met it."""
+    u = fq.white_noise(2000, seed=seed)
+    data = fq.simulate(ROLL, u, 4e-3).with_noise(0.3, seed=seed + 50)
+    for wanted in (ROLL.values, OTHER):
+        off = zip(wanted.items(), (0.6, 1.3, 0.7), strict=True)
+        start = {name: value * factor for (name, value), factor in off}
+        est = fq.fit(ROLL, data, start=start, n_starts=n_starts)
+        for name in est.names:
+            assert abs(est[name] / wanted[name] - 1) < 0.5, (name, est.values)
+
+
+def test_a_twin_is_looked_for_from_the_start():
+    """Values alone, without data; none where there is none, or a bound excludes it."""
+    far = GreyStructure(ROLL, {"b": 80.0, "a": 1.0, "tau": 0.03})
+    x = np.array(list(OTHER.values())) / far.scale
+    assert matched(far, x) * far.scale == pytest.approx(list(ROLL.values.values()), rel=1e-6)
+    near = GreyStructure(ROLL, {"b": 3000.0, "a": 20.0, "tau": 1.0})
+    assert matched(near, np.array(list(OTHER.values())) / near.scale) is None
+    kept = ROLL.with_values(a=6.0).with_bounds(a=(5.0, 50.0))
+    bounded = GreyStructure(kept, {"b": 80.0, "a": 6.0, "tau": 0.03})
+    assert matched(bounded, np.array(list(OTHER.values())) / bounded.scale) is None
+    mass = fq.two_mass()
+    alone = GreyStructure(mass, {n: v / 8 for n, v in mass.values.items()})
+    assert matched(alone, np.array([mass[n] for n in alone.physical_names]) / alone.scale) is None

@@ -122,6 +122,7 @@ def nearest(
     return _places(found.values, found.cost)
 
 
+@np.errstate(all="ignore")
 def distance(x: FloatArray, inner: ScannableStructure, boxes: Sequence[BoxDistance]) -> float:
     """That of one plant from the black boxes."""
     cost, _, _ = _NearBatch(inner, boxes, 1).normal(x[None], np.arange(1))
