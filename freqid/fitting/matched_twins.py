@@ -24,9 +24,11 @@ def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
     or the start is near anyway.
     """
     begin = np.array([structure.meant[name] for name in structure.physical_names])
+    if structure.unknown:
+        return None
     values = x * structure.scale
     told = begin * values > 0
-    if structure.unknown or not told.any():
+    if not told.any():
         return None
     moved = np.log(values[told] / begin[told])
     if np.sum(np.abs(moved) > _MOVED) < 2:
