@@ -24,6 +24,11 @@ def remembered(est: Estimate) -> tuple[Hold | None, float | None]:
     return kept
 
 
+def offset_is_free(model: ModelLike) -> bool:
+    """Whether a fit took a constant of each output for an unknown of each record."""
+    return isinstance(model, Estimate) and "offset='estimate'" in model.call.partition("\n")[0]
+
+
 def met_by(est: Estimate, reading: Reading) -> Model:
     """The model that explains one of the readings that were fitted."""
     minimum = est.minimum

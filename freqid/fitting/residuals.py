@@ -47,11 +47,12 @@ def line_errors(
     hold: Hold | str | None = None,
     band: Band | None = None,
     initial_state: str = "estimate",
+    offset: bool = False,
 ) -> LineErrors:
     """Errors of a model on a record at the lines of a band.
 
-    ``hold`` is what the input is taken to do; None is what the record remembers. Raises ValueError
-    for channels that do not match.
+    ``hold`` is what the input is taken to do; None is what the record remembers. An ``offset`` of
+    each output is free, as the initial state is. Raises ValueError for channels that do not match.
     """
     if initial_state == "zero":
         raise InputError("initial_state='zero' has no errors at lines; use 'estimate'")
@@ -60,7 +61,7 @@ def line_errors(
         record, hold, band, initial_state=initial_state,  # type: ignore[arg-type]
         skip_zero=model.integrates, delayed=late,
     )  # fmt: skip
-    return errors_of(model, reading)
+    return errors_of(model, reading.with_(offset=offset and not model.integrates))
 
 
 def errors_at_stamps(model: Model, record: StampedRecord, hold: Hold | str | None) -> FloatArray:

@@ -20,7 +20,15 @@ from freqid.data import (
     chosen,
     input_dt,
 )
-from freqid.fitting import Estimate, errors_at_stamps, in_order_of, line_errors, met, remembered
+from freqid.fitting import (
+    Estimate,
+    errors_at_stamps,
+    in_order_of,
+    line_errors,
+    met,
+    offset_is_free,
+    remembered,
+)
 from freqid.lti import Hold, PeriodicHold, as_hold
 from freqid.models import Model, ModelLike, as_model
 
@@ -117,7 +125,8 @@ def compare(
         hold: what the input does; None is what the fit assumed of its data, and else what the
             record remembers. A discrete black box simulates at the hold that it was fitted with.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
-            input to be periodic.
+            input to be periodic. Offsets of the outputs are fitted with it where the Estimate was
+            (``offset="estimate"``).
         band: in Hz; only what lies inside it is compared, of both. None compares everything.
 
     Raises ValueError for channels that do not match, a band that the record does not have, or an
@@ -144,7 +153,8 @@ def compare(
     limits = as_band(band, record.nyquist)
     choice("initial_state", initial_state, ("estimate", "steady"))
     given, hold = fitted, own_hold(model, hold, record)
-    residual = -line_errors(given, record, hold, None, initial_state).in_time()
+    free = offset_is_free(model)
+    residual = -line_errors(given, record, hold, None, initial_state, free).in_time()
     y = record.outputs[: len(residual)]
     if limits is not None:
         y, residual = part_inside(y, record.dt, limits), part_inside(residual, record.dt, limits)

@@ -17,7 +17,7 @@ from freqid.data import (
     StampedRecord,
     as_band,
 )
-from freqid.fitting import Estimate, in_order_of, line_errors, met
+from freqid.fitting import Estimate, in_order_of, line_errors, met, offset_is_free
 from freqid.lti import Hold
 from freqid.models import ModelLike, as_model
 from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
@@ -84,7 +84,7 @@ def residual_test(
     hold = own_hold(model, hold, record)
     fitted, record = met(model, record), in_order_of(as_model(model), record)
     assert isinstance(record, Record)
-    e = -line_errors(fitted, record, hold).in_time()
+    e = -line_errors(fitted, record, hold, offset=offset_is_free(model)).in_time()
     u = record.inputs[:: record.factor][: len(e)]
     N = len(e)
     if limits is not None:
