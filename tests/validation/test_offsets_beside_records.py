@@ -9,7 +9,7 @@ HEATED = fq.first_order(b=0.8 / 60, a=1 / 60)
 
 
 def stepped(seed, level=95.0, n=800):
-    """From rest at 30 %, at a level of its own in degrees: of what rest is the model knows nothing."""
+    """From rest at 30 %, at a level of its own in degrees, of which the model knows nothing."""
     u = np.r_[np.full(n // 4, 30.0), np.full(n - n // 4, 50.0)]
     clean = fq.simulate(HEATED, u - 30, 1.0)
     return fq.Record(u, level + clean.y, 1.0).with_noise(0.2, seed=seed)
