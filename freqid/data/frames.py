@@ -12,7 +12,7 @@ from freqid.data.cells import no_number
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
 from freqid.data.readers.table import named
-from freqid.data.regular_time import on_a_grid, uneven
+from freqid.data.regular_time import on_a_grid, rows_apart, uneven
 from freqid.data.remembered import (
     as_printed,
     is_kept,
@@ -68,13 +68,13 @@ def record_of(
     notes = [*kept_notes(frame), *said]
     if resample:
         held = set(u_names) if between is None or between == "zoh" else set()
-        frame, more = _resampled(frame, signals, held)
+        frame, more = _resampled(frame, signals, held, y_names)
         notes += more
     step = _sample_time(frame, dt, notes)
     u, y = (_numbers(frame, names) for names in (u_names, y_names))
     commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
 
-    factor = _slow_output(y)
+    factor = rows_apart(y)
     y = y[::factor]
     named = {*u_names, *y_names, "reference"}
     return kind(
@@ -164,7 +164,7 @@ def _on_paper(record: Record) -> FloatArray:
 
 
 def _resampled(
-    frame: pd.DataFrame, signals: Sequence[str], held: Collection[str]
+    frame: pd.DataFrame, signals: Sequence[str], held: Collection[str], outputs: Collection[str]
 ) -> tuple[pd.DataFrame, list[str]]:
     """The frame on a regular time, and what was done to it, in words."""
     import pandas as pd
@@ -172,7 +172,8 @@ def _resampled(
     times = _times(frame)
     if times is None:
         raise InputError("resample=True needs a column or index called 'time'")
-    new, notes = on_a_grid(times, {s: _numbers(frame, [s])[:, 0] for s in signals}, held)
+    columns = {s: _numbers(frame, [s])[:, 0] for s in signals}
+    new, notes = on_a_grid(times, columns, held, outputs)
     kept = {str(c): frame[c].iloc[0] for c in frame.columns if is_kept(c)}
     return pd.DataFrame(new).assign(**kept), notes
 
@@ -281,15 +282,3 @@ def _numbers(frame: pd.DataFrame, names: list[str]) -> FloatArray:
         return frame[names].to_numpy(dtype=float)
     except (TypeError, ValueError):
         raise no_number(frame, names) from None
-
-
-def _slow_output(y: FloatArray) -> int:
-    """How many rows lie between output samples, where all the others are blank; else 1."""
-    there = np.isfinite(y).all(axis=1)
-    rows = np.flatnonzero(there)
-    if there.all() or len(rows) < 2 or rows[0] != 0:
-        return 1
-    factor = int(rows[1])
-    regular = np.array_equal(rows, np.arange(0, len(y), factor))
-    blank = bool(np.isnan(y[~there]).all())
-    return factor if regular and blank else 1

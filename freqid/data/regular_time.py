@@ -17,12 +17,16 @@ _FEW = 5
 
 
 def on_a_grid(
-    times: FloatArray, columns: Mapping[str, FloatArray], held: Collection[str]
+    times: FloatArray,
+    columns: Mapping[str, FloatArray],
+    held: Collection[str],
+    outputs: Collection[str],
 ) -> tuple[dict[str, FloatArray], list[str]]:
     """Columns, and their ``time``, on a regular one, blanks filled; and what was done, in words.
 
-    Outputs are drawn by straight lines; inputs that a converter ``held`` keep their value for the
-    period that they began. Raises ValueError for times that do not increase.
+    Outputs are drawn by straight lines, and stay blank between rows where only every so many have
+    one; inputs that a converter ``held`` keep their value for the period that they began. Raises
+    ValueError for times that do not increase.
     """
     rounded = printed_period(times)
     notes = []
@@ -52,12 +56,15 @@ def on_a_grid(
     if jitter > 1e-6 * step:
         notes.append(f"jitter of up to {jitter:g} s was taken off by straight lines")
     new = {"time": grid}
+    factor = rows_apart(np.column_stack([columns[name] for name in outputs])) if outputs else 1
+    # rows that are lost would have others stand for their outputs
+    slow = set(outputs) if factor > 1 and not wide else set()
     for name, x in columns.items():
         there = np.isfinite(x)
         if not there.any():
             raise InputError(f"column {name!r} has no samples at all; leave it out")
         missing = len(x) - int(there.sum())
-        if missing:
+        if missing and name not in slow:
             how = "by the one before" if name in held else "by straight lines"
             notes.append(f"{missing} missing samples of {name!r} were filled {how}")
         if name in held:
@@ -65,7 +72,21 @@ def on_a_grid(
             new[name] = x[there][np.maximum(at, 0)]
         else:
             new[name] = np.interp(grid, times[there], x[there])
+        if name in slow:
+            new[name][np.arange(len(grid)) % factor > 0] = np.nan
     return new, notes
+
+
+def rows_apart(y: FloatArray) -> int:
+    """How many rows lie between output samples, where all the others are blank; else 1."""
+    there = np.isfinite(y).all(axis=1)
+    rows = np.flatnonzero(there)
+    if there.all() or len(rows) < 2 or rows[0] != 0:
+        return 1
+    factor = int(rows[1])
+    regular = np.array_equal(rows, np.arange(0, len(y), factor))
+    blank = bool(np.isnan(y[~there]).all())
+    return factor if regular and blank else 1
 
 
 def uneven(times: FloatArray) -> str:
