@@ -24,7 +24,7 @@ def on_a_grid(
 ) -> tuple[dict[str, FloatArray], list[str]]:
     """Columns, and their ``time``, on a regular one, blanks filled; and what was done, in words.
 
-    Outputs are drawn by straight lines, and stay blank between rows where only every so many have
+    Outputs are drawn by straight lines, and stay as they are where only every so many rows have
     one; inputs that a converter ``held`` keep their value for the period that they began. Raises
     ValueError for times that do not increase.
     """
@@ -56,9 +56,9 @@ def on_a_grid(
     if jitter > 1e-6 * step:
         notes.append(f"jitter of up to {jitter:g} s was taken off by straight lines")
     new = {"time": grid}
-    factor = rows_apart(np.column_stack([columns[name] for name in outputs])) if outputs else 1
+    sparse = bool(outputs) and rows_apart(np.column_stack([columns[n] for n in outputs])) > 1
     # rows that are lost would have others stand for their outputs
-    slow = set(outputs) if factor > 1 and not wide else set()
+    slow = set(outputs) if sparse and not wide else set()
     for name, x in columns.items():
         there = np.isfinite(x)
         if not there.any():
@@ -67,13 +67,14 @@ def on_a_grid(
         if missing and name not in slow:
             how = "by the one before" if name in held else "by straight lines"
             notes.append(f"{missing} missing samples of {name!r} were filled {how}")
-        if name in held:
+        if name in slow:
+            # across so many rows a line is no sample, and stamps jitter more often than samplers do
+            new[name] = x
+        elif name in held:
             at = np.searchsorted(clock.number[there], np.arange(len(grid)), side="right") - 1
             new[name] = x[there][np.maximum(at, 0)]
         else:
             new[name] = np.interp(grid, times[there], x[there])
-        if name in slow:
-            new[name][np.arange(len(grid)) % factor > 0] = np.nan
     return new, notes
 
 
