@@ -182,13 +182,14 @@ def saturation(scene: Scene, model: Model) -> list[Columns]:
                     found, certain = True, certain or clipped
                 pulse[0, o] = sign * s.lines_of_pulses(at)
                 both = s.rows_of(pulse)
-                rows.append(both[0] * (clipped or len(at) >= _AT_LIMIT))
+                # a limit takes away: what noise has lifted to the last step of a converter it adds
+                rows.append(-both[0] * (clipped or len(at) >= _AT_LIMIT))
                 alone = [np.zeros((1, len(other.left))) for other in scene.seen]
                 alone[number] = -both
                 ends.append(alone)
         drawn.append(np.array(rows))
     if found:
-        return [Columns(drawn, certain=certain)]
+        return [Columns(drawn, certain=certain, onesided=not certain)]
     return [Columns(alone, "", len(ends), _INSIDE, onesided=True) for alone in ends]
 
 

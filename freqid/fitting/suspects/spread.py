@@ -88,7 +88,8 @@ def told_by(est: Estimate, whole: Mapping[str, float], widths: FloatArray) -> Va
     wide = np.sqrt(widths * _bent(est, whole))
     covariance = est.covariance_matrix[np.ix_(at, at)] * np.outer(wide, wide)
     std = np.sqrt(np.maximum(np.diag(covariance), 0))
-    unknown = ~(std <= _TOLD * np.abs(values)) | (np.array(at) < 0)
+    # a part that its values explain to the last digit says nothing of their errors
+    unknown = ~((std > 0) & (std <= _TOLD * np.abs(values))) | (np.array(at) < 0)
     covariance = np.where(unknown[:, None] | unknown, np.nan, covariance)
     return Values(np.where(unknown, np.nan, values), covariance, est.minimum.freedom)
 
@@ -112,6 +113,9 @@ def _bent(est: Estimate, whole: Mapping[str, float]) -> float:
         return 1.0
     true = max(point.cost - minimum.point.cost, 0.0)
     noise, P = loudest(minimum), len(there)
+    if noise <= 0:
+        # what is explained to the last digit is so by these values alone
+        return 1.0
     level = float(scipy.stats.f.sf(true / noise / P, P, minimum.freedom))
     if straight <= _STRAIGHT * true or level < ELSEWHERE:
         return 1.0
