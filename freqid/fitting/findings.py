@@ -24,6 +24,8 @@ Severity = Literal["serious", "minor"]
 
 # a bound that is nearer than this part of the value, or of its standard error, is reached
 _AT_BOUND = 1e-6
+# and not reached where it is further away than so many standard errors
+_INSIDE = 5.0
 # beyond its physical range by so many standard errors a value is unphysical for certain
 _CERTAIN = 2.0
 # standard deviations between data and prior that are chance once in two thousand fits, and part of
@@ -180,7 +182,9 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
         for bound in (p.lower, p.upper):
             known = error if np.isfinite(error) else 0.0
             size = max(abs(bound), abs(value), abs(p.value), known)
-            if np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * size:
+            near = np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * size
+            # a value that is small for its start, and known better than that, lies inside
+            if near and not 0 < _INSIDE * known < abs(value - bound):
                 sentence = (
                     f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
                 )

@@ -159,3 +159,15 @@ def test_where_nothing_can_be_computed_next_to_a_bound_the_start_is_what_ends():
 
     found = minimise(Edge(), np.zeros(1))
     assert found.point.cost == Edge().point(found.x).cost
+
+
+def test_a_value_that_its_units_make_small_is_at_no_bound():
+    """A mass begun in kg where the data's unit makes it 1e-8 lies far inside of its bound 0."""
+    lag = fq.first_order(b=40.0, a=25.0).with_bounds(b=(0.0, np.inf))
+    record = fq.simulate(lag, fq.white_noise(800, seed=1), 0.01).with_noise(0.01)
+    small = fq.Record(record.u, 1e-9 * record.y, record.dt)
+    est = fq.fit(lag, small)
+    assert est["b"] == pytest.approx(4e-8, rel=0.05)
+    assert "edge of a bound" not in [w.kind for w in est.warnings]
+    kept = lag.with_bounds(b=(-np.inf, np.inf)).with_values(b=33e-9).with_bounds(b=(30e-9, 35e-9))
+    assert "edge of a bound" in [w.kind for w in fq.fit(kept, small).warnings]
