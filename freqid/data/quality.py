@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray, an
+from freqid.checks import FloatArray, IntArray, an
 from freqid.data.record import Record
 
 if TYPE_CHECKING:
@@ -20,14 +20,16 @@ _PLATEAU = 3
 _FAST = 3
 # values that a channel takes at the most to be called quantised
 _FEW = 0.2
+# values that tell a rate, and the part of them that stand as long
+_RUNS, _ALIKE = 20, 0.95
 
 
 def check_record(record: Record) -> pd.DataFrame:
     """What is wrong with a record's channels, one row a finding; empty where all is well.
 
-    Columns channel, finding (``constant``, ``stuck``, ``saturated``, ``quantised``, ``offset``,
-    ``unrelated reference``, ``note``), value and meaning. Quantisation is reported with its step q
-    and the noise q/√12 that it makes (Widrow and Kollár, Quantization Noise, 2008).
+    Columns channel, finding (``constant``, ``stuck``, ``saturated``, ``repeated``, ``quantised``,
+    ``offset``, ``unrelated reference``, ``note``), value and meaning. Quantisation is reported with
+    its step q and the noise q/√12 that it makes (Widrow and Kollár, Quantization Noise, 2008).
 
     >>> import numpy as np
     >>> t = np.arange(1000) * 1e-3
@@ -40,13 +42,13 @@ def check_record(record: Record) -> pd.DataFrame:
     an("record", record, Record)
     rows: list[dict[str, str | float]] = []
     channels = [
-        *zip(record.input_names, record.inputs.T, strict=True),
-        *zip(record.output_names, record.outputs.T, strict=True),
+        *((name, x, False) for name, x in zip(record.input_names, record.inputs.T, strict=True)),
+        *((name, x, True) for name, x in zip(record.output_names, record.outputs.T, strict=True)),
     ]
     if record.reference is not None and record.reference.ndim == 1:
-        channels.append(("reference", record.reference))
-    for name, x in channels:
-        rows += [{"channel": name, **finding} for finding in _findings(x)]
+        channels.append(("reference", record.reference, False))
+    for name, x, measured in channels:
+        rows += [{"channel": name, **finding} for finding in _findings(x, measured)]
     if record.reference is not None and record.reference.ndim == 1:
         rows += _reference(record)
     rows += [
@@ -55,7 +57,7 @@ def check_record(record: Record) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["channel", "finding", "value", "meaning"])
 
 
-def _findings(x: FloatArray) -> list[dict[str, str | float]]:
+def _findings(x: FloatArray, measured: bool) -> list[dict[str, str | float]]:
     found: list[dict[str, str | float]] = []
 
     def add(finding: str, value: float, meaning: str) -> None:
@@ -70,6 +72,15 @@ def _findings(x: FloatArray) -> list[dict[str, str | float]]:
     runs = np.diff(edges)
     # a record may rest before and after its excitation
     inner = runs[1:-1]
+    times = _repeated(runs)
+    if times > 1 and not measured:
+        # a converter slower than the rows rests at no limit
+        return _findings(x[edges[:-1]], measured)
+    if times > 1:
+        add("repeated", times, f"each value stands {times} times: the sensor is slower than the "
+            f"rows; keep every {times}th output and all inputs, Record(u, y[::{times}], "
+            f"dt={times} * dt, input_dt=dt)")  # fmt: skip
+        return found
     values = np.unique(x)
     q = float(np.diff(values).min())
     at_limit = False
@@ -92,8 +103,19 @@ def _findings(x: FloatArray) -> list[dict[str, str | float]]:
         add("quantised", q, f"steps of {q:g} make a noise of {q / np.sqrt(12):.3g} rms, "
             f"{100 * q / np.sqrt(12) / x.std():.2g} % of the signal")  # fmt: skip
     if abs(x.mean()) > 3 * x.std():
-        add("offset", x.mean(), "the mean is far above the movement; detrend() takes it off")
+        how = "; of a step fit(..., offset='estimate') leaves it free instead" if measured else ""
+        add("offset", x.mean(), "the mean is far above the movement; detrend() takes it off" + how)
     return found
+
+
+def _repeated(runs: IntArray) -> int:
+    """How many rows each value stands for, where nearly all stand as long; else 1."""
+    inner = runs[1:-1]
+    if len(inner) < _RUNS:
+        return 1
+    times = int(np.median(inner))
+    # two neighbours may be equal by chance, or at rest
+    return times if np.mean(inner % times == 0) > _ALIKE and (inner >= times).all() else 1
 
 
 def _reference(record: Record) -> list[dict[str, str | float]]:

@@ -242,3 +242,24 @@ def test_a_slow_output_among_jittering_stamps_stays_slow(lost, tmp_path):
     est = fq.fit(lag, record)
     assert est.verdict.trusted
     assert est["a"] == pytest.approx(250, rel=0.05)
+
+
+@pytest.mark.parametrize("times", [2, 5])
+def test_a_sensor_that_repeats_itself_is_told_so(times):
+    """It was "saturated: the sensor or the drive was overloaded", and the fit a mere doubt."""
+    clean = fq.simulate(fq.first_order(), fq.white_noise(3000, seed=1), 1e-3).with_noise(0.01)
+    repeated = fq.Record(clean.u, np.repeat(clean.y[::times], times), 1e-3)
+    (found,) = fq.check_record(repeated).to_dict("records")
+    assert (found["channel"], found["finding"], found["value"]) == ("y", "repeated", times)
+    # what it says to do is right
+    dt = repeated.dt
+    said = eval(
+        found["meaning"].split("all inputs, ")[1],
+        {"Record": fq.Record, "u": repeated.u, "y": repeated.y, "dt": dt},
+    )
+    est = fq.fit(fq.first_order(), said)
+    assert est.verdict.trusted
+    assert est["a"] == pytest.approx(fq.first_order()["a"], rel=0.05)
+    # an input that a slow converter held is neither that nor at a limit
+    held = fq.simulate(fq.first_order(), np.repeat(clean.u[::times], times), 1e-3)
+    assert not len(fq.check_record(held))
