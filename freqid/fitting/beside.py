@@ -6,13 +6,14 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import cast
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Record, rate_factor
 from freqid.fitting.black_box.lag_scan import likely_lags
-from freqid.fitting.black_box.late import in_step, whole_samples
+from freqid.fitting.black_box.late import description_length, in_step, whole_samples
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.black_box.refinement import roughly
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
@@ -151,9 +152,9 @@ def beside_of(
             box = Reference.of(model, seen, lines)
         except InputError:
             continue
-        # each has lost a few samples more than the one before
-        rows = box.objective.n_rows - box.unknowns - box.solution.point.n_initial
-        tried.append((box.cost / max(rows, 1), box, shifts, readings[0].sample_time))
+        few = cast("Sequence[SpectralExperiment]", box.objective.experiments)
+        left = description_length(box.cost, few, readings, shifts)
+        tried.append((left, box, shifts, readings[0].sample_time))
     if not tried:
         return None
     _, box, shifts, period = min(tried, key=lambda t: t[0])
@@ -174,7 +175,7 @@ def _likeliest(
         except (InputError, np.linalg.LinAlgError):
             continue
         if cost is not None:
-            left.append((cost / sum(e.n_rows for e in experiments), shifts))
+            left.append((description_length(cost, experiments, readings, shifts), shifts))
     kept = {shifts for _, shifts in sorted(left)[:_MANY]} or set(candidates)
     return [c for c in candidates if c in kept or c is candidates[0]]
 

@@ -10,6 +10,7 @@ from typing import cast
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.beside import Beside, begun_slowly, beside_of, guide_of
+from freqid.fitting.black_box.late import description_length, whole_samples
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -158,7 +159,37 @@ def _searched(
     if beside is None and isinstance(structure, PlacedStructure):
         # nothing says when it is enough, and each start is a fit of everything
         search.most = _ALONE
-    return search.run(start, options.n_starts, options.seed, known)
+    found = search.run(start, options.n_starts, options.seed, known)
+    if isinstance(beside, Beside) and structure.model.delay_sources:
+        return _without_hiding(found, scout, readings, start)
+    return found
+
+
+def _without_hiding(
+    found: Found, scout: Objective, readings: Sequence[Reading], start: FloatArray
+) -> Found:
+    """The minimum, or that next to a start in step where the first has hidden more than it says.
+
+    Outputs that a long delay leaves open cost nothing, whatever moves there.
+    """
+    structure = cast(GreyStructure, scout.structure)
+    few = cast("Sequence[SpectralExperiment]", scout.experiments)
+
+    def shifts(x: FloatArray) -> tuple[int, ...]:
+        return whole_samples(structure.at(x), readings[0])
+
+    def left(solution: Solution) -> float:
+        return description_length(solution.cost, few, readings, shifts(solution.x))
+
+    if shifts(found.solution.x) == shifts(start):
+        return found
+    try:
+        other = polish(scout, start)
+    except InputError:
+        return found
+    if left(other) < left(found.solution):
+        return dataclasses.replace(found, solution=other, n_agreed=1)
+    return found
 
 
 def _hidden(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:

@@ -13,9 +13,13 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import Record
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.reading import Reading
 from freqid.lti import PeriodicHold
 from freqid.models import GreyBox, late_samples
+
+# part of the data's energy that is down to rounding
+_EXACT = 1e-20
 
 
 def whole_samples(model: GreyBox, reading: Reading) -> tuple[int, ...]:
@@ -47,6 +51,47 @@ def in_step(reading: Reading, shifts: Sequence[int], least: int = 0) -> Reading:
         input_names=record.input_names, output_names=record.output_names,
     )  # fmt: skip
     return reading.of_part(moved).with_(delayed=False)
+
+
+def description_length(
+    cost: float,
+    experiments: Sequence[SpectralExperiment],
+    readings: Sequence[Reading],
+    shifts: Sequence[int],
+) -> float:
+    """How long a description of the outputs by a model of data in step is: Σ log variance, those
+    that are left out described by how far they move.
+
+    A long delay may leave out the very step that others have to explain, and nothing is easier to
+    explain than what then comes to rest.
+    """
+    first, last = max([*shifts, 0]), min([*shifts, 0])
+    moves = hidden = 0.0
+    kept = out = 0
+    for r in readings:
+        if not isinstance(r.data, Record):
+            # a response leaves nothing out
+            kept += r.data.response.size
+            continue
+        y = r.data.outputs
+        end = len(y) + last
+        seen, open_ended = y[first:end], np.concatenate([y[:first], y[end:]])
+        hidden += float(((open_ended - y[0]) ** 2).sum())
+        moves += float(((seen - seen.mean(axis=0)) ** 2).sum())
+        kept, out = kept + seen.size, out + open_ended.size
+    # weighted, and at the lines of the band
+    energy = sum(map(_moving, experiments))
+    noise = max(cost, _EXACT * energy, 1e-300) / kept
+    if not out:
+        return float(kept * np.log(noise))
+    movement = hidden / out * energy / max(moves, 1e-300)
+    return float(kept * np.log(noise) + out * np.log(noise + movement))
+
+
+def _moving(e: SpectralExperiment) -> float:
+    """Weighted energy of the data but for their mean."""
+    Y = e.lines.error(e.lines.Y)[..., e.lines.omega != 0]
+    return float(np.vdot(Y, Y).real)
 
 
 def with_less_delay(model: GreyBox, period: float, shifts: Sequence[int]) -> GreyBox:

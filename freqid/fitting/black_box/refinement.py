@@ -77,7 +77,7 @@ def roughly(
         return None
     lines = RationalLines(thinned_to(experiments, LINES), feedthrough)
     found = lines.minimum(next(iter(_begun(lines, order))))
-    return None if found is None else found.cost
+    return None if found is None else found.cost * lines.sizes[0] ** 2
 
 
 def exchanged_model(

@@ -9,9 +9,9 @@ from typing import cast
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import FrequencyResponse, channel_counts, common_names, input_dt
+from freqid.data import FrequencyResponse, Record, channel_counts, common_names, input_dt
 from freqid.fitting.black_box.folded_subspace import identify
-from freqid.fitting.black_box.late import in_step
+from freqid.fitting.black_box.late import description_length, in_step
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.response_poles import folded, poles_of_responses, unheld
@@ -94,12 +94,21 @@ def fit_transfer_function(
             descend(poles, delay)
     if not ends:
         raise InputError("no start for the transfer function could be computed; change its order")
-    best = min(ends, key=lambda end: end[0].cost)
+
+    def left(end: tuple[Solution, Objective, float]) -> float:
+        found = end[0]
+        if not estimated or not all(isinstance(r.data, Record) for r in readings):
+            return found.cost
+        # the delay, in samples, is the last of its unknowns
+        samples = int(np.ceil(float(found.x[-1]) - 1e-6))
+        return description_length(found.cost, experiments, readings, (samples,) * shape[1])  # type: ignore[arg-type]
+
+    best = min(ends, key=left)
     asked = options.n_starts if options is not None and options.n_starts is not None else 1
     rng = np.random.default_rng(options.seed if options is not None else 0)
     for _ in range(asked - len(ends)):
         descend(_by_chance(spec.poles, omega, rng), best[2])
-    solution, objective, _ = min(ends, key=lambda end: end[0].cost)
+    solution, objective, _ = min(ends, key=left)
     agreed = sum(end[0].cost <= (1 + _SAME) * solution.cost for end in ends)
     est = _estimate(
         spec, Minimum(objective, polish(objective, solution.x, limit=_LAST)), first.hold, unit
@@ -138,7 +147,7 @@ def _delays(
                 point = folded(spec.poles, readings, omega, delay)[2]
             else:
                 delay = max(q - 0.5, 0.0) * unit
-                point = _in_step_cost(spec.poles, [in_step(r, (q,) * shape[1]) for r in readings])
+                point = _in_step_cost(spec.poles, readings, (q,) * shape[1])
         except (InputError, np.linalg.LinAlgError):
             break
         tried.append((point, delay))
@@ -153,12 +162,12 @@ def _delays(
     return (apart * np.arange(8)).tolist()
 
 
-def _in_step_cost(order: int, readings: Sequence[Reading]) -> float:
-    """What a sampled black box leaves of each real value."""
-    seen, plane = lines_in_plane(readings)
+def _in_step_cost(order: int, readings: Sequence[Reading], shifts: Sequence[int]) -> float:
+    """What a sampled black box leaves of data in step, and these leave out."""
+    seen, plane = lines_in_plane([in_step(r, shifts) for r in readings])
     chart = Chart(identify(seen, order, True), True, plane, readings[0].sample_time)
     point = Objective(chart, seen).point(np.zeros(chart.size))
-    return np.inf if point is None else point.cost / sum(e.n_rows for e in seen)
+    return np.inf if point is None else description_length(point.cost, seen, readings, shifts)
 
 
 def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float) -> Estimate:
