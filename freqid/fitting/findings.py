@@ -37,8 +37,8 @@ _FULL = 0.75
 _NONE = 0.02
 # a response that rounding moves by so much is worth a word beside noise
 _ROUNDED = 1e-6
-# part of the input's power that may be folded without harm
-_FOLDED = 0.002
+# part of the input's power that may be folded without harm, and that explains what else is found
+FOLDED, MUCH_FOLDED = 0.002, 0.01
 
 
 class Finding(str):
@@ -259,7 +259,7 @@ def above_nyquist(e: Evidence) -> Iterator[Finding]:
 @sign
 def aliased(e: Evidence) -> Iterator[Finding]:
     """Decimation has folded so much of the input that the error bars do not cover it."""
-    if e.aliased > _FOLDED:
+    if e.aliased > FOLDED:
         yield Finding(
             "aliased",
             f"{100 * e.aliased:.3g} % of the input's power lay above the Nyquist limit when the "

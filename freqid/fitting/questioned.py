@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from freqid.fitting.findings import Finding, Inquired, between_parts
+from freqid.fitting.findings import MUCH_FOLDED, Finding, Inquired, between_parts
 from freqid.fitting.grades import Verdict, verdict
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.twins import exchangeable
@@ -45,7 +45,10 @@ class Questioned:
         if self.inquiry is not None:
             changed = "unsteady" in [a.kind for a in asked]
             asked = [*asked, *self.inquiry.on_modes(self, changed)]  # type: ignore[arg-type]
-        return [*asked, *self.signs, *exchangeable(self.problem)]
+        # what decimation has folded looks like a loop, another hold, or a plant that bends
+        folded = [s for s in self.signs if s.kind == "aliased" and (s.number or 0.0) > MUCH_FOLDED]
+        others = [s for s in self.signs if s not in folded]
+        return [*folded, *asked, *others, *exchangeable(self.problem)]
 
     @cached_property
     def verdict(self) -> Verdict:

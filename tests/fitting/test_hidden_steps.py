@@ -70,3 +70,8 @@ def test_a_long_delay_is_found_all_the_same(delay, seed):
     found = fq.fit(fq.TransferFunction(0, 1, delay="estimate"), data, offset="estimate")
     if delay < 200:
         assert found.parameters["value"]["delay"] == pytest.approx(delay, abs=4)
+
+
+def test_a_delay_beyond_what_a_record_tells_says_so():
+    with pytest.raises(ValueError, match="more than an eighth of the outputs.*log for longer"):
+        fq.fit(PLANT, logged(STEP, 0, 0.05, delay=400.0), offset="estimate")

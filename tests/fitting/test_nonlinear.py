@@ -184,3 +184,18 @@ def test_friction_given_as_an_input_leaves_nothing_to_say():
     assert est.verdict.trusted
     assert abs(est["a"] / 20 - 1) < 0.01
     assert abs(est["coulomb"] / 0.1 - 1) < 0.01
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_linear_plant_that_decimation_has_folded_is_told_that_first(seed):
+    """Found: "feedback", "hold rejected", and "the input's gain changes with its size"."""
+    rng, plant, n = np.random.default_rng(seed), fq.two_mass(), 8000
+    u = 20 * fq.chirp(1, 60, n * 1e-3, 1e-3) + 8 * rng.standard_normal(n)
+    y = fq.simulate(plant, u, 1e-3).y
+    slow = fq.Record(u, y + 0.005 * y.std() * rng.standard_normal(n), 1e-3).decimate(5)
+    est = fq.fit(plant, slow)
+    assert est.warnings[0].kind == "aliased"
+    assert not {"nonlinear", "friction"} & {w.kind for w in est.warnings}
+    assert est.verdict.grade == "doubt"
+    kept = fq.Record(u, y + 0.005 * y.std() * rng.standard_normal(n), 1e-3)
+    assert fq.fit(plant, kept.decimate(5, keep_input=True)).verdict.trusted

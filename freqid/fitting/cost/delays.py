@@ -41,7 +41,11 @@ def open_ends(
         return None, transient
     if 8 * count > rows:
         samples = max(map(abs, shifts))
-        raise InputError(f"a delay of {samples} samples leaves too little of the data")
+        raise InputError(
+            f"a delay of {samples} samples leaves open more than an eighth of the outputs, which "
+            "inputs before the record have made: log for longer, or shift the input by what is "
+            "known of the delay"
+        )
     z = on_circle(lines.omega * transient.dt)
     powers = np.concatenate([np.arange(first), -1.0 - np.arange(last)])
     samples = transient.weight * z ** -powers[:, None]

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
+from freqid.fitting.findings import FOLDED
 from freqid.fitting.suspects.elements import Element, elements
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.register import Columns, suspect
@@ -112,9 +113,14 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
 
 
 def _asked(scene: Scene, model: Model) -> bool:
-    """Whether the data can show it: records whose outputs are as fast as their inputs."""
-    alike = all(s.record is not None and s.experiment.lines.aliases == 1 for s in scene.seen)
-    return alike and len(_pairs(model)) <= _PAIRS
+    """Whether the data can show it: records whose outputs are as fast as their inputs.
+
+    Where decimation has folded an input what it did between the samples is as good as bent.
+    """
+    records = [s.record for s in scene.seen]
+    alike = all(s.experiment.lines.aliases == 1 for s in scene.seen)
+    told = all(r is not None and r.aliased <= FOLDED for r in records)
+    return alike and told and len(_pairs(model)) <= _PAIRS
 
 
 def _elements(scene: Scene, model: Model) -> list[tuple[Element, ...]]:
