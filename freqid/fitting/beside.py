@@ -146,14 +146,16 @@ def beside_of(
     if isinstance(structure, PlacedStructure):
         return BesidePlaces.of(structure, readings, lines)
     model, tried = structure.at(structure.start), []
-    for shifts in _likeliest(model, _candidates(structure, model, readings), readings, lines):
+    several = _likeliest(model, _candidates(structure, model, readings), readings, lines)
+    for shifts in several:
         try:
             seen = [in_step(r, shifts) for r in readings]
             box = Reference.of(model, seen, lines)
         except InputError:
             continue
         few = cast("Sequence[SpectralExperiment]", box.objective.experiments)
-        left = description_length(box.cost, few, readings, shifts)
+        one = len(several) == 1
+        left = 0.0 if one else description_length(box.cost, few, readings, shifts)
         tried.append((left, box, shifts, readings[0].sample_time))
     if not tried:
         return None

@@ -146,7 +146,7 @@ def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
     gram = J @ J.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    own = np.einsum("ak,ab,bk->k", J, half, J) + np.sum(Q**2, axis=0)
+    own = np.einsum("ak,ak->k", J, half @ J) + np.einsum("qk,qk->k", Q, Q)
     return np.repeat(np.minimum(own.reshape(-1, 2).mean(axis=1), MOST_LEVERAGE), 2)
 
 
