@@ -205,3 +205,16 @@ def test_a_delay_that_is_none_is_no_reason_for_doubt_without_noise():
     )
     record = fq.simulate(plant, fq.white_noise(300, seed=1), 1.0)
     assert fq.fit(fq.TransferFunction(0, 2, delay="estimate"), record).verdict.trusted
+
+
+def test_a_pole_on_a_line_is_no_start_and_says_nothing_by_itself(capfd):
+    """An integrator at the line of zero divided by nothing, and LAPACK wrote to the terminal."""
+    from freqid.fitting.black_box.subspace import inputs_of
+    from freqid.fitting.reading import Reading
+    from freqid.lti import Plane
+
+    record = fq.simulate(fq.first_order(), fq.white_noise(200, seed=1), 1e-3)
+    lines = [Reading.of(record).lines(Plane())]
+    with pytest.raises(np.linalg.LinAlgError, match="on a line"):
+        inputs_of(lines, np.eye(1), np.ones((1, 1)), False)
+    assert capfd.readouterr() == ("", "")

@@ -101,7 +101,10 @@ def inputs_of(
 def inputs_and_cost(
     experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
 ) -> tuple[StateSpace, float]:
-    """The same, and the sum of squares that they leave."""
+    """The same, and the sum of squares that they leave.
+
+    Raises LinAlgError where a pole lies on a line.
+    """
     n, m, p = len(A), experiments[0].n_channels[1], len(C)
     rows, right = [], []
     for index, e in enumerate(experiments):
@@ -129,6 +132,9 @@ def inputs_and_cost(
         rows.append(np.array(blocks).T)
         right.append(lines.rows(lines.Y))
     R = triangle(np.column_stack([np.concatenate(rows), np.concatenate(right)]))
+    if not np.isfinite(R).all():
+        # LAPACK would write to the terminal by itself
+        raise np.linalg.LinAlgError("a pole lies on a line")
     solution = np.linalg.lstsq(R[:, :-1], R[:, -1])[0]
     B = solution[: n * m].reshape(m, n).T
     D = np.zeros((p, m))
@@ -138,6 +144,7 @@ def inputs_and_cost(
     return StateSpace(A, B, C, D), float(left @ left)
 
 
+@np.errstate(all="ignore")
 def _output_rows(A: FloatArray, C: FloatArray, w: ComplexArray) -> ComplexArray:
     """C (wI − A)⁻¹, (outputs, states, lines)."""
     n, p = len(A), len(C)
