@@ -42,9 +42,9 @@ def logged(u, seed, noise, past=0.0, delay=TD):
 STEP = np.r_[np.full(20, 30.0), np.full(220, 50.0)]
 
 
-@pytest.mark.parametrize("seed", [8, 20, 22, *range(4)])
+@pytest.mark.parametrize("seed", [16, *range(3)])
 def test_a_grey_box_keeps_the_step(seed):
-    """Three of 40 ended at 250 to 300 s: "swapped channels", "no signal"."""
+    """Of 80 the first ended at 263 s, of other noise three of 40: "swapped channels"."""
     est = fq.fit(PLANT, logged(STEP, seed, 0.2, past=0.9), offset="estimate")
     assert est["Td"] == pytest.approx(TD, abs=6)
     assert est["K"] == pytest.approx(K, rel=0.05)
@@ -68,8 +68,7 @@ def test_a_long_delay_is_found_all_the_same(delay, seed):
     est = fq.fit(PLANT, data, offset="estimate")
     assert est["Td"] == pytest.approx(delay, abs=4)
     found = fq.fit(fq.TransferFunction(0, 1, delay="estimate"), data, offset="estimate")
-    if delay < 200:
-        assert found.parameters["value"]["delay"] == pytest.approx(delay, abs=4)
+    assert found.parameters["value"]["delay"] == pytest.approx(delay, abs=4)
 
 
 def test_a_delay_beyond_what_a_record_tells_says_so():
