@@ -46,8 +46,8 @@ class Questioned:
             changed = "unsteady" in [a.kind for a in asked]
             asked = [*asked, *self.inquiry.on_modes(self, changed)]  # type: ignore[arg-type]
         # what decimation has folded looks like a loop, another hold, or a plant that bends
-        folded = [s for s in self.signs if s.kind == "aliased" and (s.number or 0.0) > MUCH_FOLDED]
-        others = [s for s in self.signs if s not in folded]
+        folded = [s for s in self.signs if _much_folded(s)]
+        others = [s for s in self.signs if not _much_folded(s)]
         return [*folded, *asked, *others, *exchangeable(self.problem)]
 
     @cached_property
@@ -89,3 +89,9 @@ class Questioned:
         if self.inquiry is None:
             return between_parts()
         return self.inquiry.spread(self)  # type: ignore[arg-type]
+
+
+def _much_folded(sign: str) -> bool:
+    # a sign of somebody's own may be a plain sentence, without kind or number
+    kind, part = getattr(sign, "kind", ""), getattr(sign, "number", None)
+    return kind == "aliased" and part is not None and part > MUCH_FOLDED
