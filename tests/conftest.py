@@ -27,6 +27,29 @@ T1, T2 = 0.5e-3, 5e-3
 BAND = (10, 80)
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--studies", action="store_true",
+        help="all cases of the tests marked study, of which else the first of several is run",
+    )  # fmt: skip
+
+
+def pytest_collection_modifyitems(config, items):
+    """Of a study the first case stands for the others, unless it was asked for by its name."""
+    if config.getoption("--studies") or any("::" in arg for arg in config.args):
+        return
+    seen, kept, left = set(), [], []
+    for item in items:
+        study = item.get_closest_marker("study") is not None
+        name = item.nodeid.partition("[")[0]
+        # one that has a single case repeats within it, and has no shorter version
+        skipped = study and (name in seen or not hasattr(item, "callspec"))
+        seen.add(name)
+        (left if skipped else kept).append(item)
+    config.hook.pytest_deselected(items=left)
+    items[:] = kept
+
+
 @pytest.fixture(scope="module")
 def benchmarks():
     """The folder of the long studies, from which a module may import for as long as it runs."""

@@ -45,6 +45,7 @@ def test_the_remembered_hold_has_no_bias(plant):
         assert est.warnings == []
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("factor", [5, 20])
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 @pytest.mark.parametrize(
@@ -75,6 +76,7 @@ def noise(plant):
     return fq.FilteredSpectrum((b, a)), fq.simulate(plant, u, T1)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 @pytest.mark.parametrize("factor", [5, 10, 20])
 def test_against_time_domain_fits_of_long_noise(plant, noise, factor, hold):
@@ -133,6 +135,7 @@ def test_lines_fold_with_their_phase():
     assert ratio == pytest.approx(there.conj(), rel=1e-9)
 
 
+@pytest.mark.study
 def test_a_prefilter_moves_the_estimate_as_the_spectrum_would(plant):
     low_pass = control.tf([1], [1 / (2 * np.pi * 30), 1])
     weighted = fq.asymptotic_fit(
@@ -161,6 +164,7 @@ def test_black_boxes(plant):
     assert np.allclose(found, np.sort_complex(plant.to_control().poles()), rtol=1e-7)
 
 
+@pytest.mark.study
 def test_standard_errors_match_the_scatter(plant):
     """Deterministic input, white noise: 200 fits of 5 s."""
     u = fq.chirp(10, 80, 5, T1)

@@ -26,6 +26,7 @@ def table(plant):
     return fq.bias_map(plant, chirps(), [2, 5, 10], ["zoh", "foh", None], base_dt=T1)
 
 
+@pytest.mark.study
 def test_rows_equal_single_fits(plant, table):
     assert list(table.columns) == [
         "spectrum", "factor", "hold", "parameter", "true", "estimate", "relative_bias", "cost",
@@ -118,6 +119,7 @@ def test_an_interrupted_map_goes_on_where_it_was(plant, tmp_path, monkeypatch, t
         fq.bias_map(plant.fix("fm"), chirps(), [2, 5, 10], ["zoh", "foh", None], **ask)
 
 
+@pytest.mark.study
 def test_a_cluster_that_loses_a_worker_gives_the_same_table(plant, two_workers):
     spectra = chirps(60)
     ask = {"base_dt": T1, "chunk": 4}

@@ -38,6 +38,7 @@ def test_antialias_keeps_the_relation_between_the_signals(plant, relative_error,
     assert errors[1] < 0.02 < errors[0]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("keep_input", [False, True])
 @pytest.mark.parametrize("pole", [0.0, 0.9])
 def test_antialias_leaves_good_data_good(keep_input, pole):

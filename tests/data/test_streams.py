@@ -115,6 +115,7 @@ print(int(told[told.index("VmHWM:") + 1]) / 1024)
 """
 
 
+@pytest.mark.study
 @pytest.mark.skipif(sys.platform != "linux", reason="counts and pages of its own")
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_pages_of_a_file_that_were_read_are_given_back(tmp_path, order):
@@ -240,6 +241,7 @@ def test_a_fit_in_one_pass_is_that_of_the_record(tmp_path, kind, monkeypatch):
     assert est.verdict.grade == "trust"
 
 
+@pytest.mark.study
 def test_its_error_bars_are_those_of_the_record(monkeypatch):
     monkeypatch.setattr("freqid.frf.one_pass._SHORTEST", 1000)
     plant = fq.first_order()
@@ -260,6 +262,7 @@ def test_its_error_bars_are_those_of_the_record(monkeypatch):
     assert np.mean(inside) > 0.85
 
 
+@pytest.mark.study
 def test_a_fit_keeps_its_band_and_no_more():
     def blocks():
         rng = np.random.default_rng(0)
@@ -321,6 +324,7 @@ def test_streams_that_a_fit_cannot_take():
         fq.fit(plant, fq.open(broken, dt=DT))
 
 
+@pytest.mark.study
 def test_what_a_stream_is_asked_afterwards(monkeypatch, tmp_path):
     """Turned channels, holds of their own, weights: as the record has them."""
     monkeypatch.setattr("freqid.frf.one_pass._SHORTEST", 1000)

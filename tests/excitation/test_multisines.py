@@ -57,6 +57,7 @@ def test_a_logarithmic_grid():
 
 
 # the peaks that the best published search reaches within six seconds
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("lines", "size", "peak"),
     [(30, 512, 1.402), (100, 1024, 1.386), (300, 2048, 1.36), (1000, 4096, 1.32)],

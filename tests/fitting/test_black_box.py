@@ -131,6 +131,7 @@ def test_the_refined_start_lands_near_the_minimum_in_noise(rng):
     assert cost(identify([experiment], 4, False)) > 1.1 * least
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("spec", [fq.OutputError(2), fq.TransferFunction(1, 2)])
 def test_error_bars_of_black_boxes_hold_in_coloured_noise(spec):
     """Noise with a resonance beside the plant's: bars of white noise hold in two cases of three."""

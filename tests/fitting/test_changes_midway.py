@@ -76,6 +76,7 @@ def test_a_mode_that_a_sweep_has_passed_and_that_moves_is_found():
     assert sum("unsteady" in kinds for kinds in said) >= 7, said
 
 
+@pytest.mark.study
 def test_a_drift_that_made_friction_negative_is_named_before_it():
     """With a friction below zero the axis follows the drift; kept physical it cannot.
 

@@ -31,6 +31,7 @@ def test_without_noise_the_way_through_the_reference_is_exact():
     assert np.abs(off).max() < 1e-6
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("torque", [0.005, 0.02])
 def test_disturbing_torques_are_no_fault_and_no_bias(torque):
     """A direct fit was off by 6 standard errors, and the box of the loop followed the noise."""
@@ -56,6 +57,7 @@ def test_an_input_as_it_is_stays_where_no_feedback_is_seen():
     assert "reference=True" in str(again.call)
 
 
+@pytest.mark.study
 def test_records_of_which_one_has_no_reference_are_fitted_as_they_are():
     """They were sent through references that not all have."""
     with_one = disturbed(1, 0.005)
@@ -91,6 +93,7 @@ def lightly_damped(seed, noise=0.1, samples=4000):
     return fq.Record(u, y, DT, reference=r)
 
 
+@pytest.mark.study
 def test_a_stranger_is_no_reference():
     """It explains several per cent of a lightly damped loop's input by chance; one of eight was
     trusted with numbers eleven standard errors off.
@@ -104,6 +107,7 @@ def test_a_stranger_is_no_reference():
         assert np.abs((est.values - [75, 0.03, 2000]) / est.parameters["std"]).max() < 4
 
 
+@pytest.mark.study
 def test_noise_that_comes_back_without_harm_leaves_the_input_as_it_is():
     """What is fed back is a few parts in ten thousand of the input: the way through the reference
     cost more than it was worth.
@@ -153,6 +157,7 @@ def under_pi(seed, dt=1e-3, samples=10_000, r=None, noise=0.15, late=False):
     return fq.Record(u, y, dt, reference=r)
 
 
+@pytest.mark.study
 def test_a_state_of_the_controller_that_shows_little_is_found():
     """The loop's black box had three states of four in 12 of 19: off by 12 standard errors."""
     fits = [fq.fit(SERVO, under_pi(seed), start=START) for seed in (2, 5, 7)]
@@ -162,6 +167,7 @@ def test_a_state_of_the_controller_that_shows_little_is_found():
     assert [e.verdict.grade for e in fits] == ["trust"] * 3
 
 
+@pytest.mark.study
 def test_noise_that_comes_back_within_the_sample_is_no_feedthrough_and_no_delay():
     """Doubted by either in 9 of 12, whose values were right: the input itself held the noise."""
     for seed in (100, 101, 102):
@@ -172,6 +178,7 @@ def test_noise_that_comes_back_within_the_sample_is_no_feedthrough_and_no_delay(
         assert est.verdict.trusted, est.warnings
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("noise", [0.05, 0.3])
 def test_an_input_that_acts_late_is_a_delay_in_a_loop_too(noise):
     r = fq.white_noise(8000, seed=3)
@@ -180,6 +187,7 @@ def test_an_input_that_acts_late_is_a_delay_in_a_loop_too(noise):
     assert "ms later" in est.warnings[0]
 
 
+@pytest.mark.study
 def test_the_loop_of_a_record_is_looked_for_once(monkeypatch):
     """Asked as it is, and again through its reference, it took twice the time."""
     sought, whole = [], LoopBox.of.__func__

@@ -57,6 +57,7 @@ def test_channels_that_subspace_poles_did_not_explain(benchmarks, case):
     assert est.n_evaluations < 50
 
 
+@pytest.mark.study
 def test_two_by_two_of_order_eight():
     frf = measured(8, 2, 2, 0)
     est = fq.fit(fq.TransferFunction(7, 8), frf, weights="noise")
@@ -64,6 +65,7 @@ def test_two_by_two_of_order_eight():
     assert not est.warnings
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("delay", "order"), [(0.001, 3), (0.0123, 6), (0.05, 3)])
 def test_a_delay_is_found_over_the_whole_range(delay, order):
     frf = measured(order, 1, 1, order, delay)

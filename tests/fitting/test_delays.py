@@ -92,6 +92,7 @@ def test_a_delay_in_a_local_response_never_costs_more_than_its_start(seed):
     assert est["a"] == pytest.approx(100, rel=0.02)
 
 
+@pytest.mark.study
 def test_an_output_that_comes_before_the_input_is_named():
     record = late_record(0, 600)
     early = fq.Record(record.u[:-20], record.y[20:], DT)
@@ -181,6 +182,7 @@ def swung(seed, delay, samples=400, before=100):
     return fq.Record(u[before:], y, 0.01)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("delay", [0.034, 0.154, 0.396])
 def test_error_bars_of_delays_of_many_samples(delay):
     score, std = [], []
@@ -216,6 +218,7 @@ def test_a_delay_of_many_samples_is_found_without_a_start(delay, seed):
     assert est.verdict.grade == "trust"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("late", [0.013, 0.042])
 def test_a_delay_and_weights_go_together(late):
     """Found: a known delay of more than a sample and weights="noise" ended in numpy's words."""

@@ -29,6 +29,7 @@ def in_a_loop(seed, size=4000, feedback=3.0, level=1.5):
     return fq.Record(u, y, DT, reference=r)
 
 
+@pytest.mark.study
 def test_a_record_with_a_reference_is_fitted_through_it():
     poles, through, inside = [], [], []
     for seed in range(12):
@@ -61,6 +62,7 @@ def test_a_loop_without_noise_needs_no_detour():
     assert forced["a"] == pytest.approx(20, rel=1e-6)
 
 
+@pytest.mark.study
 def test_little_noise_in_a_loop_is_heard_in_the_input_and_left_where_it_does_no_harm():
     """Of 0.8 % the loop brings back what biases a direct fit by 0.6 standard errors, of 0.1 % by
     nothing that shows.
@@ -110,6 +112,7 @@ def test_records_with_a_reference_are_fitted_in_time_too(options):
         assert est["a"] == pytest.approx(20, rel=0.05)
 
 
+@pytest.mark.study
 def test_an_actuator_that_adds_noise_of_its_own_is_no_loop():
     """What its reference does not explain of an input excites, where it is measured."""
     said = 0
@@ -175,6 +178,7 @@ def spiked(seed, share=0.03):
     return fq.Record(record.u, y, DT)
 
 
+@pytest.mark.study
 def test_hubers_loss_forgives_spikes():
     squares, robust, inside = [], [], []
     for seed in range(40):

@@ -81,6 +81,7 @@ def test_distance_from_a_black_box_is_what_its_own_cost_says():
         assert np.abs(by_steps - slope[i]).max() < 1e-4 * np.abs(slope).max()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("stable", [False, True])
 def test_output_error_in_noise_ends_no_higher_than_from_the_true_poles(stable):
     """Two weak modes in noise as large as they are, 12 records."""

@@ -215,6 +215,7 @@ def test_an_estimate_shows_itself(plant, slow):
         est.to_continuous()
 
 
+@pytest.mark.study
 def test_the_variance_of_the_response_is_linear_in_the_covariance(plant, slow):
     est = fq.fit(plant, slow.with_noise(0.5), band=BAND)
     omega = np.array([150.0])

@@ -126,6 +126,7 @@ fq.fit_many(lag, each, sys.argv[1], n_jobs=1, verdicts=False, chunk=1, band=(1, 
 """
 
 
+@pytest.mark.study
 def test_two_jobs_never_write_one_path(tmp_path):
     path = tmp_path / "t.parquet"
     call, pipe = [sys.executable, "-c", JOB, str(path)], subprocess.PIPE
@@ -142,6 +143,7 @@ def test_two_jobs_never_write_one_path(tmp_path):
     assert len(pd.read_parquet(path)) == 6
 
 
+@pytest.mark.study
 def test_a_job_that_was_killed_leaves_no_lock(tmp_path):
     path = tmp_path / "t.parquet"
     call, pipe = [sys.executable, "-c", JOB, str(path)], subprocess.PIPE
@@ -257,6 +259,7 @@ def lag_that_ends(how, asked_by, b, a, load):
     return [[-a]], [[b]], [[1.0]], None
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("how", ["exit", "die"])
 def test_a_record_that_ends_its_process_is_a_row(tmp_path, how):
     plant = fq.GreyBox(
@@ -289,6 +292,7 @@ def lag_that_tells(folder, b, a):
     return [[-a]], [[b]], [[1.0]], None
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("count", [6, 40])
 def test_a_cluster_that_is_asked_for_is_used_and_may_lose_a_worker(tmp_path, count, two_workers):
     folder = tmp_path / "seen"

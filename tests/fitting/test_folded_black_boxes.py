@@ -33,6 +33,7 @@ PLANTS = {
 }
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("factor", [2, 5, 10])
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("stable", [False, True])
@@ -48,6 +49,7 @@ def test_white_inputs(plant, factor, stable):
         assert np.abs(poles - true).max() < 0.02
 
 
+@pytest.mark.study
 def test_random_plants():
     """Order 1 to 5, modes up to eight tenths of the fast Nyquist frequency, factors 2 to 8: 23 of
     24 are found (99 of 100); the other, with a mode at twice the output's rate, is a doubt.
@@ -97,6 +99,7 @@ def test_the_order_is_chosen():
     assert fq.select_order(data, range(1, 6)).attrs["best"] == 2
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("factor", [2, 5])
 def test_several_records(factor):
     num, den = PLANTS["order 3, zero on the right"]
@@ -109,6 +112,7 @@ def test_several_records(factor):
     assert est.verdict.grade == "trust"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("factor", [2, 5, 12])
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_integrators(factor, noise, capfd):
@@ -126,6 +130,7 @@ def test_integrators(factor, noise, capfd):
     assert "DLASCL" not in "".join(capfd.readouterr())
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("factor", "slow"), [(20, 60), (25, 60), (25, 100)])
 def test_few_lines_for_many_inputs(factor, slow):
     """The lifted plant of 20 and 25 inputs cannot be told from 30 lines: 1 to 3 of 12 were lost."""

@@ -16,6 +16,7 @@ def test_the_papers_decimated_record_tells_its_hold(plant, slow, relative_error)
     assert any("probably decimated by about 10" in w for w in est.warnings)
 
 
+@pytest.mark.study
 def test_its_interval_holds_the_truth(plant, slow):
     std, inside, runs = 0.01 * slow.y.std(), 0, 60
     for seed in range(runs):
@@ -52,6 +53,7 @@ def test_the_derivative_by_the_period(plant, slow):
         assert gradient == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("hold", ["zoh", "foh", "bl"])
 def test_a_hold_that_the_data_contradict_is_rejected(plant, slow, hold):
     est = fq.fit(plant, slow.with_noise(0.1), hold=hold, band=BAND)

@@ -66,6 +66,7 @@ def test_what_is_kept(kind, tmp_path):
     assert fq.load(tmp_path / "again.json").verdict == est.verdict
 
 
+@pytest.mark.study
 def test_a_hold_that_was_assumed_is_assumed_again(tmp_path):
     """A fit that took the slow period for the hold's compares as it did."""
     slow = RECORD.decimate(5)
@@ -176,6 +177,7 @@ def modes_of_order(n):
     return record.with_noise(0.05 * record.y.std(), seed=2)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("order", [1, 2, 3, 5])
 @pytest.mark.parametrize("kind", ["sampled", "direct", "rational", "late"])
 def test_a_loaded_black_box_has_its_band_and_its_poles(kind, order, tmp_path):

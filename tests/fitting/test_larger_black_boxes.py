@@ -35,6 +35,7 @@ def off(est, y):
     return np.linalg.norm(said - y) / np.linalg.norm(y)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("channels", [(1, 1), (1, 2), (2, 1), (2, 2)])
 def test_too_low_an_order_is_no_longer_trusted(channels):
     """Of OutputError under white inputs 24 of 61 were, the worst 93 % off, most without a word."""
@@ -54,6 +55,7 @@ def test_too_low_an_order_is_no_longer_trusted(channels):
     assert not wrong
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("past", [0.0, 0.9])
 def test_the_right_order_lacks_no_mode(past):
     spoken = []
@@ -99,6 +101,7 @@ def test_what_is_stable_by_request_is_compared_with_the_like():
     assert "another mode" not in [w.kind for w in est.warnings if w.severity == "serious"]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_a_lag_that_is_taken_for_noise_is_named(hold):
     """Of two lags taken for one, 4.4 % off, 42 of 60 were trusted without a word: a lag leaves no
@@ -199,6 +202,7 @@ def test_a_mode_that_only_the_noise_has_is_named():
     assert named > 3
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("past", [0.0, 0.9])
 def test_modes_that_are_there_are_no_ghosts(past):
     for seed in range(8):
@@ -222,6 +226,7 @@ def resonance(kind, past, seed, n=2000):
     return fq.Record(u, y + 0.1 * y.std() / e.std() * e, DT)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["step", "white", "prbs", "chirp"])
 @pytest.mark.parametrize("past", [0.9, -0.8])
 def test_a_mode_of_coloured_noise_is_named(kind, past):

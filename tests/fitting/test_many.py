@@ -83,6 +83,7 @@ def lag_that_dies(marker, b, a):
     return [[-a]], [[b]], [[1.0]], None
 
 
+@pytest.mark.study
 def test_a_killed_worker_loses_no_row(tmp_path):
     from functools import partial
 
@@ -190,6 +191,7 @@ def test_a_plant_that_fails_is_a_row():
     assert "no licence" in table["error"][1]
 
 
+@pytest.mark.study
 def test_on_a_cluster(two_workers):
     records = runs(12, samples=100)
     alone = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)

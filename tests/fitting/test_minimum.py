@@ -77,6 +77,7 @@ def test_the_right_hold_is_not_rejected_for_a_prior(plant, slow):
     assert not [w for w in est.warnings if "hold rejected" in w]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("spec", [fq.OutputError(2), fq.TransferFunction(1, 2)])
 def test_modes_of_black_boxes_hold_in_coloured_noise(spec):
     """Noise with a resonance beside the plant's: bars of white noise are half of the scatter."""
@@ -111,6 +112,7 @@ def test_the_covariance_is_that_of_a_linear_problem(weak):
     assert seen.variance[0, 0, 0] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.study
 def test_the_variance_of_a_black_boxes_response_goes_through_the_hold():
     """A continuous black box seen through a slow hold scatters as its simulated estimates do."""
     hold, omega = fq.ZeroOrderHold(0.02), [120.0]
@@ -151,6 +153,7 @@ def test_the_bias_bar_takes_band_and_weights_from_the_estimate(plant, fast):
         assert (bars["bias"].abs() < 1e-3 * bars["std"]).all()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("bounds", [(0, 90), (110, 400), (0, 400)])
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
 def test_a_search_within_bounds_ends_where_an_exact_one_does(bounds, noise):

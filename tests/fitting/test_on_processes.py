@@ -37,6 +37,7 @@ ASKED = {
 }
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ASKED)
 def test_processes_give_the_same_numbers(plant, tmp_path, name):
     here = ASKED[name](plant)
@@ -50,6 +51,7 @@ def test_processes_give_the_same_numbers(plant, tmp_path, name):
         ASKED[name](plant, n_jobs=0)
 
 
+@pytest.mark.study
 def test_a_cluster_is_used_where_joblib_says_so(plant, tmp_path, two_workers):
     here = {name: ask(plant) for name, ask in ASKED.items()}
     with two_workers():

@@ -37,6 +37,7 @@ def noisy_modes(n=600, noise=0.02, seed=0):
     return record.with_noise(noise * record.y.std(), seed=1000 + seed)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("stable", [False, True])
 def test_the_cost_never_rises_with_the_order(arm, stable):
     for record in (arm, noisy_modes()):
@@ -56,6 +57,7 @@ def test_nor_for_an_output_that_was_decimated(plant):
     assert (np.diff(costs) <= 1e-6 * np.array(costs[:-1])).all()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [100, 101])
 @pytest.mark.parametrize("stable", [False, True])
 def test_nor_with_several_channels(seed, stable):
@@ -106,6 +108,7 @@ def test_orders_beyond_the_data_are_refused():
         fq.fit(fq.OutputError(200), noisy_modes(1000))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(4))
 def test_the_right_order_is_chosen(seed):
     table = fq.select_order(noisy_modes(1500, 0.01, seed), range(2, 7))
@@ -113,6 +116,7 @@ def test_the_right_order_is_chosen(seed):
     assert table["cross_validation"].idxmin() == 2
 
 
+@pytest.mark.study
 def test_feedthrough_and_dead_time_are_chosen_in_any_unit():
     u = np.random.default_rng(3).standard_normal(800)
     lag = fq.simulate(fq.first_order(b=20, a=20), u, 5e-3)
@@ -135,6 +139,7 @@ def test_an_order_that_fails_keeps_the_table():
             fq.select_order(noisy_modes(60), [2], **wrong)
 
 
+@pytest.mark.study
 def test_a_fast_input_beside_a_slow_output(plant):
     clean = fq.simulate(plant, fq.chirp(10, 80, 10, 0.5e-3), 0.5e-3)
     record = clean.with_noise(0.05, seed=1).decimate(40, keep_input=True)
@@ -168,6 +173,7 @@ def test_a_free_double_integrator_is_recognised():
     assert est.fit_percent > 99.99
 
 
+@pytest.mark.study
 def test_an_integrator_that_may_grow_is_no_reason_for_doubt():
     """A pole at one, within its error bar of the unit circle, and one that is truly beyond it."""
 
@@ -186,6 +192,7 @@ def test_an_integrator_that_may_grow_is_no_reason_for_doubt():
     assert severities(0.5) == ["serious"] * 8
 
 
+@pytest.mark.study
 def test_a_fit_that_may_grow_explains_no_less_than_one_that_may_not():
     """In coloured noise a free fit had a cost 0.5 % above that of a stable one, its own kin."""
     rng = np.random.default_rng([16, 13])
@@ -199,6 +206,7 @@ def test_a_fit_that_may_grow_explains_no_less_than_one_that_may_not():
         assert free.cost <= stable.cost * (1 + 1e-3), order
 
 
+@pytest.mark.study
 def test_lines_that_share_their_noise_are_counted_once():
     """Of a local response every line was taken for a measurement of its own: order 6 or 7 of 7."""
     b, a = np.array([-2.0, 40]), np.polymul([1, 5], [1, 2, 100.0])
@@ -212,6 +220,7 @@ def test_lines_that_share_their_noise_are_counted_once():
         assert table.attrs["best"] == 3
 
 
+@pytest.mark.study
 def test_a_delay_one_too_long_is_not_chosen_for_a_pole_that_grows():
     """b/(s + a) 4.3 samples late: behind five samples order 2 has a pole at −340, an advance."""
     for seed in range(4):

@@ -29,6 +29,7 @@ def test_a_record_in_motion_that_is_told_to_be_at_rest_is_named():
     assert said[0] == "not at rest", said
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("pole", [0.0, 0.9])
 def test_noise_is_no_motion(pole):
     said = []

@@ -44,6 +44,7 @@ def test_rough_inputs_of_several_lengths_are_not_lost(weights):
         assert worst(fq.fit(model, records, weights=weights), model) < 0.2
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("part", [(5, 10), (3, 8)])
 @pytest.mark.parametrize("weights", [None, "noise"])
 def test_no_fit_ends_above_the_cost_of_its_start(plant, fast, part, weights):
@@ -87,6 +88,7 @@ def test_a_large_initial_state_is_no_trouble(state):
     assert worst(est, stiff()) < 1e-6
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(2))
 def test_three_masses_from_a_factor_three(seed):
     model = fq.drivetrain(3)
@@ -98,6 +100,7 @@ def test_three_masses_from_a_factor_three(seed):
     assert est.cost < 1.002 * black.cost
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [8, 17, 32])
 def test_a_mode_that_few_lines_do_not_tell_is_told_by_more(seed):
     """Three masses in noise: on the first six hundred lines a mode of noise explained as much."""
@@ -166,6 +169,7 @@ def test_outputs_of_any_other_size_are_fitted_alike(size):
 # the witness -------------------------------------------------------------------------------------
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("coloured", [False, True])
 def test_the_witness_is_uniform_where_the_model_is_right(coloured):
     model, p = light_mode(), []
@@ -181,6 +185,7 @@ def test_the_witness_is_uniform_where_the_model_is_right(coloured):
     assert scipy.stats.kstest(p, "uniform").pvalue > 0.01
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("hold", "verdict"), [(None, "complete"), ("zoh", "lacking"), ("foh", "lacking")]
 )
@@ -205,6 +210,7 @@ def test_the_witness_refuses_a_structure_that_is_too_stiff(plant, fast):
     assert right.witness.degrees[0] == wrong.witness.degrees[0] == 2
 
 
+@pytest.mark.study
 def test_the_witness_of_an_output_slower_than_its_input(plant, fast):
     for factor in (10, 40):
         record = fast.with_noise(0.05, seed=1).decimate(factor, keep_input=True)
@@ -280,6 +286,7 @@ def test_a_witness_beside_responses_of_the_plant_itself(plant):
     assert "another mode" in [w.kind for w in wrong.warnings], wrong.warnings
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("w", [24.0, 29.5, 41.0])
 def test_walks_that_agree_on_a_lobe_are_not_believed(w):
     """All of a dozen starts ended in one lobe of a narrow resonance, at twice the least cost."""

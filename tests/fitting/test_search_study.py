@@ -27,6 +27,7 @@ def test_a_study_goes_on_where_it_was_interrupted(studies, tmp_path):
     assert table["twice"].tolist() == [0, 2, 4, 6, 8]
 
 
+@pytest.mark.study
 def test_random_plants_are_found_or_doubted(studies):
     minima = studies[0]
     table = pd.DataFrame([minima.one(case) for case in range(3000, 3012)])
@@ -38,6 +39,7 @@ def test_random_plants_are_found_or_doubted(studies):
     assert (table["cost"] <= table["own"] * (1 + 1e-6)).all()
 
 
+@pytest.mark.study
 def test_orders_and_witness(studies):
     _, orders, _, witness = studies
     assert [orders.one(case)["mdl"] for case in range(3)] == [4, 4, 4]
@@ -86,6 +88,7 @@ def test_what_goes_down_with_the_others_is_no_minimum_that_they_agree_on(studies
     assert est.witness.verdict == "complete"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("case", [540, 582, 586, 1198])
 def test_plants_whose_black_box_was_lost_itself(studies, case):
     """A weak mode in noise, an open mass, a lost mass, and steps whose few lines mislead."""
@@ -97,6 +100,7 @@ def test_plants_whose_black_box_was_lost_itself(studies, case):
     assert est.cost <= from_truth.cost * (1 + studies[0].WORSE)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("case", [46, 135, 203])
 def test_plants_that_the_data_leave_open_are_not_called_complete(studies, case):
     """Costs 0.2 to 3 % above another minimum, in noise as large as the signal."""

@@ -33,6 +33,7 @@ def kinds(est):
     return [w.kind for w in est.warnings]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("window", ["hann", "boxcar", ("kaiser", 8.0)])
 def test_what_segments_show_is_memory_times_the_impulse_response(window):
     """Bendat and Piersol's mean of H1, against the mean of scipy's own over a long record."""

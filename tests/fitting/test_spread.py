@@ -20,6 +20,7 @@ def _record(w, seed, n=800, dt=0.01, noise=0.03):
     return record.with_noise(noise * record.y.std(), seed=seed + 1)
 
 
+@pytest.mark.study
 def test_good_data_keep_their_error_bars():
     """At the level of 0.001: one of 60 data sets in a thousand runs of 60."""
     wider = 0
@@ -31,6 +32,7 @@ def test_good_data_keep_their_error_bars():
     assert wider <= 1
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("scatter", [0.002, 0.02])
 def test_machines_that_differ_widen_the_error_bar(scatter):
     """Five runs, each with a frequency of its own: the mean is off by scatter/√5."""

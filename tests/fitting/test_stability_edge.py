@@ -44,6 +44,7 @@ def by_hand(record, pole, angle):
     return scipy.optimize.least_squares(left, [pole, angle], xtol=1e-14, ftol=1e-14).x
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(4))
 def test_it_is_the_least_on_the_circle(seed):
     """It stopped where it met the circle, not converged, and nothing was to be used."""
@@ -139,6 +140,7 @@ def angles_by_hand(record, angles, radius):
     return scipy.optimize.least_squares(left, angles, xtol=1e-14, ftol=1e-14).x, left
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("plant", ALONE)
 def test_every_pole_may_be_held(plant):
     """Where no pole was free nothing was held: not converged, and never the edge of a bound."""

@@ -15,6 +15,7 @@ def scattered(model, factor, count, seed=3):
         yield {n: model[n] * factor ** rng.uniform(-1, 1) for n in names}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_starts_within_a_factor_of_ten_reach_the_best_cost(plant, slow, hold):
     best = fq.fit(plant, slow, hold=hold, band=BAND).cost

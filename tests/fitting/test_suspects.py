@@ -33,6 +33,7 @@ def healthy(seed, pole=0.0):
     return recorded(fq.simulate(LAG, u, DT).y, u, seed, pole=pole)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("pole", [0.0, 0.9])
 def test_false_alarms_are_those_of_the_level(pole):
     p = {}
@@ -45,6 +46,7 @@ def test_false_alarms_are_those_of_the_level(pole):
     assert np.mean([min(v) for v in p.values()]) > 0.003
 
 
+@pytest.mark.study
 def test_good_data_have_no_warning_and_are_trusted():
     grades = [fq.fit(LAG, healthy(seed)).verdict.grade for seed in range(100, 140)]
     assert grades.count("trust") >= 37
@@ -126,6 +128,7 @@ FAULTS = {
 }  # fmt: skip
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", FAULTS)
 def test_a_fault_is_the_first_one_named(kind):
     found = []
@@ -183,6 +186,7 @@ def test_nothing_is_left_to_ask_of_data_without_noise():
     assert est.verdict.grade == "trust"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("factor", [2, 4])
 def test_an_output_slower_than_its_input_is_asked_as_well(factor):
     """Each line has several frequencies of the input, in no order."""
@@ -201,6 +205,7 @@ def test_an_output_slower_than_its_input_is_asked_as_well(factor):
     assert fq.fit(LAG, slow).suspects["p_value"]["delay"] < 1e-6
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("share", [0.0, 0.01])
 def test_a_mode_that_means_over_three_periods_show_is_named(share):
     """Few periods tell their covariance badly; a mode of a hundredth of the gain is seen in it."""
@@ -276,6 +281,7 @@ def test_a_spike_does_not_hide_a_plant_that_changes():
     assert est.verdict.grade == "doubt"
 
 
+@pytest.mark.study
 def test_halves_of_good_data_are_alike():
     """200 records of a lag in white and slow noise: the test's p-values are those of chance."""
     model, found = fq.first_order(b=50.0, a=20.0), []
@@ -289,6 +295,7 @@ def test_halves_of_good_data_are_alike():
     assert scipy.stats.kstest(found, "uniform").pvalue > 0.01
 
 
+@pytest.mark.study
 def test_a_worse_minimum_with_values_that_are_not_told_is_a_doubt():
     """0.3 % above the best cost, with a negative stiffness inside wide error bars: trusted once.
 

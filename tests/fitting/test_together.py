@@ -127,6 +127,7 @@ def test_what_is_in_doubt_is_left_to_a_search(doubt):
     assert row["k_std"] == est.parameters["std"]["k"]
 
 
+@pytest.mark.study
 def test_far_starts_end_in_no_worse_minimum():
     plant, records = runs("three masses", count=4, noise=0.1)
     start = {p.name: p.value * 3.0 ** (-1) ** i for i, p in enumerate(plant.free_parameters)}

@@ -51,6 +51,7 @@ def delayed_record(plant, tau, dt, n=50):
     return fq.Record(u, fq.simulate(plant, fine, dt / n).y[::n], dt)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("steps", [0, 0.36, 4.52])
 def test_delays_of_parts_of_a_sample(plant, steps):
     dt = 2e-3

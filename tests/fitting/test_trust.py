@@ -36,11 +36,13 @@ TRUTH = {"b": 50.0, "a": 20.0}
 FAIR, RUNS = 0.89, 150
 
 
+@pytest.mark.study
 def test_intervals_in_slow_noise_in_the_time_domain():
     held = coverage(lambda s: fq.fit(LAG, in_slow_noise(s), domain="time"), TRUTH, RUNS)
     assert (held >= FAIR).all()
 
 
+@pytest.mark.study
 def test_intervals_in_slow_noise_beside_a_vague_prior():
     vague = LAG.with_prior(b=(50, 500))
     held = coverage(lambda s: fq.fit(vague, in_slow_noise(s)), TRUTH, RUNS)
@@ -54,12 +56,14 @@ def relative_noise(seed, plant, size=0.02):
     return fq.FrequencyResponse(f, G * (1 + size * (e[0] + 1j * e[1])))
 
 
+@pytest.mark.study
 def test_intervals_of_a_bare_response(plant):
     truth = {n: plant[n] for n in ("Jm", "k", "Ja", "fm", "d")}
     held = coverage(lambda s: fq.fit(plant, relative_noise(s, plant)), truth, 100)
     assert (held >= 0.86).all()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("method", [fq.local_polynomial, fq.local_rational])
 def test_intervals_of_local_responses_whose_lines_share_windows(plant, method):
     base = fq.simulate(plant, fq.white_noise(8000, seed=3), 2e-3)
@@ -104,6 +108,7 @@ def test_modes_on_the_axis_and_real_poles():
     assert free["damping"].isna().all()
 
 
+@pytest.mark.study
 def test_an_interval_at_a_bound_is_one_sided():
     def mode(d):
         return [[0, 1], [-400.0, -d]], [[0], [400.0]], [[1, 0]], [[0]]
@@ -212,6 +217,7 @@ def test_true_holds_are_checked(plant):
             fq.experiment_design(plant, 0.5e-3, noise_std=0.01, true_hold=wrong)
 
 
+@pytest.mark.study
 def test_what_is_seen_from_one_end_of_a_long_chain():
     chain = fq.drivetrain(5)
     record = fq.simulate(chain, fq.chirp(1, 100, 5, 1e-3), 1e-3).with_noise(0.05)
@@ -236,6 +242,7 @@ def unlike_noise(seed, sizes=(0.02, 0.1, 0.4)):
     return records
 
 
+@pytest.mark.study
 def test_experiments_whose_noise_is_unlike():
     """A quiet experiment beside a loud one is no spike, no drift and no other plant."""
     pulls, warned, grades = [], 0, []
@@ -252,6 +259,7 @@ def test_experiments_whose_noise_is_unlike():
     assert "unlike experiments" in [w.kind for w in mixed.warnings]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("outputs", [1, 2])
 def test_error_bars_in_coloured_noise_of_short_records(outputs):
     """A drifting input and red noise: weights that run around would meet the jump at the ends."""
@@ -324,6 +332,7 @@ def in_a_loop(plant, seed, size=1000, dt=0.01):
     return fq.Record(u[200:], y[200:], dt, reference=r[200:])
 
 
+@pytest.mark.study
 def test_error_bars_of_closed_loops():
     """The input that the reference explains has errors of its own, from the same noise."""
 

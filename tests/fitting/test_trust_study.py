@@ -12,6 +12,7 @@ def studies(benchmarks):
     return studies
 
 
+@pytest.mark.study
 def test_every_fault_is_mostly_named_and_seldom_trusted(studies, tmp_path):
     table = pd.DataFrame([studies.named(case) for case in range(len(studies.FAULTS))])
     faulty = table[table["fault"] != "none"]
@@ -22,6 +23,7 @@ def test_every_fault_is_mostly_named_and_seldom_trusted(studies, tmp_path):
     assert (tmp_path / "faults.png").stat().st_size > 10_000
 
 
+@pytest.mark.study
 def test_loops_under_several_controllers(benchmarks):
     from trust import loops
 
@@ -38,6 +40,7 @@ def test_every_cell_of_the_coverage_runs(studies):
     assert table["held"].mean() > 0.6
 
 
+@pytest.mark.study
 def test_faults_as_weak_as_may_be_are_mostly_named(benchmarks):
     from trust import strengths
 

@@ -56,6 +56,7 @@ def begun(model):
     return {n: v * (1.2 if i % 2 else 0.85) for i, (n, v) in enumerate(model.values.items())}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("model", "kind", "noise"),
     [
@@ -82,6 +83,7 @@ def test_exchanged_channels_are_named_and_not_to_be_used(model, kind):
     assert est.verdict.grade == "do not use"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("channel", [0, 1])
 def test_one_output_of_the_wrong_sign_is_named(channel):
     record = measured(SENSORS, "white", 0.05)
@@ -95,6 +97,7 @@ def test_one_output_of_the_wrong_sign_is_named(channel):
     assert est.verdict.grade == "do not use"
 
 
+@pytest.mark.study
 def test_one_input_of_the_wrong_sign_is_named():
     def pushed(m, c, k):
         A, B, C, _ = spring(m, c, k)
@@ -119,6 +122,7 @@ def test_a_response_of_the_wrong_sign_is_named():
     assert fq.fit(SPRING, frf, start=begun(SPRING)).warnings[0].kind == "wrong sign"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_turned_where_the_input_is_not_heard(seed):
     rng = np.random.default_rng(seed)
@@ -128,6 +132,7 @@ def test_nothing_is_turned_where_the_input_is_not_heard(seed):
     assert not {"wrong sign", "swapped channels"} & set(kinds)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(4))
 def test_nothing_is_turned_in_noise_or_where_a_mode_is_missing(seed):
     loud = fq.fit(TWO, measured(TWO, "white", 2.0, seed), start=begun(TWO))
@@ -160,6 +165,7 @@ def test_a_wrong_sign_without_noise_is_named(model):
     assert est.warnings[0].kind == "wrong sign"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(2))
 def test_what_looks_like_the_inverse_of_a_plant_from_far_is_not_exchanged(seed):
     def accelerometer(m, c, k):
@@ -179,6 +185,7 @@ def test_what_looks_like_the_inverse_of_a_plant_from_far_is_not_exchanged(seed):
     assert not est.verdict.trusted
 
 
+@pytest.mark.study
 def test_a_slow_output_of_the_wrong_sign_is_no_mirrored_mode():
     """Found: trusted, with 90 times the stiffness, where the input changes only with the output."""
 
@@ -195,6 +202,7 @@ def test_a_slow_output_of_the_wrong_sign_is_no_mirrored_mode():
         assert est.verdict.trusted if sign > 0 else est.warnings[0].kind == "wrong sign"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("times", [5.0, 1e6])
 @pytest.mark.parametrize("model", [SPRING, LAG])
 def test_slow_noise_turns_nothing(model, times):

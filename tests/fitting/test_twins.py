@@ -132,6 +132,7 @@ def test_fleets_and_resamples():
     assert len({bool(order) for order in drawn["t1"] > drawn["t2"]}) == 1
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "names",
     [("w1", "z1", "g1", "w2", "z2", "g2"), ("w_a", "z_a", "g_a", "w_b", "z_b", "g_b"),

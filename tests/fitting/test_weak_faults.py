@@ -59,6 +59,7 @@ def test_a_converter_and_a_signal_at_rest_are_no_limit():
     assert "saturation" not in [w.kind for w in fq.fit(LAG, fq.Record(begun, rises, DT)).warnings]
 
 
+@pytest.mark.study
 def test_a_direct_term_is_said_before_a_hold_that_no_converter_has():
     """In a resonance; a lag takes a direct term and a shorter hold for the same."""
 
@@ -78,6 +79,7 @@ def test_a_direct_term_is_said_before_a_hold_that_no_converter_has():
     assert said.count("feedthrough") >= 7, said
 
 
+@pytest.mark.study
 def test_one_start_along_a_valley_is_no_trust():
     """Three masses seen from one end: one start may end a little above the best, unseen."""
     plant = fq.drivetrain(3)
@@ -110,6 +112,7 @@ def test_a_hum_is_called_a_tone():
     assert np.abs(off).max() < 0.1 / (1000 * DT)
 
 
+@pytest.mark.study
 def test_a_spike_and_a_weak_mode_stick_out_of_coloured_noise():
     """Where the noise is weak: at high frequency, and against its own prediction."""
     found = []
@@ -205,6 +208,7 @@ def test_one_sample_that_a_limit_has_cut_is_no_spike():
     assert [kind for kind, *_ in outside] == ["spikes"] * 8
 
 
+@pytest.mark.study
 def test_a_drift_that_friction_has_absorbed_is_said_by_its_name():
     """Of an axis that hardly anything brakes it pulls the friction below zero: one step from there
     tells no drift, a fit with it free does.
@@ -224,6 +228,7 @@ def test_a_drift_that_friction_has_absorbed_is_said_by_its_name():
     assert np.mean(named) >= 0.8, named
 
 
+@pytest.mark.study
 def test_decimated_data_whose_mode_has_gone_to_its_mirror_image_name_the_hold():
     """A delay of half a millisecond was said first, and no hold at all."""
 
@@ -243,6 +248,7 @@ def test_decimated_data_whose_mode_has_gone_to_its_mirror_image_name_the_hold():
         assert est.verdict.grade == "do not use"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("late", "noise"), [(0.178, 0.25), (0.4, 0.05)])
 def test_a_long_delay_beside_slow_outputs_is_told_by_the_past(late, noise):
     """Of a mode that answers 18 samples late 39 % were explained at half its damping, and trusted:

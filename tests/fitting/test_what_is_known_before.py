@@ -47,6 +47,7 @@ def test_a_start_of_a_fixed_parameter_is_refused_unless_it_is_its_value(record):
         fq.fit(plant, record, start={"c": 7.0})
 
 
+@pytest.mark.study
 def test_a_hold_that_the_record_contradicts_is_no_loop():
     """The paper's experiment: what a wrong hold leaves looks like a loop, too."""
     fast, slow = fq.paper.study_records()

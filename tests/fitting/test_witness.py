@@ -112,6 +112,7 @@ def uniform(p_values):
     return scipy.stats.kstest(p_values, "uniform").pvalue
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("measured", "make"),
     [(record, axis), (periods, axis), (periods, two_axes)],
@@ -131,6 +132,7 @@ def test_p_values_of_a_true_model_are_those_of_chance(measured, make):
     assert est.witness.p_value < 1e-6
 
 
+@pytest.mark.study
 def test_p_values_of_two_axes_in_a_loop_are_those_of_chance():
     p = []
     for seed in range(24):
@@ -139,6 +141,7 @@ def test_p_values_of_two_axes_in_a_loop_are_those_of_chance():
     assert uniform(p) > 1e-3, np.sort(p).round(4)
 
 
+@pytest.mark.study
 def test_p_values_of_few_periods_under_disturbing_torques():
     """Lines beside a resonance lend it a covariance that is not its own."""
     p = []
@@ -167,6 +170,7 @@ def test_a_coupling_at_its_bound_is_a_coupling(number):
     assert observed_order(model) == 2
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [6, 7])
 def test_noise_that_outweighs_the_signal_leaves_no_witness_to_rely_on(seed):
     """One start, "complete" and w = 82.5 ± 0.4 where 55 is true: a lobe of noise among others."""
@@ -186,6 +190,7 @@ def test_noise_that_outweighs_the_signal_leaves_no_witness_to_rely_on(seed):
     assert all(e.witness.verdict != "complete" for e in lobes)
 
 
+@pytest.mark.study
 def test_a_black_box_without_a_residual_speaks_against_a_model_that_leaves_one():
     """Noise-free data of a plant with a way past it that the model lacks: a division by zero."""
     plant = fq.GreyBox(

@@ -93,6 +93,7 @@ def test_noise_on_either_end(light):
     assert at_ten(fq.h2, noisy_y) > 1.5
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("estimate", [
     lambda r: fq.h1(r, 500, band=(30, 80)),
     lambda r: fq.local_polynomial(r, band=(30, 80)),

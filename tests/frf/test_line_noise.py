@@ -60,6 +60,7 @@ def test_lines_that_are_left_keep_their_noise():
     assert np.array_equal(asked.line_noise.rows, part.line_noise.rows)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("estimate", [fq.local_rational, fq.local_polynomial])
 def test_error_bars_of_a_resonance_that_four_lines_tell(estimate):
     """40 records of six seconds: 95 % intervals hold; they held in 91 %."""

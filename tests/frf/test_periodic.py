@@ -27,6 +27,7 @@ def measured(seed, periods, level=0.1, plant=LAG):
     return fq.Record(*noisy, DT, hold="bl")
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("periods", [4, 8])
 def test_noise_on_the_input_leaves_no_bias_and_honest_error_bars(periods):
     off, score, costs = [], [], []
@@ -198,6 +199,7 @@ def test_a_period_that_is_none_is_refused_by_name():
     assert fq.periodic(noisy, period=1.0).response.shape[-1] > 10
 
 
+@pytest.mark.study
 def test_error_bars_of_several_outputs_hold():
     """The covariance of three outputs, from three periods, is a worse estimate than that of one."""
 
@@ -306,6 +308,7 @@ def test_a_reference_is_checked_and_may_be_as_fast_as_the_input():
         fq.periodic(record, 1.0, np.full(len(u), np.nan))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("lines", "periods", "pole"), [(3, 8, 0.0), (60, 3, 0.8)])
 def test_error_bars_of_few_lines_and_of_coloured_noise(lines, periods, pole):
     u = np.tile(fq.multisine((5, 4 + lines), 1, DT, 1, crest="schroeder"), periods + 1)
@@ -359,6 +362,7 @@ def test_the_noise_of_few_periods_in_a_loop_is_told_next_to_a_resonance():
     assert each.min() > 0.2
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("offset", [0.0, 10.0, 1e4])
 @pytest.mark.parametrize("referred", [False, True])
 def test_an_offset_of_the_input_takes_no_lines_away(offset, referred):

@@ -185,6 +185,7 @@ def periods(seed, count=24, noise=0.05):
     return fq.simulate(fq.first_order(), u, DT, hold="bl").with_noise(noise, seed=seed)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("block", [100, 777, 5000])
 @pytest.mark.parametrize("known", [True, False])
 def test_periods_of_a_stream_are_those_of_the_record(block, known, monkeypatch):

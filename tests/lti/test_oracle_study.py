@@ -11,6 +11,7 @@ def oracle(benchmarks):
     return oracle
 
 
+@pytest.mark.study
 def test_random_plants_against_fifty_digits(oracle):
     rows = [oracle.one(case) for case in range(20_000, 20_045)]
     assert len({row["kind"] for row in rows}) >= 6

@@ -49,6 +49,7 @@ plant = fq.GreyBox(lag, [fq.Parameter("a", 20.0, lower=0.1), fq.Parameter("b", 9
 """
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "model",
     [
@@ -80,6 +81,7 @@ def test_of_several_records_and_a_start(file, tmp_path):
     np.testing.assert_allclose(again(lines(est, tmp_path), tmp_path), est.values, rtol=1e-9)
 
 
+@pytest.mark.study
 def test_of_an_own_plant_in_a_file(file, tmp_path):
     (tmp_path / "my_plant.py").write_text(OWN)
     run = subprocess.run(
@@ -134,6 +136,7 @@ def test_data_that_were_changed_were_not_read(file):
     assert source(record.with_conditions(**{"my q": 1.0})) is None
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("made", [
     lambda record: record.decimate(5),
     lambda record: record.detrend().slice(0.5, 3.5).decimate(4, keep_input=True),
@@ -152,6 +155,7 @@ def test_what_was_done_to_the_data_is_done_again(made, file, tmp_path):
     np.testing.assert_allclose(again(code, tmp_path), est.values, rtol=1e-9)
 
 
+@pytest.mark.study
 def test_of_the_command_line_with_decimation(file, tmp_path):
     run = subprocess.run(
         [sys.executable, "-m", "freqid.cli", "fit", str(file), "--model", "two-mass", "--band",
@@ -182,6 +186,7 @@ print(*est.values.tolist(), sep="\\n")
 """
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("taken", "uses"),
     [

@@ -16,6 +16,7 @@ def unlike():
     return fq.fit(fq.two_mass(), runs)
 
 
+@pytest.mark.study
 def test_of_long_records_it_stays_below_a_megabyte(unlike, tmp_path):
     unlike.report(tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text()

@@ -33,6 +33,7 @@ def panels(drawn):
     return list(np.ravel(np.asarray(drawn, dtype=object)))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_plotly_figure_has_the_same_curves(name):
     before = plt.get_fignums()

@@ -22,6 +22,7 @@ def test_it_is_exact_without_noise(plant):
     assert est.values == pytest.approx([plant[n] for n in est.names], rel=1e-7)
 
 
+@pytest.mark.study
 def test_it_is_better_than_linear_where_errors_grow_with_the_response(plant):
     errors = {"linear": [], "log": []}
     inside = []

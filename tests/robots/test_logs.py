@@ -55,6 +55,7 @@ def test_rational_ratios_are_exact(plant, rates, offset):
     assert worst(est, plant) < 1e-8
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
 def test_stamps_beyond_repair_are_taken_as_they_are(plant, hold):
     """Jitter of half a period and 5 % of the samples lost, on both clocks."""
@@ -91,6 +92,7 @@ def test_a_clock_that_is_off_by_50_ppm(plant):
     assert ratio == pytest.approx(4 * (1 + 50e-6), rel=3e-6)
 
 
+@pytest.mark.study
 def test_error_bars_on_stamps():
     lag, rng = fq.first_order(b=50, a=20), np.random.default_rng(4)
     u = fq.white_noise(1000, seed=1)
@@ -135,6 +137,7 @@ def test_what_is_no_log():
         fq.Record.from_logs(t, x, t, x, hold="zog")
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("rates", [(1000, 1000), (1000, 250), (1000, 300), (50, 250)])
 @pytest.mark.parametrize("late", [3.7e-3, -6e-3])
 def test_an_unknown_offset_of_the_clocks_is_found(plant, rates, late):
@@ -154,6 +157,7 @@ def test_an_unknown_offset_of_the_clocks_is_found(plant, rates, late):
     assert "clock_offset" not in fq.fit(plant, known, start=start_of(plant)).names
 
 
+@pytest.mark.study
 def test_the_error_bar_of_an_offset_in_noise(plant):
     u = fq.chirp(5, 60, 4, 1e-3)
     u_time, y_time = 1e-3 * np.arange(len(u)), 0.05 + 1e-3 * np.arange(3900)
@@ -215,6 +219,7 @@ def test_stamps_that_may_be_milliseconds_are_doubted():
     assert not any("milliseconds" in n for n in fq.Record.from_logs(t / 1e3, x, t / 1e3, x).notes)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("late", [0.4, -0.4])
 def test_clocks_that_are_a_tenth_of_the_record_apart(late, tmp_path):
     model = fq.GreyBox(
@@ -237,6 +242,7 @@ def test_clocks_that_are_a_tenth_of_the_record_apart(late, tmp_path):
         fq.Record.from_logs(t, u, t, y, offset="estimate", hold="foh")
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("rates", "late"), [((1000, 250), 0.0123), ((1000, 300), 0.0213)])
 def test_an_offset_of_a_slow_output_in_noise_is_found(plant, rates, late):
     h, T = 1 / rates[0], 1 / rates[1]

@@ -71,6 +71,7 @@ def test_postures_are_exact_without_noise(how):
         assert est[name] == pytest.approx(joint()[name], rel=1e-7)
 
 
+@pytest.mark.study
 def test_what_ignores_the_posture_is_wrong_and_says_so():
     data = [r.with_conditions(q=0.0) for r in records(noise=0.02)]
     est = fq.fit(joint(**START), data)
@@ -137,6 +138,7 @@ def test_a_known_inertia_that_differs():
     assert same["k"] == pytest.approx(plant["k"], rel=1e-7)
 
 
+@pytest.mark.study
 def test_values_of_their_own():
     plant = fq.two_mass()
     friction, sweep = np.array([10.0, 25.0, 60.0]), fq.chirp(5, 80, 4, 1e-3)
@@ -345,6 +347,7 @@ def looped(reference, seed, noise=1e-3):
     return fq.Record(u, y, 5e-3, reference=reference), response
 
 
+@pytest.mark.study
 def test_two_experiments_tell_three_inputs_of_a_loop():
     """At most 1.5 times the rms error of three."""
     errors = {2: [], 3: []}

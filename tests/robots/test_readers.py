@@ -63,6 +63,7 @@ def bag(request, tmp_path):
     return path if request.param != "mcap" else next(path.glob("*.mcap"))
 
 
+@pytest.mark.study
 def test_bags(bag):
     found = fq.channels(bag)
     assert set(found.index) == {"torque.data", *(f"joint_states.velocity[{i}]" for i in range(3))}
@@ -165,6 +166,7 @@ def test_channels_on_the_command_line(tmp_path, capsys):
     assert "rate" in capsys.readouterr().out
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("formula", "read"), [("2 * X1 + 1", True), ("print(X1)", False), ("X1.__class__", False)]
 )

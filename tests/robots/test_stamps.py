@@ -215,6 +215,7 @@ def test_small_jitter_of_the_stamps_moves_no_sample():
     assert off(fq.fit(LAG, record, start={"a": 30})) < 0.02
 
 
+@pytest.mark.study
 def test_error_bars_of_stamps_whose_noise_is_unlike():
     """A short loud experiment beside a long quiet one, each with a pole of its own."""
     given = []

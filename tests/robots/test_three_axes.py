@@ -28,6 +28,7 @@ def runs():
     return made
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("how", ["records", "kept input", "responses"])
 def test_exact_without_noise(runs, how):
     data = runs
@@ -45,6 +46,7 @@ def test_exact_without_noise(runs, how):
     assert max(abs(est[n] / v - 1) for n, v in robot.TRUE.items()) < 1e-7
 
 
+@pytest.mark.study
 def test_stiffnesses_from_logs_in_noise():
     """Two clocks, friction, loops, 2 % noise: each stiffness in its interval, and within 3 %."""
     est = fq.fit(robot.robot(), robot.responses(robot.read(seed=1), seed=1), start=start())

@@ -19,6 +19,7 @@ def marked(table, **options):
     return np.flatnonzero(fq.fleet_alarms(table, "k", **options)).tolist()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("rows", "spread", "scatter"), [
     (6, 2.0, 0.5), (10, 10.0, 1.0), (30, 10.0, 0.0), (60, 2.0, 0.5),
 ])  # fmt: skip
@@ -37,6 +38,7 @@ def test_a_single_row():
     assert np.mean(found) > 0.9
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("size", [3, 8, 50])
 @pytest.mark.parametrize("begin", [18, 30, 50])
 def test_a_lasting_change(size, begin):
@@ -91,6 +93,7 @@ def test_rows_that_failed_and_rows_without_errors():
     assert marked(pd.DataFrame({"k": [1.0] * 20, "k_std": 0.0})) == []
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("spread", [0.4, 1.0])
 @pytest.mark.parametrize("rows", [5, 8, 12])
 def test_rounded_values_are_no_changes(rows, spread):

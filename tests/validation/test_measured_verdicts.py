@@ -33,6 +33,7 @@ def test_the_robot_arm_with_its_feedthrough_and_without(measured):
     assert lacking.warnings[0].kind == "feedthrough"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("order", [3, 4, 6, 8])
 def test_flutter_is_not_trusted(measured, order):
     """One order explained 77 % and was trusted; its mode moves by 32 % between halves."""
@@ -41,6 +42,7 @@ def test_flutter_is_not_trusted(measured, order):
     assert kinds(est) & {"unsteady", "unstable", "feedback"}
 
 
+@pytest.mark.study
 def test_the_ruler_robot_is_trusted_for_the_mode_that_repeats_confirm(measured):
     """Halves of a sweep see other modes each, halves of the repeats the same ones."""
     records = [r.detrend() for r in ruler_robot.read_all(measured / "ruler_robot")]
@@ -52,6 +54,7 @@ def test_the_ruler_robot_is_trusted_for_the_mode_that_repeats_confirm(measured):
     )
 
 
+@pytest.mark.study
 def test_the_f16_is_trusted_for_its_wing_torsion(measured):
     data = scipy.io.loadmat(measured / "f16" / "F16Data_FullMSine_Level1.mat", squeeze_me=True)
     record = fq.Record(data["Force"], data["Acceleration"][2], 1 / 400, hold="bl")

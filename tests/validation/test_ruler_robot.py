@@ -48,6 +48,7 @@ def mode(est):
     return modes[(modes["frequency"] > 10) & (modes["damping"] < 0.5)]["frequency"].iloc[0]
 
 
+@pytest.mark.study
 def test_any_five_repeats_find_the_mode_of_the_other_five(records):
     """Five of the 126 ways to halve them; benchmarks/measured.py takes all."""
     halves = list(itertools.combinations(range(10), 5))[:126:30]
@@ -57,6 +58,7 @@ def test_any_five_repeats_find_the_mode_of_the_other_five(records):
         assert abs(a / b - 1) < 0.01
 
 
+@pytest.mark.study
 def test_decimation_costs_nothing_under_the_remembered_hold(records, full):
     table = ruler_robot.decimated(records, full, factors=[5])
     assert table.loc["remembered, every 10 ms"].abs().max() < 2
@@ -64,6 +66,7 @@ def test_decimation_costs_nothing_under_the_remembered_hold(records, full):
     assert table.loc["FOH, every 10 ms"].abs().max() > 10
 
 
+@pytest.mark.study
 def test_validation_on_repeats_that_were_not_used(records):
     est = ruler_robot.estimate(records[:5])
     for record in records[5:]:

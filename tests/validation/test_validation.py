@@ -31,6 +31,7 @@ def short(fast):
     return fast.decimate(5)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["white", "coloured", "coloured, weighted"])
 def test_intervals_hold_and_the_scatter_is_what_they_say(plant, short, kind):
     true = np.array([plant[p.name] for p in plant.free_parameters])
@@ -49,6 +50,7 @@ def test_intervals_hold_and_the_scatter_is_what_they_say(plant, short, kind):
     assert np.allclose(np.mean(std, axis=0), np.std(values, axis=0), rtol=0.2)
 
 
+@pytest.mark.study
 def test_noise_weights_beat_ones_in_coloured_noise(plant, short):
     errors = {w: [] for w in (None, "noise")}
     for s in range(40):
@@ -184,6 +186,7 @@ def test_a_response_is_compared_and_tested(plant, short):
         fq.residual_test(plant, frf)
 
 
+@pytest.mark.study
 def test_whiteness_keeps_its_size_in_short_records():
     model, rejected = fq.first_order(b=0.0, a=20.0), 0
     for seed in range(1500):
