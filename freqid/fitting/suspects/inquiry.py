@@ -158,10 +158,15 @@ class Inquiry:
         if not merged:
             return []
         ranked = ordered(list(merged.values()), scene)
-        if "hold rejected" in merged and not all(_remembered(r) for r in self.readings):
-            # the record says another hold itself: what is left is no loop's
-            others = [a for a in ranked if a.name not in ("hold rejected", "feedback")]
-            return [merged["hold rejected"], *others]
+        if hold := merged.get("hold rejected"):
+            # what a wrong hold leaves goes with inputs still to come, as in a loop
+            alone = [a for a in ranked if a.name != "feedback"]
+            if not all(_remembered(r) for r in self.readings):
+                return [hold, *(a for a in alone if a is not hold)]
+            looks = [evidence(scene, a) for a in ranked if a.name == "feedback"]
+            looks = looks or [_WORTH * max(evidence(scene, a) for a in ranked)]
+            if evidence(scene, hold) > looks[0]:
+                return alone
         # a fault that explains what is left leaves no room for a loop
         runaway = bool((self.model.poles.real > 0).any()) and not self.model.dt
         alike = "unlike experiments" not in merged and self.share is None

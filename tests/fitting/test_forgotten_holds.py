@@ -1,0 +1,74 @@
+"""Decimated records whose hold was forgotten: the paper's mistake on other plants and inputs.
+
+What the input did between its samples looks like a loop (it goes with inputs still to come) and
+like one more mode; neither is said before the hold.
+"""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+DT, FACTOR = 1e-3, 5
+
+
+def motor():
+    """Voltage to the speed of a motor; a load behind its gear and a soft coupling."""
+    R, Kt, N = 1.2, 0.06, 15.0
+
+    def matrices(L, Jm, bm, k, d, Jl):
+        A = [
+            [-R / L, -Kt / L, 0, 0],
+            [Kt / Jm, -(bm + d / N**2) / Jm, -k / N / Jm, d / N / Jm],
+            [0, 1 / N, 0, -1],
+            [0, d / N / Jl, k / Jl, -d / Jl],
+        ]
+        return A, [[1 / L], [0], [0], [0]], [[0, 1.0, 0, 0]], None
+
+    values = {"L": 1e-3, "Jm": 3e-5, "bm": 1e-4, "k": 15.0, "d": 0.05, "Jl": 5e-3}
+    return fq.GreyBox(matrices, [fq.Parameter(n, v, lower=0) for n, v in values.items()])
+
+
+TRUE = {"L": 2e-3, "Jm": 4e-5, "bm": 3e-4, "k": 25.0, "d": 0.02, "Jl": 8e-3}
+
+
+def forgotten(plant, seed, jitter=0.17, n=1600, noise=0.02):
+    """A chirp and a little white torque, held over DT; every fifth sample of both is logged."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n * FACTOR) * DT
+    u = scipy.signal.chirp(t, 1, t[-1], 80) + jitter * rng.standard_normal(len(t))
+    fast = fq.simulate(plant, u, DT)
+    y = fast.y + noise * fast.y.std() * rng.standard_normal(fast.y.shape)
+    return fq.Record(u[::FACTOR], y[::FACTOR], DT * FACTOR)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_hold_is_said_before_a_loop_and_one_more_mode(seed):
+    est = fq.fit(motor(), forgotten(motor().with_values(**TRUE), seed))
+    assert est.warnings[0].kind == "hold rejected"
+    assert "feedback" not in [w.kind for w in est.warnings]
+    assert est.verdict.grade == "do not use"
+
+
+def test_a_loop_under_the_right_hold_is_still_a_loop():
+    """A second-order plant under a proportional controller; its sensor's noise goes round.
+
+    The controller answers a sample late, so that it is no direct term.
+    """
+    plant = fq.GreyBox(
+        lambda w, z, g: ([[0, 1], [-w * w, -2 * z * w]], [[0], [g * w * w]], [[1.0, 0]], None),
+        [fq.Parameter("w", 60.0, lower=0), fq.Parameter("z", 0.2, lower=0), fq.Parameter("g", 1.0)],
+    )
+    dt, gain = 5e-3, 0.6
+    A, B, C, _ = plant.matrices(*plant.values.values())
+    F, G, *_ = scipy.signal.cont2discrete([*map(np.asarray, (A, B, C)), np.zeros((1, 1))], dt)
+    rng = np.random.default_rng(4)
+    reference, noise = rng.standard_normal((2, 3000))
+    x, u, y = np.zeros(2), np.zeros(3000), np.zeros(3000)
+    for i in range(len(u)):
+        u[i] = gain * (reference[i] - y[i - 1])
+        y[i] = C[0] @ x + 0.3 * noise[i]
+        x = F @ x + G[:, 0] * u[i]
+    est = fq.fit(plant, fq.Record(u, y, dt))
+    assert "feedback" in [w.kind for w in est.warnings]
