@@ -74,3 +74,19 @@ def test_a_long_delay_is_found_all_the_same(delay, seed):
 def test_a_delay_beyond_what_a_record_tells_says_so():
     with pytest.raises(ValueError, match="an eighth of the outputs"):
         fq.fit(PLANT, logged(STEP, 0, 0.05, delay=400.0), offset="estimate")
+
+
+def test_a_delay_that_outgrows_half_of_the_record_describes_nothing_of_it():
+    """A second lag that the model lacks: fits to halves of the record wander there."""
+    two = fq.GreyBox(
+        lambda K, slow, fast: (
+            [[-1 / slow, 0], [1 / fast, -1 / fast]], [[K / slow], [0]], [[0, 1.0]], None
+        ),
+        [fq.Parameter("K", K), fq.Parameter("slow", TAU), fq.Parameter("fast", 60.0)],
+        input_delay=TD,
+    )  # fmt: skip
+    clean = fq.simulate(two, STEP - STEP[0], DT)
+    record = fq.Record(STEP, 95 + clean.y, DT).with_noise(0.05, seed=2)
+    est = fq.fit(PLANT, record, offset="estimate")
+    assert est.warnings
+    assert est.verdict.grade == "doubt"

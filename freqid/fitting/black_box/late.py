@@ -75,6 +75,9 @@ def description_length(
             continue
         y = r.data.outputs
         end = len(y) + last
+        if end <= first:
+            # it leaves everything out, and explains nothing
+            return np.inf
         seen, open_ended = y[first:end], np.concatenate([y[:first], y[end:]])
         hidden += float(((open_ended - y[0]) ** 2).sum())
         moves += float(((seen - seen.mean(axis=0)) ** 2).sum())
