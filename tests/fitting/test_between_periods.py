@@ -59,6 +59,7 @@ def test_a_plant_that_bends_is_doubted(periods):
     assert said.p_value < 1e-6
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("past", [0.0, 0.95])
 @pytest.mark.parametrize("periods", [2, 3, 6])
 def test_noise_alone_is_no_doubt(periods, past):

@@ -104,6 +104,7 @@ def test_a_sensor_that_bends_is_named(kind):
     assert "sensor" in est.warnings[0]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("model", [LAG, SPRING], ids=["velocity", "position"])
 def test_linear_plants_are_called_neither(model):
     """Their faults keep their own names."""
@@ -186,6 +187,7 @@ def test_friction_given_as_an_input_leaves_nothing_to_say():
     assert abs(est["coulomb"] / 0.1 - 1) < 0.01
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(3))
 def test_a_linear_plant_that_decimation_has_folded_is_told_that_first(seed):
     """Found: "feedback", "hold rejected", and "the input's gain changes with its size"."""

@@ -12,6 +12,14 @@ import freqid as fq
 RECORD = fq.simulate(fq.first_order(), fq.chirp(2, 40, 4, 5e-3), 5e-3).with_noise(0.01)
 
 
+@pytest.fixture(autouse=True)
+def _heard():
+    """Jobs that a shell has put into the background are deaf to Ctrl-C, and so are their tests."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def plant(after, slow=False, always=False):
     """A lag whose matrices are interrupted when they have been asked for so many times."""
     calls = []
