@@ -9,7 +9,6 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.digits import in_digits, of_error, rounded
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Z95, Estimate
-from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import FITTERS, Near, SearchOptions, fitter_of
 from freqid.fitting.grades import Verdict
 from freqid.fitting.grey_box import fit_grey_box
@@ -22,5 +21,6 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_at_stamps, line_errors
 from freqid.fitting.search.batched import Answers, descend
 from freqid.fitting.search.descent import settled, uninterrupted
+from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.uncertainty.covariance import determined
 from freqid.fitting.uncertainty.minimum import Minimum, Spread

@@ -17,13 +17,13 @@ from freqid.fitting.cost.places import Place, places_of
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
 from freqid.fitting.sight import hold_that_changes, out_of_sight
+from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.twins import nearest_to_start
 from freqid.fitting.uncertainty.minimum import Minimum, Spread

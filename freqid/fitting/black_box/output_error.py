@@ -23,12 +23,12 @@ from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.findings import Evidence, findings
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.sight import out_of_sight
+from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.sufficiency import enough_rows, moving, told_apart
 from freqid.fitting.uncertainty.error_bars import pole_scatter
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
