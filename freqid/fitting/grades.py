@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from freqid.fitting.uncertainty.parts_of_values import parts_of_values
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
@@ -154,9 +155,7 @@ def _once(est: Estimate, std: np.ndarray) -> list[str]:
 
 def _relative(est: Estimate, std: np.ndarray) -> np.ndarray:
     """Standard errors as parts of their values."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        relative: np.ndarray = np.abs(std / est.values)
-    return relative
+    return parts_of_values(std, est.values, est.names, est.model, est.hold)
 
 
 def _supported(est: Estimate, std: np.ndarray) -> str:
@@ -167,6 +166,7 @@ def _supported(est: Estimate, std: np.ndarray) -> str:
         if np.isfinite(relative).any():
             worst = int(np.nanargmax(np.where(np.isfinite(relative), relative, np.nan)))
             name, size = est.names[worst], f"{100 * relative[worst]:.2g} %"
+            size += " of a sample" if std[worst] > relative[worst] * abs(est.values[worst]) else ""
             text += f"; the least certain parameter, {name}, is known to {size}"
             text += ": the data do not tell it from zero" if relative[worst] > 0.5 else ""
     if est.witness.verdict == "complete":

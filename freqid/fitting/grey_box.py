@@ -213,6 +213,7 @@ def _estimate(
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
+        wanted=(minimum.unbounded * structure.scale)[:count],
     )
     return Estimate(
         model=model,

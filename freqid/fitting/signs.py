@@ -61,6 +61,7 @@ class Evidence:
     aliased: float = 0.0
     rounding: tuple[float, str] = (0.0, "")
     tied: Sequence[tuple[Parameter, str, float]] = ()
+    wanted: FloatArray | None = None
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -112,17 +113,21 @@ def not_physical(e: Evidence) -> Iterator[Finding]:
 @sign
 def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
     """A parameter at a bound of its search."""
-    for p, value, error in zip(e.parameters, e.values, e.std, strict=True):
+    outside = np.full(len(e.values), np.inf) if e.wanted is None else np.abs(e.wanted - e.values)
+    for p, value, error, beyond in zip(e.parameters, e.values, e.std, outside, strict=True):
         for bound in (p.lower, p.upper):
             known = error if np.isfinite(error) else 0.0
             size = max(abs(bound), abs(value), abs(p.value), known)
             near = np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * size
             # a value that is small for its start, and known better than that, lies inside
-            if near and not 0 < _INSIDE * known < abs(value - bound):
-                sentence = (
-                    f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
-                )
-                yield Finding("edge of a bound", sentence, number=float(value))
+            if not near or 0 < _INSIDE * known < abs(value - bound):
+                continue
+            sentence = f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
+            severity: Severity = "serious"
+            if beyond < _CERTAIN * known:
+                sentence += " by less than two standard errors, so that they allow the bound itself"
+                severity = "minor"
+            yield Finding("edge of a bound", sentence, severity, float(value))
 
 
 @sign

@@ -33,6 +33,7 @@ from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.uncertainty.parts_of_values import parts_of_values
 from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom, shared
 from freqid.lti import tuned
 from freqid.models import Model, observed_order
@@ -172,8 +173,12 @@ class Testimony:
 
     def _open(self) -> bool:
         """Whether a parameter is so badly known that distant ones explain the data alike."""
-        std = np.sqrt(np.diag(Spread(np.ones(len(self.minimum.x)), self.minimum).covariance))
-        return bool((std > _OPEN * np.abs(self.minimum.x)).any())
+        structure = self.minimum.structure
+        assert isinstance(structure, GreyStructure)
+        std = np.sqrt(np.diag(Spread(structure.scale, self.minimum).covariance))
+        values, hold = self.minimum.x * structure.scale, self.readings[0].hold
+        parts = parts_of_values(std, values, structure.physical_names, structure.model, hold)
+        return bool((parts > _OPEN).any())
 
     def _verdict(self, order: int, numbers: str, p: float, gap: float) -> tuple[Verdict, str]:
         if p < _LEVEL:

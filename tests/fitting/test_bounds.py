@@ -171,3 +171,42 @@ def test_a_value_that_its_units_make_small_is_at_no_bound():
     assert "edge of a bound" not in [w.kind for w in est.warnings]
     kept = lag.with_bounds(b=(-np.inf, np.inf)).with_values(b=33e-9).with_bounds(b=(30e-9, 35e-9))
     assert "edge of a bound" in [w.kind for w in fq.fit(kept, small).warnings]
+
+
+def direct(through):
+    """A lag with a direct term that is bounded to be positive."""
+    return fq.GreyBox(
+        lambda a, b, e: ([[-a]], [[b]], [[1.0]], [[e]]),
+        [
+            fq.Parameter("a", 25.0, lower=0),
+            fq.Parameter("b", 40.0, lower=0),
+            fq.Parameter("e", through, lower=min(through, 0.0)),
+        ],
+    )
+
+
+def test_a_true_value_on_its_bound_is_no_doubt():
+    """The data want it beyond in half of the records, by chance, and by two standard errors in one
+    of 44; all ended in a doubt.
+    """
+    begun, said = direct(0.0).with_values(e=0.3), []
+    for seed in range(40):
+        record = fq.simulate(direct(0.0), fq.white_noise(400, seed=seed), 0.01)
+        est = fq.fit(begun, record.with_noise(0.2, seed=seed))
+        said.append([w for w in est.warnings if w.kind == "edge of a bound"])
+        assert est.parameters.loc["e", "lower"] == 0 or not said[-1]
+    at_it = [w for found in said for w in found]
+    assert 10 <= len(at_it) <= 30
+    serious = [w for w in at_it if w.severity == "serious"]
+    assert len(serious) <= 3
+    assert "less than two standard errors" in next(w for w in at_it if w.severity == "minor")
+
+
+def test_a_value_that_the_data_want_beyond_its_bound_is_a_doubt():
+    begun = direct(0.0).with_values(e=0.3)
+    for seed in range(3):
+        record = fq.simulate(direct(-0.3), fq.white_noise(400, seed=seed), 0.01)
+        est = fq.fit(begun, record.with_noise(0.2, seed=seed))
+        (said,) = [w for w in est.warnings if w.kind == "edge of a bound"]
+        assert said.severity == "serious"
+        assert est.verdict.grade != "trust"

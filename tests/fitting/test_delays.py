@@ -266,3 +266,23 @@ def test_a_delay_that_a_zero_may_take_over_has_no_errors_to_trust():
     late = est.frequency_response(omega)
     assert (late.variance > 0).all()
     assert (late.variance < 10 * own.frequency_response(omega).variance).all()
+
+
+@pytest.mark.parametrize("kind", ["white", "chirp"])
+def test_no_delay_at_all_is_a_delay_that_is_told(kind):
+    """Its error, far below a sample, is more than half of what is next to zero: "not settled"."""
+    free = fq.first_order(b=40.0, a=25.0)
+    free = fq.GreyBox(
+        free.matrices,
+        [*free.parameters, fq.Parameter("Td", 0.0, "s", lower=0)],
+        input_delay="Td",
+    )
+    u = fq.white_noise(1500, seed=3) if kind == "white" else fq.chirp(0.5, 60, 3, 2e-3)
+    grades = []
+    for seed in range(8):
+        record = fq.simulate(free, u, 2e-3).with_noise(0.02, seed=seed)
+        est = fq.fit(free, record, start={"a": 32.0, "Td": 1e-3})
+        assert est["Td"] < 1e-4
+        assert est.witness.verdict != "lacking" or est.witness.p_value > 1e-3
+        grades.append(est.verdict.grade)
+    assert grades.count("trust") >= 7

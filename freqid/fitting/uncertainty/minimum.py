@@ -159,6 +159,12 @@ class Minimum:
             score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
         return np.sqrt(self.inflation) * half @ root(half.T @ score @ half)
 
+    @property
+    def unbounded(self) -> FloatArray:
+        """The unknowns (P,) where the cost, as it is to second order, is least without bounds."""
+        slope = self.point.jacobian.T @ self.point.residual
+        return np.asarray(self.x - self.determined.inverse @ slope)
+
     def inside_bounds(
         self, scale: FloatArray, std: FloatArray, lower: FloatArray, upper: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -172,9 +178,7 @@ class Minimum:
         lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
         if not (np.isfinite(low).any() or np.isfinite(high).any()):
             return lower, upper
-        beyond = value - self.determined.inverse @ (self.point.jacobian.T @ self.point.residual) * (
-            scale
-        )
+        beyond = self.unbounded * scale
         for i, at in enumerate(value):
             if not np.isfinite(std[i]) or std[i] == 0:
                 continue
