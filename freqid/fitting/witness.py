@@ -21,7 +21,7 @@ import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse, Record, StampedRecord
-from freqid.fitting.black_box.late import in_step, whole_samples, with_less_delay
+from freqid.fitting.black_box.late import plant_in_step
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
@@ -104,20 +104,13 @@ class Testimony:
             return Witness("absent", "an initial state at rest is none of a black box's lines")
         try:
             if structure.model.delay_sources:
-                structure, readings = self._in_step(structure)
+                nearer, readings = plant_in_step(structure.at(self.minimum.x), self.readings)
+                structure = GreyStructure(nearer)
             else:
                 readings = [r.beside() for r in self.readings]
             return self._heard(structure, readings)
         except (InputError, np.linalg.LinAlgError) as error:
             return Witness("absent", str(error))
-
-    def _in_step(self, structure: GreyStructure) -> tuple[GreyStructure, list[Reading]]:
-        """The plant with less than a sample of delay, on the data with the rest taken off."""
-        model = structure.at(self.minimum.x)
-        shifts = whole_samples(model, self.readings[0])
-        readings = [in_step(r.at_lines(), shifts).with_(delayed=True) for r in self.readings]
-        nearer = with_less_delay(model, readings[0].sample_time, shifts)
-        return GreyStructure(nearer), readings
 
     def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
         grey = self._grey(structure, readings)

@@ -286,3 +286,35 @@ def test_no_delay_at_all_is_a_delay_that_is_told(kind):
         assert est.witness.verdict != "lacking" or est.witness.p_value > 1e-3
         grades.append(est.verdict.grade)
     assert grades.count("trust") >= 7
+
+
+@pytest.mark.parametrize("delay", [0.0013, 0.007])
+@pytest.mark.parametrize("masses", [2, 3])
+def test_one_more_mode_behind_a_delay_is_named(masses, delay):
+    """Black boxes with a mode more stood beside plants in time only: "tone", "drift", nothing."""
+
+    def chain(count, late):
+        def matrices(m, k, d):
+            coupled = np.diff(np.eye(count), axis=0)
+            L = coupled.T @ coupled
+            A = np.block(
+                [[np.zeros((count, count)), np.eye(count)], [-k / m * L, -d / m * (L + ends)]]
+            )
+            return A, np.r_[np.zeros(count), ends[:, 0] / m][:, None], np.eye(2 * count)[[count]]
+
+        ends = np.diag(np.eye(count)[0])
+        values = {"m": 1.0, "k": 4000.0, "d": 2.0}
+        return fq.GreyBox(
+            lambda m, k, d, Td: (*matrices(m, k, d), None),
+            [*(fq.Parameter(n, v, lower=0) for n, v in values.items()),
+             fq.Parameter("Td", late, "s", lower=0)],
+            input_delay="Td",
+        )  # fmt: skip
+
+    record = fq.simulate(chain(masses, delay), fq.white_noise(2000, seed=1), 2e-3)
+    est = fq.fit(chain(2, delay), record.with_noise(0.02 * record.y.std(), seed=2))
+    if masses == 2:
+        assert est.verdict.trusted
+        return
+    assert est.warnings[0].kind == "another mode"
+    assert not est.verdict.trusted

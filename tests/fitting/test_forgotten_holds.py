@@ -72,3 +72,20 @@ def test_a_loop_under_the_right_hold_is_still_a_loop():
         x = F @ x + G[:, 0] * u[i]
     est = fq.fit(plant, fq.Record(u, y, dt))
     assert "feedback" in [w.kind for w in est.warnings]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("fault", ["hold", "feedthrough"])
+def test_what_one_unknown_of_a_linear_plant_explains_is_no_friction(fault, seed):
+    """To a sweep through a lag the sign of the speed explains half of it: it was said first."""
+    lag, dt, n = fq.first_order(b=50.0, a=20.0), 0.01, 1500
+    u = fq.chirp(1, 30, n * dt, dt)
+    clean = fq.simulate(lag, u, dt).y
+    if fault == "hold":
+        between = np.interp(np.arange(5 * n) / 5, np.arange(n), u)
+        y = fq.simulate(lag, between, dt / 5).y[::5]
+    else:
+        y = clean + 0.1 * clean.std() / u.std() * u
+    e = np.random.default_rng(seed).standard_normal(n)
+    est = fq.fit(lag, fq.Record(u, y + 0.1 * clean.std() * e, dt))
+    assert est.warnings[0].kind in ("hold rejected", "feedthrough")

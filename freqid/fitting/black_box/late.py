@@ -53,6 +53,13 @@ def in_step(reading: Reading, shifts: Sequence[int], least: int = 0) -> Reading:
     return reading.of_part(moved).with_(delayed=False)
 
 
+def plant_in_step(model: GreyBox, readings: Sequence[Reading]) -> tuple[GreyBox, list[Reading]]:
+    """The plant with less than a sample of delay, on the data with the rest taken off."""
+    shifts = whole_samples(model, readings[0])
+    moved = [in_step(r.at_lines(), shifts).with_(delayed=True) for r in readings]
+    return with_less_delay(model, moved[0].sample_time, shifts), moved
+
+
 def description_length(
     cost: float,
     experiments: Sequence[SpectralExperiment],

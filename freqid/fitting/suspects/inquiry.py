@@ -222,7 +222,9 @@ class Inquiry:
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""
         moves = a.test.largest_change > _HARMLESS
-        little = a.test.gain < _NOTHING * scene.energy and scene.cost < _QUIET * scene.energy
+        # a constant is much of the data, and tells nothing
+        energy = scene.moving
+        little = a.test.gain < _NOTHING * energy and scene.cost < _QUIET * energy
         return bool(little and not moves)
 
     def _finding(self, scene: Scene, a: Asked) -> Finding:

@@ -22,6 +22,7 @@ from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.behind_delay import InStep, without_delay
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved, poles_of
 from freqid.fitting.suspects.lacking_mode import lacking_mode
 from freqid.fitting.suspects.scene import Scene, lines_beside
@@ -43,6 +44,8 @@ _KEPT = 0.1
 
 def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     """A black box with one mode more, which may lie at any of the lines."""
+    if getattr(inquiry.model, "delay_sources", ()) and not isinstance(inquiry, InStep):
+        return _behind_delay(inquiry, scene)
     model = _met(inquiry)
     if model is None:
         return []
@@ -61,6 +64,21 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         both = [t for t in (told, comparison.told(readings)) if t is not None]
         told = min(both, key=lambda a: a.p_value, default=None)
     return [] if told is None else [told]
+
+
+def _behind_delay(inquiry: Asking, scene: Scene) -> list[Asked]:
+    """The same of a plant whose inputs come late, on data in step."""
+    try:
+        step = without_delay(inquiry)
+    except (InputError, np.linalg.LinAlgError):
+        return []
+    found = [] if step is None else one_more_mode(*step)
+    # of what is left of the data as they are
+    return [_rescaled(a, scene.cost / step[1].cost) for a in found if step is not None]
+
+
+def _rescaled(a: Asked, by: float) -> Asked:
+    return dataclasses.replace(a, test=dataclasses.replace(a.test, gain=by * a.test.gain))
 
 
 @dataclass(frozen=True)
@@ -157,7 +175,7 @@ def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:
     """What is compared with a larger black box, none itself or one; None where nothing is."""
     model, minimum = inquiry.model, inquiry.minimum
     structure = minimum.structure
-    late = model.late or bool(getattr(model, "delay_sources", ()))
+    late = model.late and not isinstance(inquiry, InStep)
     if late or isinstance(structure, PlacedStructure) or minimum.prior is not None:
         return None
     if isinstance(structure, GreyStructure):

@@ -17,7 +17,7 @@ _UNLIKELY = ("delay", "feedthrough", "hold rejected")
 _EQUAL, _CHANCE = 0.98, 6.0
 # level at which a change midway explains more than what is simpler
 _CLEAR = 1e-3
-# part of one more mode's gain at which something simpler is believed instead
+# part of the gain of one more mode, or of a simple explanation, at which another is believed
 _AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
@@ -79,7 +79,12 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         ranked = [a for a in ranked if a.name != "unsteady"]
     if ranked[0].name not in _SENSOR:
         least = _HALF * max(a.test.gain for a in asked)
+        # to a sweep the sign of the speed looks like what one unknown of a linear plant explains,
+        # and the other way round: of both the better one
+        linear = [evidence(scene, a) for a in asked if a.name in LIKELY]
+        surely = _AS_MUCH * max(linear, default=0.0)
         bent = [a for a in ranked if a.name in BENT and a.test.gain >= least]
+        bent = [a for a in bent if evidence(scene, a) >= surely]
         ranked = [*bent, *(a for a in ranked if a not in bent)]
     # what the data themselves show, and what explains much besides, needs no weighing
     shown = [a for a in ranked if a.certain and evidence(scene, a) > 0]
