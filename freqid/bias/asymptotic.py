@@ -261,7 +261,7 @@ def error_covariance(
     rows = dG * np.sqrt(expected.weight)
     J = np.ascontiguousarray(rows.reshape(len(rows), -1)).view(float)
     size = float(np.linalg.norm(J * x[:, None]))
-    told = determined(triangle(J.T), x, structure.names, size)
+    told = determined(triangle(J.T), x, structure.names, size, structure.scale)
     if n_samples is None:
         return told.scatter(np.zeros_like(told.inverse))
     each = expected.gain * (noise_std**2 + expected.error_power)

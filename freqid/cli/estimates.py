@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter as Option
 
 import freqid as fq
-from freqid.checks import InputError
+from freqid.checks import InputError, whole
 from freqid.cli.fleets import engine, matching
 from freqid.cli.options import Asked, Force, Reading, Search
 from freqid.cli.plants import TEMPLATE, pairs
@@ -27,7 +27,7 @@ def fit(
     asked: Asked,
     reading: Reading = USUAL_READING,
     search: Search = USUAL_SEARCH,
-    decimate: int = 1,
+    decimate: float = 1,
     keep_input: bool = False,
     domain: Literal["frequency", "time"] = "frequency",
     initial_state: Literal["estimate", "zero", "steady"] = "estimate",
@@ -71,10 +71,11 @@ def fit(
     if conditions:
         record = record.with_conditions(**pairs("--conditions", conditions))
         other = other and other.with_conditions(**record.conditions)
-    if decimate != 1:
+    factor = whole("--decimate", decimate)
+    if factor != 1:
         if not isinstance(record, fq.Record):
             raise InputError("--decimate is for records; a response has no samples")
-        record = record.decimate(decimate, keep_input=keep_input)
+        record = record.decimate(factor, keep_input=keep_input)
     plant, model = asked.plant(), asked.model
     what = repr(record)[1:-1]
     with progress() as bar:
@@ -89,6 +90,12 @@ def fit(
         )
     band = search.band
     compared = None if other is None else fq.compare(estimate, other, band=band)
+    found = estimate.verdict
+    if isinstance(other, fq.Record):
+        from freqid.pages import validated
+
+        # what cannot validate is an error, and nothing is written
+        found = validated(estimate, other)
     if out is not None:
         estimate.save(out, overwrite=force)
     if report is not None:
@@ -102,11 +109,6 @@ def fit(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
     )
-    found = estimate.verdict
-    if isinstance(other, fq.Record):
-        from freqid.pages import validated
-
-        found = validated(estimate, other)
     print(f"verdict: {found.grade}: {typed(found.reasons[0])}")
     print(f"witness {estimate.witness.verdict}: {typed(estimate.witness.sentence)}")
     for warning in estimate.warnings:

@@ -171,3 +171,28 @@ def test_a_search_within_bounds_ends_where_an_exact_one_does(bounds, noise):
     assert est.cost <= least * (1 + 1e-6) + 1e-12
     assert bounds[0] <= est["a"] <= bounds[1]
     assert est.converged
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(
+    ("damping", "word"),
+    [
+        (lambda c, q: c + q, "sum c+q"),
+        (lambda c, q: c - q, "difference c-q"),
+        (lambda c, q: c * q, "product c*q"),
+        (lambda c, q: c / q, "ratio c/q"),
+    ],
+)
+@pytest.mark.parametrize("begun", [(4.0, 2.0), (8.0, -5.0), (1.0, 0.5)])
+def test_what_two_parameters_leave_open_has_its_name(damping, word, begun):
+    """A sum was called a product where the search had made one of its parts negative."""
+
+    def spring(k, c, q):
+        return [[0, 1], [-k, -damping(c, q)]], [[0], [1]], [[1.0, 0]], [[0]]
+
+    true = fq.GreyBox(spring, [fq.Parameter(n, v) for n, v in (("k", 1600), ("c", 3), ("q", 1))])
+    record = fq.simulate(true, fq.white_noise(2000, seed=0), 5e-3).with_noise(1e-5, seed=0)
+    start = zip("kcq", (1500.0, *begun), strict=True)
+    est = fq.fit(fq.GreyBox(spring, [fq.Parameter(n, v) for n, v in start]), record)
+    said = [w for w in est.warnings if w.kind == "not identifiable"]
+    assert f"only the {word} is determined" in said[0]

@@ -38,11 +38,12 @@ class Determined:
 
 
 def determined(
-    jacobian: FloatArray, values: FloatArray, names: Sequence[str], size: float
+    jacobian: FloatArray, values: FloatArray, names: Sequence[str], size: float, scale: FloatArray
 ) -> Determined:
     """What the rows of a Jacobian tell of the unknowns.
 
-    Args: jacobian (rows, P) by unknowns of order one; ``size`` the norm of the weighted data.
+    Args: jacobian (rows, P) by unknowns of order one, in units of the ``scale`` (P,); ``size`` the
+    norm of the weighted data.
     """
     norms = np.linalg.norm(jacobian, axis=0)
     effect = norms * np.where(values == 0, 1, np.abs(values))
@@ -61,27 +62,36 @@ def determined(
         Vt = np.linalg.svd(jacobian[:, seen] / norms[seen])[2] if len(Vt) < len(seen) else Vt
         weak = s < _PARALLEL * s[0]
         for direction in Vt[weak]:
+            step = direction / norms[seen]
             # in relative changes of the parameters
-            change = direction / effect[seen]
+            change = step / np.where(values == 0, 1, values)[seen]
             change /= np.abs(change).max()
             members = np.abs(change) > 1e-3
             loose[seen[np.abs(direction) > 1e-4]] = True
-            sentences.append(_combination([names[i] for i in seen[members]], change[members]))
+            named = [names[i] for i in seen[members]]
+            sentences.append(_combination(named, change[members], (step * scale[seen])[members]))
         half = np.zeros((len(values), np.count_nonzero(~weak)))
         half[seen] = ((Vt[~weak] / s[~weak, None]) / norms[seen]).T
     return Determined(half, loose, sentences)
 
 
-def _combination(names: list[str], change: FloatArray) -> str:
-    """Name what the data leave open, as relative changes that cancel one another."""
+def _combination(names: list[str], change: FloatArray, step: FloatArray) -> str:
+    """Name what the data leave open, as relative changes that cancel one another.
+
+    The ``step`` has the parameters' own units: a sum leaves it with equal and opposite parts.
+    """
     parts = [f"{name} by {c:+.3g} %" for name, c in zip(names, change, strict=True)]
     text = f"{', '.join(names)}; changing {' and '.join(parts)} leaves the data"
     if len(names) == 2:
-        ratio = change[1] / change[0]
-        for sign, word, mark in ((-1, "product", "*"), (1, "ratio", "/")):
-            if abs(ratio - sign) < 1e-3:
-                return (
-                    f"{text} as they are: only the {word} {names[0]}{mark}{names[1]} is "
-                    "determined, so fix one"
-                )
+        relative, own = change[1] / change[0], step[1] / step[0]
+        tried = [
+            (abs(relative + 1), "product", "*"), (abs(relative - 1), "ratio", "/"),
+            (abs(own + 1), "sum", "+"), (abs(own - 1), "difference", "-"),
+        ]  # fmt: skip
+        off, word, mark = min(tried)
+        if off < 1e-3:
+            return (
+                f"{text} as they are: only the {word} {names[0]}{mark}{names[1]} is "
+                "determined, so fix one"
+            )
     return text + " as they are; fix one of them"

@@ -127,7 +127,9 @@ class Minimum:
         """
         J, names = self.point.jacobian, self.structure.names
         if names:
-            return determined(J, self.x, names, np.sqrt(self.objective.energy))
+            scale = self.structure.scale  # type: ignore[attr-defined]
+            size = np.sqrt(self.objective.energy)
+            return determined(J, self.x, names, size, scale)
         half = np.linalg.pinv(J)
         return Determined(half, np.zeros(len(half), bool), [])
 
