@@ -23,6 +23,8 @@ class PeriodicResponse(FrequencyResponse):
             experiments.
         noise: covariance of these means, outputs first, (E, K, outputs + inputs, the same).
         freedom: degrees of freedom of that.
+        settled: how often chance makes the first of the periods differ so much from the others,
+            which a transient does, too; NaN where that is not known.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it is the sample maximum
     likelihood (Pintelon and Schoukens, System Identification, 2012, section 9.11). Made by
@@ -33,6 +35,7 @@ class PeriodicResponse(FrequencyResponse):
     outputs: ComplexArray
     noise: ComplexArray
     freedom: int
+    settled: float
 
     def __init__(
         self,
@@ -52,6 +55,7 @@ class PeriodicResponse(FrequencyResponse):
         outputs: Any = None,
         noise: Any = None,
         freedom: int = 0,
+        settled: float = float("nan"),
     ) -> None:
         super().__init__(
             frequency, response, dt, hold, variance, coherence, input_spectrum, input_names,
@@ -70,7 +74,7 @@ class PeriodicResponse(FrequencyResponse):
                 raise InputError(f"{name} must be finite")
         self.__dict__.update(
             inputs=frozen(U), outputs=frozen(Y), noise=frozen(C),
-            freedom=whole("freedom", freedom),
+            freedom=whole("freedom", freedom), settled=float(settled),
         )  # fmt: skip
 
     @that_follows
@@ -85,11 +89,11 @@ class PeriodicResponse(FrequencyResponse):
         at = np.isin(self.frequency, kept.frequency)
         more: dict[str, Any] = {
             "inputs": self.inputs[..., at], "outputs": self.outputs[..., at],
-            "noise": self.noise[:, at], "freedom": self.freedom,
+            "noise": self.noise[:, at], "freedom": self.freedom, "settled": self.settled,
         }  # fmt: skip
         return PeriodicResponse(**kept.__dict__, **more)
 
     def plain(self) -> FrequencyResponse:
         """The response alone, its means and their noise left out."""
-        own = ("inputs", "outputs", "noise", "freedom")
+        own = ("inputs", "outputs", "noise", "freedom", "settled")
         return FrequencyResponse(**{k: v for k, v in self.__dict__.items() if k not in own})

@@ -24,6 +24,7 @@ from freqid.frf.driven_lines import driven_lines, folded_lines
 from freqid.frf.measured import units_of
 from freqid.frf.noise_of_means import PeriodMeans, means
 from freqid.frf.periods import PERIODS_SHOWN, check_period, samples_of_a_period
+from freqid.frf.settling import settled
 
 # samples of periods of a stream that are taken at once
 _AT_ONCE = 1 << 18
@@ -128,7 +129,10 @@ def periodic(
     if not excited.any():
         raise InputError(f"input has no energy in band={limits}; widen it")
     mean, noise, freedom = means([each.at(excited) for each in found], first.n_outputs)
-    return _packed(first, f[excited], mean, noise, freedom)
+    spectra = [_amplitudes(r.outputs, n, skip, P) for r in sets if isinstance(r, Record)]
+    chances = [settled(Y[..., excited]) for Y in spectra]
+    chance = min(np.nanmin(chances) * len(chances), 1.0) if P > 2 and chances else np.nan
+    return _packed(first, f[excited], mean, noise, freedom, chance)
 
 
 def _experiments(
@@ -191,7 +195,12 @@ def _amplitudes(x: FloatArray, n: int, skip: int, periods: int) -> ComplexArray:
 
 
 def _packed(
-    first: Record | Stream, f: FloatArray, mean: ComplexArray, C: ComplexArray, freedom: int
+    first: Record | Stream,
+    f: FloatArray,
+    mean: ComplexArray,
+    C: ComplexArray,
+    freedom: int,
+    chance: float,
 ) -> PeriodicResponse:
     p = first.n_outputs
     Y, U = np.moveaxis(mean[:, :p], 0, 1), np.moveaxis(mean[:, p:], 0, 1)  # (channels, E, K)
@@ -215,5 +224,5 @@ def _packed(
         input_spectrum=(np.abs(U) ** 2).mean(axis=1),
         input_names=first.input_names, output_names=first.output_names,
         inputs=U, outputs=Y, noise=C, freedom=freedom, conditions=first.conditions,
-        units=units_of(first),
+        units=units_of(first), settled=chance,
     )  # fmt: skip

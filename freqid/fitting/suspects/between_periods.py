@@ -12,6 +12,13 @@ from freqid.fitting.uncertainty.minimum import Minimum
 
 # how much more in power is no matter of covariances that are estimates, and chance's level
 _MORE, _LEVEL = 1.2, 1e-6
+# the same of periods that are alike: noise that reaches from one to the next makes them differ, too
+_SETTLED = 1e-8
+_TRANSIENT = (
+    "the first of the periods that were averaged differs from the others: the plant had not come "
+    "to its periodic answer, and what was left of its start counts in all that is told"
+)
+_CURE = "leave more periods out at the start, fq.periodic(records, skip=), or begin at rest"
 
 
 def beyond_noise(minimum: Minimum) -> list[Finding]:
@@ -23,6 +30,9 @@ def beyond_noise(minimum: Minimum) -> list[Finding]:
     periodic = [e for e in experiments if isinstance(e, PeriodicExperiment)]
     if len(periodic) < len(experiments) or minimum.exact:
         return []
+    chance = min((e.data.settled for e in periodic if e.data.settled >= 0), default=1.0)
+    if chance < _SETTLED:
+        return [Finding("transient", f"{_TRANSIENT} (p = {chance:.2g}); {_CURE}", p_value=chance)]
     expected = sum(e.n_rows * e.level for e in periodic)
     rows = minimum.objective.n_rows
     # neighbours that share a covariance are no more than have told it
