@@ -158,9 +158,9 @@ class FrequencyResponse:
         return quotient(*(self.units.get(name, "") for name in ends))
 
     @that_follows
-    def select(self, limits: tuple[float, float]) -> FrequencyResponse:
-        """The frequencies inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        keep = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
+    def select(self, band: tuple[float, float]) -> FrequencyResponse:
+        """The frequencies inside ``band`` (Hz), ends included; ValueError if there are none."""
+        keep = chosen(self.frequency, Band.of(band, name="band"), "band")
         cut: dict[str, Any] = {
             name: None if getattr(self, name) is None else getattr(self, name)[..., keep]
             for name in ("frequency", "response", "variance", "coherence", "input_spectrum")

@@ -83,9 +83,9 @@ class PeriodicResponse(FrequencyResponse):
         return dataclasses.replace(self, conditions={**self.conditions, **conditions})
 
     @that_follows
-    def select(self, limits: tuple[float, float]) -> PeriodicResponse:
-        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        kept = self.plain().select(limits)
+    def select(self, band: tuple[float, float]) -> PeriodicResponse:
+        """The lines inside ``band`` (Hz), ends included; ValueError if there are none."""
+        kept = self.plain().select(band)
         at = np.isin(self.frequency, kept.frequency)
         more: dict[str, Any] = {
             "inputs": self.inputs[..., at], "outputs": self.outputs[..., at],

@@ -51,6 +51,19 @@ class StampedRecord(Record):
             array.flags.writeable = False
             self.__dict__[name] = array
 
+    @property
+    def scatter(self) -> float:
+        """How far stamps are off even ticks, rms in periods, of the worse clock; gaps are none."""
+        worst = 0.0
+        for time in (self.u_time, self.y_time):
+            steps = np.diff(time)
+            period = float(np.median(steps)) if len(steps) else 0.0
+            if period > 0:
+                # of a normal variable, and a step has two ends
+                off = 1.4826 * float(np.median(np.abs(steps - period))) / np.sqrt(2)
+                worst = max(worst, off / period)
+        return worst
+
     def regular(self) -> Record:
         """The record on its regular grid alone, without the stamps."""
         return Record(**_fields(self))

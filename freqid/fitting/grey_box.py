@@ -213,7 +213,9 @@ def _estimate(
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
-        wanted=(minimum.unbounded * structure.scale)[:count],
+        # what rounding leaves wants nothing
+        wanted=values[:count] if minimum.exact else (minimum.unbounded * structure.scale)[:count],
+        scatter=max(getattr(r.data, "scatter", 0.0) for r in readings),
     )
     return Estimate(
         model=model,

@@ -261,7 +261,8 @@ class Reading:
             raise InputError("error='log': the response is zero at a line; leave it out")
         relative = RelativeNoise(self.noise).weights(frf, frf.response.shape)
         weight = np.sqrt(relative) * np.abs(frf.response)
-        return LogResponse(frf.omega, frf.response, self.hold, weight, self.place)
+        known = getattr(frf, "line_noise", None)
+        return LogResponse(frf.omega, frf.response, self.hold, weight, self.place, frf.reach, known)
 
     def samples(self, plane: Plane | None = None) -> TimeExperiment:
         """The samples of a record as residuals; ValueError where the input's do not tell."""

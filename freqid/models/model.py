@@ -117,7 +117,9 @@ class Model(ABC):
             return Sampled(at.A, at.B, 0 * at.B)
         return hold.sampled(at.A, at.B)
 
-    def frequency_response(self, omega: ArrayLike, hold: Hold | None = None) -> FrequencyResponse:
+    def frequency_response(
+        self, omega: ArrayLike, hold: Hold | str | None = None
+    ) -> FrequencyResponse:
         """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
 
         That of a sampled model is taken at exp(jω·dt): it has its hold inside. Returns a
@@ -134,6 +136,8 @@ class Model(ABC):
             raise InputError(
                 f"omega has shape {at.shape}; expected finite frequencies (rad/s), (K,)"
             )
+        if hold == "bl":
+            hold = BandLimited()
         if hold is not None and not isinstance(hold, Hold):
             raise InputError(
                 f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "

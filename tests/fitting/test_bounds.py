@@ -210,3 +210,21 @@ def test_a_value_that_the_data_want_beyond_its_bound_is_a_doubt():
         (said,) = [w for w in est.warnings if w.kind == "edge of a bound"]
         assert said.severity == "serious"
         assert est.verdict.grade != "trust"
+
+
+def test_two_lags_that_are_alike_have_a_minimum():
+    """Steps that were asked for along what both do met zero: "not converged", in 9 of 20."""
+
+    def lags(g, t1, t2):
+        return [[-1 / t1, 0], [1 / t2, -1 / t2]], [[g / t1], [0]], [[0, 1.0]], None
+
+    def plant(**values):
+        return fq.GreyBox(lags, [fq.Parameter(n, v, lower=0) for n, v in values.items()])
+
+    true = plant(g=1.5, t1=0.02, t2=0.02)
+    for seed in range(8):
+        clean = fq.simulate(true, fq.white_noise(1500, seed=seed), 2e-3)
+        est = fq.fit(plant(g=1.0, t1=0.015, t2=0.04), clean.with_noise(0.002, seed=seed))
+        assert est.converged
+        assert est["g"] == pytest.approx(1.5, rel=0.01)
+        assert est["t1"] + est["t2"] == pytest.approx(0.04, rel=0.02)

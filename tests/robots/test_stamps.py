@@ -232,3 +232,17 @@ def test_error_bars_of_stamps_whose_noise_is_unlike():
         pulls.append([(est[n] - LAG[n[0]]) / std[n] for n in ("a[0]", "a[1]", "b")])
     # one variance for both gave 3.8, 0.57 and 0.81
     assert (np.abs(np.std(pulls, axis=0) - 1) < 0.4).all()
+
+
+@pytest.mark.parametrize(("off", "said"), [(0.05, 0), (0.3, 1)])
+def test_stamps_that_are_taken_for_the_times_of_samples_are_said(off, said):
+    """An even sampler whose stamps jitter has other times than its stamps: trusted in silence."""
+    plant = fq.two_mass()
+    record = fq.simulate(plant, fq.chirp(10, 80, 4, 5e-4), 5e-4)
+    ticks = np.arange(len(record.u))
+    stamps = (ticks + off * np.random.default_rng(3).uniform(-1, 1, len(ticks))) * 5e-4
+    logged = fq.Record.from_logs(stamps, record.u, ticks[::10] * 5e-4, record.y[::10])
+    est = fq.fit(plant, logged, n_starts=1)
+    found = [w for w in est.warnings if w.kind == "stamps"]
+    assert len(found) == said
+    assert all(w.number == pytest.approx(off / np.sqrt(3), rel=0.2) for w in found)

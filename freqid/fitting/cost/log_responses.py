@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
+from freqid.data import LineNoise
 from freqid.lti import Hold, Realisation, sampled_response
 
 # part of the measured response below which that of a model is none
@@ -21,7 +22,8 @@ class LogResponse:
     """log(G/Ĝ) at the lines of an experiment, (outputs, inputs, lines) as real rows.
 
     ``weight`` (outputs, inputs, lines) multiplies the error: it says how well Ĝ is known. Where it
-    is zero there is no error.
+    is zero there is no error. Errors go together within the ``reach`` of some lines, as
+    ``line_noise`` says where that is known.
     """
 
     def __init__(
@@ -31,14 +33,22 @@ class LogResponse:
         hold: Hold,
         weight: FloatArray | float = 1.0,
         place: int = 0,
+        reach: int = 0,
+        line_noise: LineNoise | None = None,
     ) -> None:
-        self.omega, self.hold = omega, hold
+        self.omega, self.hold, self.reach, self.line_noise = omega, hold, reach, line_noise
         self.weight = np.broadcast_to(weight, response.shape)
         silent = self.weight == 0
         # below this a model says nothing there: it is zero, or that but for rounding
         self.deaf = np.where(silent, np.inf, _DEAF * np.abs(response))
         self.measured = np.where(silent, 1, response)
         self.n_rows, self.place = 2 * response.size, place
+
+    @property
+    def turn(self) -> ComplexArray:
+        """Ĝ/|Ĝ|, which makes of errors of the logarithm those of the response, in their phase."""
+        turned: ComplexArray = self.measured / np.abs(self.measured)
+        return turned
 
     @property
     def energy(self) -> float:

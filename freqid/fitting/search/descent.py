@@ -124,6 +124,8 @@ def _descended(
                 "edge": _fallen(objective),
                 "limit": "the most evaluations were made",
             }
+            if how == "edge" and not _stopped(objective, x):
+                how = "minimum"
             return Solution(x, end, how == "minimum", said[how])
         # where no such step gains anything, next to what cannot be computed, reflective ones may
         begin, tolerance = near.x, max(tolerance, _BOUNDED)
@@ -132,15 +134,33 @@ def _descended(
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
     wanted = point.triangle[:-1, -1]
-    if objective.failure is not None and wanted @ wanted > _EDGE * point.cost + objective.rounding:
+    least = _EDGE * point.cost + objective.rounding
+    if objective.failure is not None and wanted @ wanted > least and _stopped(objective, result.x):
         return Solution(result.x, point, False, _fallen(objective))
     return Solution(result.x, point, result.status > 0, result.message)
+
+
+def _stopped(objective: Objective, x: FloatArray) -> bool:
+    """Whether a short part of the step that the cost asks for cannot be computed.
+
+    Where two unknowns all but do the same the cost asks for steps far beyond what it means.
+    """
+    point = objective.point(x)
+    if point is None:
+        return True
+    R, c = point.triangle[:-1, :-1], point.triangle[:-1, -1]
+    step = -np.linalg.lstsq(R, c, rcond=None)[0]
+    short = step * min(_SHORT / max(np.abs(step).max(), 1e-300), 1.0)
+    there = np.clip(x + short, objective.structure.lower, objective.structure.upper)
+    return objective.point(there) is None
 
 
 def _fallen(objective: Objective) -> str:
     return f"the cost falls on where the model cannot be computed ({objective.failure})"
 
 
+# of the unknowns' order: so short a step is stopped next to what cannot be computed
+_SHORT = 1e-2
 # a Gauss-Newton step of this relative size needs no second look: the next one is its square
 _LAST_STEP = 1e-7
 # such steps in a row

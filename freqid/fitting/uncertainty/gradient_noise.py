@@ -6,7 +6,9 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
+from freqid.data import LineNoise
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
+from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
@@ -37,6 +39,8 @@ def score_covariance(
         return _of_periods(objective, x)
     if all(isinstance(e, TimeExperiment) for e in objective.experiments):
         return _of_samples(objective, x, alone)
+    if all(isinstance(e, LogResponse) for e in objective.experiments):
+        return _of_logarithms(objective, x, alone)
     if len(lines) + len(stamped) < len(objective.experiments):
         return None
     try:
@@ -55,7 +59,8 @@ def score_covariance(
             J = J - (J @ Q.T) @ Q
             left = r if noise_at is realisation else projected(e.at(noise_at))[0]
             if e.response:
-                total += _of_response(J, left, e)
+                size = e.lines.scale.reshape(*e.n_channels, -1)
+                total += _of_response(J, left, size, e.reach, e.line_noise)
             else:
                 left = left / np.sqrt(1 - leverage(J, Q))
                 total += (J * local_power(left, e)) @ J.T
@@ -166,36 +171,37 @@ def _of_stamps(
     return (J * np.tile(power, len(e.y))) @ J.T, 0 if delta is None else len(delta)
 
 
-def _of_response(J: FloatArray, residual: FloatArray, e: SpectralExperiment) -> FloatArray:
-    """What the noise of a response makes of the gradient, (P, P).
+def _of_response(
+    J: FloatArray, residual: FloatArray, scale: FloatArray, reach: int, noise: LineNoise | None
+) -> FloatArray:
+    """What the noise of a response makes of the gradient, (P, P); its errors (outputs, inputs, K)
+    were multiplied by the ``scale``.
 
     Its size is each line's own, divided by what the fit leaves of it (MacKinnon and White's HC3, J.
     Econometrics 29, 1985): a resonance that few lines tell has noise like none of its neighbours.
     Within the ``reach`` of a line noise goes together as it does on average, or, where that is
     known, as the local models that made the response take it from the outputs' lines.
     """
-    error = residual.view(complex)
+    error, lines = residual.view(complex), scale.shape[-1]
     at = J[:, ::2] + 1j * J[:, 1::2]
-    if e.line_noise is not None:
-        p, m = e.n_channels
-        scale = e.lines.scale.reshape(p, m, -1)
+    if noise is not None:
         # noise moves denominators, and what is left is larger than its first order says
-        told = float((scale**2 * e.line_noise.variance).sum())
+        told = float((scale**2 * noise.variance).sum())
         wider = max(float(residual @ residual) / told, 1.0) if told > 0 else 1.0
-        return wider * e.line_noise.along(at.reshape(len(at), p, m, -1) * scale)
+        return wider * noise.along(at.reshape(len(at), *scale.shape) * scale)
     gram = J @ J.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
     lever = np.einsum("ak,ab,bk->k", at.conj(), half, at).real / 2
     left = error / np.maximum(1 - lever, 0.1)
     total: FloatArray = (np.abs(left) ** 2 * at.conj() @ at.T).real / 2
-    if not e.reach:
+    if not reach:
         return total
-    each = left.reshape(-1, e.n_lines)
+    each = left.reshape(-1, lines)
     local = np.sqrt(np.maximum(local_mean(np.abs(each) ** 2), 1e-300))
     unit, here = each / local, at.reshape(len(at), *each.shape) * local
     total = (here.conj().reshape(len(at), -1) @ here.reshape(len(at), -1).T).real / 2
-    for d in range(1, min(e.reach, e.n_lines - 1) + 1):
+    for d in range(1, min(reach, lines - 1) + 1):
         # lines far apart in the window share little of it: Bartlett's taper
         share = np.mean(unit[:, :-d] * unit[:, d:].conj())
         pairs = (here[..., :-d].conj().reshape(len(at), -1) * share) @ here[..., d:].reshape(
@@ -203,6 +209,27 @@ def _of_response(J: FloatArray, residual: FloatArray, e: SpectralExperiment) -> 
         ).T
         total += (pairs + pairs.conj().T).real / 2
     return total
+
+
+def _of_logarithms(
+    objective: Objective, x: FloatArray, alone: FloatArray | None
+) -> FloatArray | None:
+    """The same of logarithms of responses, whose errors are those of the responses, in their phase
+    and as parts of them.
+    """
+    try:
+        realisation = objective.structure.realise(x)
+        noise_at = realisation if alone is None else objective.structure.realise(alone)
+    except Exception:  # the user's function may raise anything
+        return None
+    total = np.zeros((len(x), len(x)))
+    for e in objective.experiments:
+        assert isinstance(e, LogResponse)
+        rows = [e.at(noise_at).residual, *e.at(realisation).jacobian(None)]
+        turned = (np.array(rows).view(complex) * e.turn.ravel()).view(float)
+        scale = np.asarray(e.weight / np.abs(e.measured))
+        total += _of_response(turned[1:], turned[0], scale, e.reach, e.line_noise)
+    return total if np.isfinite(total).all() else None
 
 
 def projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
