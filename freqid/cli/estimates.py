@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter as Option
 
 import freqid as fq
-from freqid.checks import InputError, whole
+from freqid.checks import InputError
 from freqid.cli.fleets import engine, matching
 from freqid.cli.options import Asked, Force, Reading, Search
 from freqid.cli.plants import TEMPLATE, pairs
@@ -27,7 +27,7 @@ def fit(
     asked: Asked,
     reading: Reading = USUAL_READING,
     search: Search = USUAL_SEARCH,
-    decimate: float = 1,
+    decimate: float = 1.0,
     keep_input: bool = False,
     domain: Literal["frequency", "time"] = "frequency",
     initial_state: Literal["estimate", "zero", "steady"] = "estimate",
@@ -71,11 +71,12 @@ def fit(
     if conditions:
         record = record.with_conditions(**pairs("--conditions", conditions))
         other = other and other.with_conditions(**record.conditions)
-    factor = whole("--decimate", decimate)
-    if factor != 1:
+    if not decimate.is_integer():
+        raise InputError(f"--decimate={decimate:g}: expected a whole number of samples")
+    if decimate != 1:
         if not isinstance(record, fq.Record):
             raise InputError("--decimate is for records; a response has no samples")
-        record = record.decimate(factor, keep_input=keep_input)
+        record = record.decimate(int(decimate), keep_input=keep_input)
     plant, model = asked.plant(), asked.model
     what = repr(record)[1:-1]
     with progress() as bar:

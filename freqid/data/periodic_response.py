@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import ComplexArray, InputError, numbers, whole
+from freqid.checks import ComplexArray, InputError, finite, numbers, whole
 from freqid.data.entries import frozen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
@@ -24,7 +24,7 @@ class PeriodicResponse(FrequencyResponse):
         noise: covariance of these means, outputs first, (E, K, outputs + inputs, the same).
         freedom: degrees of freedom of that.
         settled: how often chance makes the first of the periods differ so much from the others,
-            which a transient does, too; NaN where that is not known.
+            which a transient does, too; None where that is not known.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it is the sample maximum
     likelihood (Pintelon and Schoukens, System Identification, 2012, section 9.11). Made by
@@ -35,7 +35,7 @@ class PeriodicResponse(FrequencyResponse):
     outputs: ComplexArray
     noise: ComplexArray
     freedom: int
-    settled: float
+    settled: float | None
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class PeriodicResponse(FrequencyResponse):
         outputs: Any = None,
         noise: Any = None,
         freedom: int = 0,
-        settled: float = float("nan"),
+        settled: float | None = None,
     ) -> None:
         super().__init__(
             frequency, response, dt, hold, variance, coherence, input_spectrum, input_names,
@@ -74,7 +74,8 @@ class PeriodicResponse(FrequencyResponse):
                 raise InputError(f"{name} must be finite")
         self.__dict__.update(
             inputs=frozen(U), outputs=frozen(Y), noise=frozen(C),
-            freedom=whole("freedom", freedom), settled=float(settled),
+            freedom=whole("freedom", freedom),
+            settled=None if settled is None else finite("settled", settled),
         )  # fmt: skip
 
     @that_follows

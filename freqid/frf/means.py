@@ -130,8 +130,8 @@ def periodic(
         raise InputError(f"input has no energy in band={limits}; widen it")
     mean, noise, freedom = means([each.at(excited) for each in found], first.n_outputs)
     spectra = [_amplitudes(r.outputs, n, skip, P) for r in sets if isinstance(r, Record)]
-    chances = [settled(Y[..., excited]) for Y in spectra]
-    chance = min(np.nanmin(chances) * len(chances), 1.0) if P > 2 and chances else np.nan
+    told = [c for Y in spectra if (c := settled(Y[..., excited])) is not None]
+    chance = min(min(told) * len(told), 1.0) if told else None
     return _packed(first, f[excited], mean, noise, freedom, chance)
 
 
@@ -200,7 +200,7 @@ def _packed(
     mean: ComplexArray,
     C: ComplexArray,
     freedom: int,
-    chance: float,
+    chance: float | None,
 ) -> PeriodicResponse:
     p = first.n_outputs
     Y, U = np.moveaxis(mean[:, :p], 0, 1), np.moveaxis(mean[:, p:], 0, 1)  # (channels, E, K)

@@ -12,10 +12,10 @@ from freqid.frf.noise_of_means import FREEDOM
 _ROUNDING = 1e-12
 
 
-def settled(outputs: ComplexArray) -> float:
+def settled(outputs: ComplexArray) -> float | None:
     """How often chance makes the first period differ so much from the mean of the others.
 
-    Args: spectra of each period (P, outputs, K). NaN where there are too few to tell their noise.
+    Args: spectra of each period (P, outputs, K). None where there are too few to tell their noise.
 
     What dies away is largest in the first, and at the lines next to the mode that it belongs to:
     each line and all of them together are asked (F tests; neighbours lend one another their noise,
@@ -23,7 +23,7 @@ def settled(outputs: ComplexArray) -> float:
     """
     P, _, K = outputs.shape
     if P < 3 or not K:
-        return float("nan")
+        return None
     rest = outputs[1:]
     mean = rest.mean(axis=0)
     own = (np.abs(rest - mean) ** 2).sum(axis=0) / (P - 2)

@@ -136,7 +136,7 @@ class Model(ABC):
             raise InputError(
                 f"omega has shape {at.shape}; expected finite frequencies (rad/s), (K,)"
             )
-        if hold == "bl":
+        if isinstance(hold, str) and hold == "bl":
             hold = BandLimited()
         if hold is not None and not isinstance(hold, Hold):
             raise InputError(

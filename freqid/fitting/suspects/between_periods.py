@@ -30,17 +30,18 @@ def beyond_noise(minimum: Minimum) -> list[Finding]:
     periodic = [e for e in experiments if isinstance(e, PeriodicExperiment)]
     if len(periodic) < len(experiments) or minimum.exact:
         return []
-    chance = min((e.data.settled for e in periodic if e.data.settled >= 0), default=1.0)
+    told = [e.data.settled for e in periodic if e.data.settled is not None]
+    chance = min(told, default=1.0)
     if chance < _SETTLED:
         return [Finding("transient", f"{_TRANSIENT} (p = {chance:.2g}); {_CURE}", p_value=chance)]
     expected = sum(e.n_rows * e.level for e in periodic)
     rows = minimum.objective.n_rows
     # neighbours that share a covariance are no more than have told it
-    told = sum(2.0 * e.n_means for e in periodic)
+    free = sum(2.0 * e.n_means for e in periodic)
     if rows <= len(minimum.x) or not 0 < expected < np.inf:
         return []
     ratio = minimum.solution.cost / (expected * (1 - len(minimum.x) / rows))
-    p = float(scipy.special.fdtrc(rows - len(minimum.x), told, ratio))
+    p = float(scipy.special.fdtrc(rows - len(minimum.x), free, ratio))
     if ratio < _MORE or p > _LEVEL:
         return []
     text = (

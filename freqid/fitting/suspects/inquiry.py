@@ -52,6 +52,8 @@ _SURE = 1e-6
 _SMALL, _HARMLESS = 0.3, 1e-3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
+# part of what is left that is most of it
+_MOST = 0.5
 # the files whose suspects are known
 _KNOWN = (changing, measurement, nonlinear, plant)
 # level at which all suspects together speak of good data
@@ -222,8 +224,8 @@ class Inquiry:
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""
         moves = a.test.largest_change > _HARMLESS
-        # a constant is much of the data, and tells nothing
-        energy = scene.moving
+        # a constant is much of the data, and tells nothing of what explains most of the rest
+        energy = scene.moving if a.test.gain > _MOST * scene.cost else scene.energy
         little = a.test.gain < _NOTHING * energy and scene.cost < _QUIET * energy
         return bool(little and not moves)
 
