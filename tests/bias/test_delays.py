@@ -30,6 +30,7 @@ def test_what_data_show_is_the_held_response_behind_the_delay(delay):
     np.testing.assert_allclose(seen.response[0, 0], exact, atol=1e-12)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("spectrum", [fq.WhiteSpectrum(), fq.ChirpSpectrum(1, 100)])
 @pytest.mark.parametrize("delay", [4e-3, 4.3e-3])
 def test_the_true_hold_leaves_no_bias(spectrum, delay):
@@ -48,6 +49,7 @@ def test_a_slow_hold_moves_the_delay_as_it_does_in_long_records():
     assert expected["Td"] < 3e-3
 
 
+@pytest.mark.study
 def test_maps_and_designs_know_it():
     table = fq.bias_map(
         plant(), {"1-100": fq.ChirpSpectrum(1, 100)}, [1, 4], ["zoh", None], DT, progress=False

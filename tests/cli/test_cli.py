@@ -43,6 +43,7 @@ def test_the_package_runs_as_a_module_and_shows_notes_once(tmp_path):
     assert "nan" not in shown
 
 
+@pytest.mark.study
 def test_reproduce(tmp_path):
     result = run("reproduce", "--out", tmp_path / "out")
     assert result.returncode == 0, result.stderr

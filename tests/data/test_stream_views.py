@@ -49,6 +49,7 @@ def test_views_are_those_of_the_record(view, block):
     assert dict(loaded.conditions) == dict(held.conditions)
 
 
+@pytest.mark.study
 def test_a_pass_from_the_middle_is_the_rest():
     for seen in (
         stream(),

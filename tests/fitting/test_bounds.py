@@ -185,6 +185,7 @@ def direct(through):
     )
 
 
+@pytest.mark.study
 def test_a_true_value_on_its_bound_is_no_doubt():
     """The data want it beyond in half of the records, by chance, and by two standard errors in one
     of 44; all ended in a doubt.

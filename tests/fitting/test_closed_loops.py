@@ -49,6 +49,7 @@ def test_disturbing_torques_are_no_fault_and_no_bias(torque):
     assert np.median(p) > 0.1, p
 
 
+@pytest.mark.study
 def test_an_input_as_it_is_stays_where_no_feedback_is_seen():
     est = fq.fit(PLANT, disturbed(1, 0.0, 0.0))
     assert any("as it is; reference=True" in note for note in est.notes)

@@ -29,6 +29,7 @@ def late_record(steps, n=460, seed=0):
     return fq.Record(u, y, DT)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("steps", [0, 0.18, 1, 3.4, 7])
 @pytest.mark.parametrize("cut", ["whole", "running", "slow"])
 def test_a_late_plant_is_as_exact_as_one_in_time(steps, cut):
@@ -57,6 +58,7 @@ def test_black_boxes_behind_a_delay(steps, known):
     assert est.fit_percent > 100 - 1e-8
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(4))
 def test_error_bars_and_witness_of_a_delay(seed):
     record = late_record(3.4, 660, seed).with_noise(0.2, seed=seed).slice(0.6, 6.6)
@@ -210,6 +212,7 @@ def test_the_cost_is_smooth_in_a_long_delay(delay):
     assert rough.max() < 0.05 * np.ptp(cost)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("delay", [0.004, 0.213, 0.396])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_delay_of_many_samples_is_found_without_a_start(delay, seed):
@@ -268,6 +271,7 @@ def test_a_delay_that_a_zero_may_take_over_has_no_errors_to_trust():
     assert (late.variance < 10 * own.frequency_response(omega).variance).all()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["white", "chirp"])
 def test_no_delay_at_all_is_a_delay_that_is_told(kind):
     """Its error, far below a sample, is more than half of what is next to zero: "not settled"."""
@@ -288,6 +292,7 @@ def test_no_delay_at_all_is_a_delay_that_is_told(kind):
     assert grades.count("trust") >= 7
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("delay", [0.0013, 0.007])
 @pytest.mark.parametrize("masses", [2, 3])
 def test_one_more_mode_behind_a_delay_is_named(masses, delay):

@@ -147,6 +147,7 @@ def test_an_offset_is_an_unknown(model):
     assert abs(wrong.modes()["frequency"][0] * 2 * np.pi - 20) > 0.1
 
 
+@pytest.mark.study
 def test_the_offset_of_each_record_and_its_error_bars():
     hits = []
     for seed in range(60):

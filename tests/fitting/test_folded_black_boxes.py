@@ -93,6 +93,7 @@ def test_several_channels():
     assert est.cost < 1.2 * (size**2).sum() * len(data.y)
 
 
+@pytest.mark.study
 def test_the_order_is_chosen():
     num, den = PLANTS["resonance"]
     data, _ = record(num, den, np.random.default_rng(0).standard_normal(N), 5, 0.01, 1)

@@ -43,6 +43,7 @@ def forgotten(plant, seed, jitter=0.17, n=1600, noise=0.02):
     return fq.Record(u[::FACTOR], y[::FACTOR], DT * FACTOR)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(4))
 def test_the_hold_is_said_before_a_loop_and_one_more_mode(seed):
     est = fq.fit(motor(), forgotten(motor().with_values(**TRUE), seed))
@@ -74,6 +75,7 @@ def test_a_loop_under_the_right_hold_is_still_a_loop():
     assert "feedback" in [w.kind for w in est.warnings]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("fault", ["hold", "feedthrough"])
 def test_what_one_unknown_of_a_linear_plant_explains_is_no_friction(fault, seed):

@@ -90,6 +90,7 @@ def test_the_file_is_strict_json(tmp_path):
     assert (tmp_path / "est.json").stat().st_size < 20_000
 
 
+@pytest.mark.study
 def test_in_another_process(tmp_path):
     est, path = ESTIMATES["built in"], tmp_path / "est.json"
     est.save(path)

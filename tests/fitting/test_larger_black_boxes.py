@@ -138,6 +138,7 @@ def test_a_half_without_any_mode_is_no_error():
     assert {"frequency", "damping", "time_constant", "in_band"} <= set(modes.columns)
 
 
+@pytest.mark.study
 def test_a_gain_that_changes_is_no_trusted_black_box():
     """Its modes stay where they are: of gains that grow by half 30 of 30 were trusted, 18 % off."""
     w = 2 * np.pi * 6
@@ -243,6 +244,7 @@ def oscillator(omega):
     return 900 / (900 - omega**2 + 3j * omega)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("past", [0.0, 0.9])
 def test_a_mode_of_the_noise_in_a_transfer_function_is_named(past):
     """All were trusted, one of them with a mode that grows."""

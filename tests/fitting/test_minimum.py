@@ -134,6 +134,7 @@ def test_a_prior_that_contradicts_the_data_is_no_noise(weights):
     assert est.parameters["std"]["b"] == pytest.approx(std, rel=0.06)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(3))
 def test_poles_that_cancel_leave_the_others_their_errors(seed):
     record = fq.simulate(fq.first_order(b=80, a=60), fq.white_noise(800, seed=seed), 1e-3)

@@ -73,6 +73,7 @@ def test_nor_with_several_channels(seed, stable):
     assert more.cost <= costs[1] * (1 + 1e-9)
 
 
+@pytest.mark.study
 def test_an_unstable_model_says_so(arm):
     est = fq.fit(fq.OutputError(5), arm)
     unstable = [w for w in est.warnings if w.kind == "unstable"]

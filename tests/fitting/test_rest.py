@@ -42,6 +42,7 @@ def test_noise_is_no_motion(pole):
     assert "not at rest" not in said, said
 
 
+@pytest.mark.study
 def test_a_value_that_is_unphysical_by_chance_turns_no_channel():
     """Found: a free mass whose own motion is nearly all, "wrong sign", do not use."""
     u = fq.white_noise(1000, seed=4)

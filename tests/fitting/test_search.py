@@ -199,6 +199,7 @@ def test_the_witness_refuses_the_wrong_hold(plant, slow, hold, verdict):
     assert json.loads(json.dumps(est.to_dict()["witness"]))["verdict"] == verdict
 
 
+@pytest.mark.study
 def test_the_witness_refuses_a_structure_that_is_too_stiff(plant, fast):
     record = fast.with_noise(0.05, seed=1)
     wrong = fq.fit(plant.with_values(d=30).fix("d"), record, band=(10, 80))

@@ -134,6 +134,7 @@ def test_without_data_or_noise_the_table_is_empty_with_its_columns(tmp_path):
         assert list(other.spread.index.names) == ["between", "parameter"]
 
 
+@pytest.mark.study
 def test_experiments_that_share_no_resonance_are_named():
     """A tenth apart, each half a per cent wide: from between them one step tells nothing."""
     for seed in range(4):

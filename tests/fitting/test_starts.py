@@ -70,6 +70,7 @@ def test_scattered_starts_stay_inside_bounds(slow):
         fq.fit(inside, slow, start={"k": 5e6})
 
 
+@pytest.mark.study
 def test_no_step_leaves_the_bounds(plant, slow):
     """Also where the cost outside is lower and a Gauss-Newton step would go there."""
     free = fq.fit(plant, slow, hold="foh", band=BAND)

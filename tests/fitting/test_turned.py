@@ -141,6 +141,7 @@ def test_nothing_is_turned_in_noise_or_where_a_mode_is_missing(seed):
         assert not {"wrong sign", "swapped channels"} & {w.kind for w in est.warnings}
 
 
+@pytest.mark.study
 def test_means_of_periods_of_the_wrong_sign_are_named():
     u = fq.multisine((1, 60), 2, DT, periods=6)
     record = fq.simulate(SPRING, u, DT).with_noise(0.02)
@@ -148,6 +149,7 @@ def test_means_of_periods_of_the_wrong_sign_are_named():
     assert fq.fit(SPRING, means, start=begun(SPRING)).warnings[0].kind == "wrong sign"
 
 
+@pytest.mark.study
 def test_a_log_of_the_wrong_sign_is_named():
     record = measured(SPRING, "white", 0.02).slice(0, 2)
     rng = np.random.default_rng(1)

@@ -22,6 +22,7 @@ def first_said(record, model=LAG):
     return warnings[0].kind if warnings else "none"
 
 
+@pytest.mark.study
 def test_a_delay_where_the_noise_is_weak_is_found_among_lines_where_it_is_strong():
     """Lines count by their noise: those at high frequency tell a delay, the low ones hide it."""
     said = []
@@ -179,6 +180,7 @@ def test_as_many_unknowns_as_values_tell_no_errors():
     assert fq.fit(LAG, enough).verdict.grade == "trust"
 
 
+@pytest.mark.study
 def test_a_limit_of_a_swept_output_is_said_first():
     """To a sweep a limit looks like a direct term and a delay, which were all that was said."""
     u = fq.chirp(1, 50, 6, 2e-3)

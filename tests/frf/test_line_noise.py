@@ -74,6 +74,7 @@ def test_error_bars_of_a_resonance_that_four_lines_tell(estimate):
     assert 0.7 < np.sqrt(np.mean(np.square(size))) < 1.25
 
 
+@pytest.mark.study
 def test_a_sharp_resonance_keeps_its_height_in_noise():
     """Equations with noisy outputs in them flatten it: 1.4 % of damping on average of these 40."""
     model, found = resonance(), []

@@ -41,6 +41,7 @@ def test_a_transient_in_the_periods_is_a_doubt(z, periods, skip):
     assert frf.select((5, 40)).settled == frf.settled
 
 
+@pytest.mark.study
 def test_chances_of_what_has_settled_are_chances():
     """Least of 60: about a sixtieth, and no rounding of an answer without noise."""
     chances = []

@@ -54,6 +54,7 @@ def elsewhere(thing):
     return done.stdout.decode().split()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "model",
     [made_inside("lambda"), made_inside("closure"), made_inside("numpy"), late(), slopes(),

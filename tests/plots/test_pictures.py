@@ -110,6 +110,7 @@ def test_units_and_names_are_on_the_axes(plant, slow, est):
         fq.plot_poles(est, est, labels=["one"])
 
 
+@pytest.mark.study
 def test_ellipses_of_poles_hold_the_scatter(plant, fast):
     """100 runs: 95 % of the poles inside the ellipse told by each."""
     true = plant.to_control().poles()

@@ -98,7 +98,7 @@ def test_frequency_response_to_control_and_back(slow):
     part = frf.select((20, 30))
     assert part.frequency.min() == pytest.approx(20)
     assert part.input_spectrum.shape == (1, 101)
-    with pytest.raises(ValueError, match="hold no frequency"):
+    with pytest.raises(ValueError, match="holds no frequency"):
         frf.select((200, 300))
     with pytest.raises(ValueError, match="increasing"):
         fq.FrequencyResponse([2.0, 1], [1, 1])

@@ -140,7 +140,7 @@ REFUSALS = {
         lambda: fq.fit(fq.OutputError(1), FRF),
         "a sampled model needs a response",
     ),
-    "a band without lines": (lambda: FRF.select((500, 900)), "hold no frequency"),
+    "a band without lines": (lambda: FRF.select((500, 900)), "holds no frequency"),
     "an output that is not there": (lambda: FRF.unit(4), "output=4"),
     "entries of weights": (
         lambda: fq.fit(PLANT, [RECORD, RECORD], weights=["noise"]),

@@ -29,6 +29,7 @@ def velocities(torque):
     return np.array(seen)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(3))
 def test_the_mean_of_the_sign_over_a_sample_tells_the_friction(seed):
     u = 8 * fq.chirp(0.3, 40, duration=N * DT, dt=DT)

@@ -29,6 +29,7 @@ def test_the_level_is_kept(rows, spread, scatter):
     assert np.sum(false) <= 11
 
 
+@pytest.mark.study
 def test_a_single_row():
     found = []
     for seed in range(20):
