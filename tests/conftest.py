@@ -35,7 +35,7 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of a study the first case stands for the others, unless it was asked for by its name."""
+    """Of a study the first of several cases runs, unless all were asked for, or it by its name."""
     if config.getoption("--studies") or any("::" in arg for arg in config.args):
         return
     seen, kept, left = set(), [], []

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError
@@ -59,9 +60,9 @@ class StampedRecord(Record):
             steps = np.diff(time)
             period = float(np.median(steps)) if len(steps) else 0.0
             if period > 0:
-                # of a normal variable, and a step has two ends
-                off = 1.4826 * float(np.median(np.abs(steps - period))) / np.sqrt(2)
-                worst = max(worst, off / period)
+                # a step has two ends
+                off = scipy.stats.median_abs_deviation(steps, scale="normal") / np.sqrt(2)
+                worst = max(worst, float(off) / period)
         return worst
 
     def regular(self) -> Record:
