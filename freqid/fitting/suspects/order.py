@@ -62,11 +62,12 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         equal.sort(key=lambda a: likely.index(a.name))
         ranked = [*equal, *(a for a in ranked if a not in equal)]
     if ranked[0].name == "another mode":
-        enough = _AS_MUCH * np.array([ranked[0].test.gain, evidence(scene, ranked[0])])
-        # where lines count by their own noise, what is left of all tells less than evidence does
-        told = [np.array([a.test.gain, evidence(scene, a)]) >= enough for a in ranked[1:]]
-        as_much = [a for a, more in zip(ranked[1:], told, strict=True) if more.any()]
-        simple = [a for a in as_much if a.name not in _NARROW]
+        enough = _AS_MUCH * ranked[0].test.gain
+        simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name not in _NARROW]
+        # a wrong hold leaves what no hold explains as well; its evidence tells how sure it is
+        sure = _AS_MUCH * evidence(scene, ranked[0])
+        held = [a for a in ranked[1:] if a.name == "hold rejected" and evidence(scene, a) >= sure]
+        simple += [a for a in held if a not in simple]
         ranked = [*simple, *(a for a in ranked if a not in simple)]
     if ranked[0].name == "unsteady":
         # to a sweep whatever the model lacks is a change between its halves
