@@ -22,6 +22,7 @@ from freqid.checks import (
     sealed,
     whole,
 )
+from freqid.data.argument_order import in_either_order
 from freqid.data.band import Band, chosen
 from freqid.data.conditions import as_conditions
 from freqid.data.entries import frozen, shaped
@@ -43,9 +44,9 @@ class FrequencyResponse:
     Args:
         frequency: increasing, in Hz, (K,).
         response: complex, (outputs, inputs, K), or (K,) for one input and one output.
+        variance: variance of the complex response, shaped like it.
         dt: sample time in s; 0 for a continuous-time response.
         hold: what the input did between its samples; None where it does not apply.
-        variance: variance of the complex response, shaped like it.
         coherence: between 0 and 1, shaped like the response.
         input_spectrum: energy |U|² of each input at the frequencies, (inputs, K): the weight of
             the bias integral (paper, eq. 2).
@@ -65,9 +66,9 @@ class FrequencyResponse:
 
     frequency: FloatArray
     response: ComplexArray
+    variance: FloatArray | None
     dt: float
     hold: Hold | None
-    variance: FloatArray | None
     coherence: FloatArray | None
     input_spectrum: FloatArray | None
     input_names: tuple[str, ...]
@@ -77,13 +78,14 @@ class FrequencyResponse:
     units: Mapping[str, str]
 
     # written by hand: fields hold what was checked, which is less than what may be given
+    @in_either_order
     def __init__(
         self,
         frequency: ArrayLike,
         response: ArrayLike,
+        variance: ArrayLike | None = None,
         dt: float = 0.0,
         hold: Hold | None = None,
-        variance: ArrayLike | None = None,
         coherence: ArrayLike | None = None,
         input_spectrum: ArrayLike | None = None,
         input_names: Sequence[str] | None = None,
@@ -104,8 +106,6 @@ class FrequencyResponse:
                 f"response has shape {G.shape} for {len(f)} frequencies; "
                 "expected (outputs, inputs, frequencies)"
             )
-        if np.ndim(dt):
-            raise InputError("dt is an array; expected a sample time in s: give variance by name")
         if finite("dt", dt) < 0:
             raise InputError(f"dt={dt!r} must be a sample time in s, or 0 for continuous time")
         p, m, K = G.shape

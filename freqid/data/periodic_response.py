@@ -41,9 +41,9 @@ class PeriodicResponse(FrequencyResponse):
         self,
         frequency: Any,
         response: Any,
+        variance: Any = None,
         dt: float = 0.0,
         hold: Any = None,
-        variance: Any = None,
         coherence: Any = None,
         input_spectrum: Any = None,
         input_names: Any = None,
@@ -58,7 +58,7 @@ class PeriodicResponse(FrequencyResponse):
         settled: float | None = None,
     ) -> None:
         super().__init__(
-            frequency, response, dt, hold, variance, coherence, input_spectrum, input_names,
+            frequency, response, variance, dt, hold, coherence, input_spectrum, input_names,
             output_names, reach, conditions, units,
         )  # fmt: skip
         p, m, K = self.response.shape
