@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, TypeVar, cast
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -23,9 +23,9 @@ def in_either_order(made: _Made) -> _Made:
     """
 
     @wraps(made)
-    def told(self: object, *given: Any, **named: Any) -> None:
+    def told(self: object, *given: object, **named: object) -> None:
         first, third, rest = given[:2], given[2:5], given[5:]
-        number = len(third) > 0 and third[0] is not None and np.ndim(third[0]) == 0
+        number = len(third) > 0 and third[0] is not None and np.asarray(third[0]).ndim == 0
         if not number and not (len(third) > 1 and isinstance(third[1], Hold)):
             return made(self, *given, **named)
         if len(third) == len(_OTHER):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -17,6 +18,7 @@ _DENOMINATORS = 64
 _CALM, _FOLLOWING = 0.4, 0.1
 # part of a period that stamps of even ticks are off by, of stamps and of the program that made them
 _STEADY = 0.1
+_EVEN = 0.5
 # a period's and a start's part that rounding hides at best
 _DIGITS, _EXACT = 1e-13, 1e-7
 
@@ -27,7 +29,7 @@ class Clock:
 
     ``jitter`` is the rms distance of the stamps from the line and ``worst`` the largest, both in
     periods; ``missing`` counts samples that never came; ``digit`` in s is what stamps of an even
-    clock were rounded to, 0 where they were not.
+    clock were rounded to, 0 where they were not. An ``even`` clock ticks whatever its stamps say.
     """
 
     stamps: FloatArray
@@ -38,6 +40,7 @@ class Clock:
     worst: float
     missing: int
     digit: float = 0.0
+    even: bool = False
 
     @classmethod
     def of(cls, name: str, stamps: ArrayLike) -> Clock:
@@ -84,13 +87,23 @@ class Clock:
 
     @property
     def calm(self) -> bool:
-        """Whether its stamps are off by so little that its ticks are even."""
-        return bool(self.digit) or self.worst <= _STEADY
+        """Whether its ticks are even: its stamps are off by little, or it is said."""
+        return self.even or bool(self.digit) or self.worst <= _STEADY
 
     @property
     def times(self) -> FloatArray:
         """When the samples were: at even ticks, or of a clock that jitters when its stamps say."""
-        return self.start + self.period * self.number if self.calm else self.stamps
+        return self.ticks if self.calm else self.stamps
+
+    @property
+    def ticks(self) -> FloatArray:
+        """When the samples were if the clock ticks evenly."""
+        return self.start + self.period * self.number
+
+    def ticking(self, earliest: bool) -> Clock:
+        """The same where its ticks are even: amid the stamps, or where these can only be late."""
+        early = float((self.stamps - self.ticks).min()) if earliest else 0.0
+        return dataclasses.replace(self, start=self.start + early, even=True)
 
     @property
     def standard_error(self) -> float:
@@ -121,16 +134,24 @@ def _numbered(t: FloatArray, gaps: FloatArray) -> IntArray:
     if float(np.abs(gaps / period - steps).max()) < _CALM:
         return np.concatenate([[0], np.cumsum(steps)])
     # nothing missing: then no stamp is a whole period off the line through all of them
-    number = np.arange(len(t))
-    line = np.polyfit(number, t, 1)
-    if float(np.abs(t - np.polyval(line, number)).max()) < 0.5 * line[0]:
-        return number
+    every = np.arange(len(t))
+    line = np.polyfit(every, t, 1)
+    if float(np.abs(t - np.polyval(line, every)).max()) < 0.5 * line[0]:
+        return every
     for _ in range(2):
         number = _followed(t, period)
         period, start = np.polyfit(number, t, 1)
     nearest = np.round((t - start) / period).astype(int)
     # the nearest tick, unless two stamps share one
-    return nearest - nearest[0] if (np.diff(nearest) > 0).all() else number
+    number = nearest - nearest[0] if (np.diff(nearest) > 0).all() else number
+    # stamps that are late by more than half a period seem to skip ticks
+    return every if _off(every, t) <= _off(number, t) else number
+
+
+def _off(number: IntArray, t: FloatArray) -> float:
+    """Rms distance of stamps from the line through them, in its periods."""
+    line = np.polyfit(number, t, 1)
+    return float(np.sqrt(np.mean((t - np.polyval(line, number)) ** 2)) / line[0])
 
 
 def _followed(t: FloatArray, period: float) -> IntArray:
@@ -151,8 +172,10 @@ def simple_ratio(slow: Clock, fast: Clock) -> Fraction | None:
     """
     ratio, length = slow.period / fast.period, max(int(slow.number[-1]), 1)
     error = 4 * ratio * np.hypot(slow.standard_error, fast.standard_error)
-    # and no drift is believed that is nothing, or not, that is a tenth of a period
-    allowed = np.clip(error * length, _EXACT, _STEADY * min(1.0, ratio))
+    # and no drift is believed that is nothing, or not, that is a tenth of a period, or half of one
+    # where stamps that are far off tell it
+    most = _EVEN if slow.even or fast.even else _STEADY
+    allowed = np.clip(error * length, _EXACT, most * min(1.0, ratio))
     for denominator in range(1, _DENOMINATORS + 1):
         found = Fraction(round(ratio * denominator), denominator)
         if found > 0 and abs(float(found) - ratio) * length < allowed:

@@ -45,8 +45,12 @@ def record_from_logs(
     reference: ArrayLike | None = None,
     conditions: Mapping[str, float] | None = None,
     offset: float | Literal["estimate"] = 0.0,
+    even: tuple[bool, bool] = (False, False),
+    earliest: bool = False,
 ) -> Record:
-    """The work of ``Record.from_logs``."""
+    """The work of ``Record.from_logs``; clocks of inputs and of outputs that are ``even`` tick so
+    whatever their stamps say, ``earliest`` where these are late at the best.
+    """
     inputs, outputs = samples("u", u), samples("y", y)
     commanded = None if reference is None else samples("reference", reference)
     u_seconds, y_seconds, told = common_seconds(u_time, y_time)
@@ -56,7 +60,7 @@ def record_from_logs(
             raise InputError(f"offset={offset!r}: expected a number of seconds, or 'estimate'")
     else:
         y_seconds = y_seconds - finite("offset", offset)
-    clocks = Clock.of("u_time", u_seconds), Clock.of("y_time", y_seconds)
+    u_clock, y_clock = clocks = Clock.of("u_time", u_seconds), Clock.of("y_time", y_seconds)
     for name, x, clock in (("u", inputs, clocks[0]), ("y", outputs, clocks[1])):
         if len(x) != len(clock.stamps):
             raise InputError(f"{name} has {len(x)} samples and {len(clock.stamps)} time stamps")
@@ -69,7 +73,11 @@ def record_from_logs(
         "input_names": input_names, "output_names": output_names, "units": units,
         "conditions": conditions,
     }  # fmt: skip
-    u_clock, y_clock = clocks
+    if any(even):
+        u_clock, y_clock = clocks = (
+            u_clock.ticking(earliest) if even[0] else u_clock,
+            y_clock.ticking(earliest) if even[1] else y_clock,
+        )
     u_at, y_at = u_clock.times, y_clock.times
     both = max(u_at[0], y_at[0]), min(u_at[-1], y_at[-1])
     shared = [int(((both[0] <= t) & (t <= both[1])).sum()) for t in (u_at, y_at)]

@@ -10,7 +10,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, flag
+from freqid.data.clocks import Clock
 from freqid.data.record import Record
 from freqid.data.selection import as_holds
 from freqid.lti import Hold
@@ -53,17 +54,44 @@ class StampedRecord(Record):
             self.__dict__[name] = array
 
     @property
-    def scatter(self) -> float:
-        """How far stamps are off even ticks, rms in periods, of the worse clock; gaps are none."""
-        worst = 0.0
-        for time in (self.u_time, self.y_time):
-            steps = np.diff(time)
-            period = float(np.median(steps)) if len(steps) else 0.0
-            if period > 0:
-                # a step has two ends
-                off = scipy.stats.median_abs_deviation(steps, scale="normal") / np.sqrt(2)
-                worst = max(worst, float(off) / period)
-        return worst
+    def scatter(self) -> tuple[float, float]:
+        """How far stamps of inputs and of outputs are off even ticks, rms in periods."""
+        return _scatter(self.u_time), _scatter(self.y_time)
+
+    def even(self, inputs: bool = True, outputs: bool = True, earliest: bool = False) -> Record:
+        """The record as if its ``inputs``, its ``outputs`` or both came at even ticks.
+
+        Where a converter was even and only the program that stamped its samples late, which
+        ``est.warnings`` tell: amid the stamps, or before them all where they are late at the best.
+        On a regular grid where the rates fit one.
+
+        >>> u, t = np.sin(np.arange(50.0)), 0.1 * np.arange(50)
+        >>> late = np.abs(np.sin(7 * t)) * 0.04
+        >>> record = Record.from_logs(t, u, t + late, u)
+        >>> type(record).__name__, type(record.even(inputs=False, earliest=True)).__name__
+        ('StampedRecord', 'Record')
+        """
+        from freqid.data.logs import record_from_logs
+
+        return record_from_logs(
+            self.u_time, self.u_logged, self.y_time, self.y_logged, self.hold.name,
+            input_names=self.input_names, output_names=self.output_names, units=self.units,
+            conditions=self.conditions, even=(flag("inputs", inputs), flag("outputs", outputs)),
+            earliest=flag("earliest", earliest),
+        )  # fmt: skip
+
+    def ticking(self, inputs: bool, outputs: bool, earliest: bool) -> StampedRecord:
+        """The same samples at even ticks of their clocks, still at times of their own."""
+        u_time, y_time = (
+            Clock.of(name, time).ticking(earliest).ticks if even else time
+            for name, time, even in (
+                ("u_time", self.u_time, inputs), ("y_time", self.y_time, outputs)
+            )
+        )  # fmt: skip
+        if u_time[0] > y_time[0]:
+            # the first value has been there for the part of a period that the stamps were late
+            u_time = np.concatenate([y_time[:1], u_time[1:]])
+        return self._with(u_time=u_time, y_time=y_time)
 
     def regular(self) -> Record:
         """The record on its regular grid alone, without the stamps."""
@@ -142,6 +170,16 @@ class StampedRecord(Record):
             part, u_time=self.u_time[u], u_logged=self.u_logged[u], y_time=self.y_time[y],
             y_logged=self.y_logged[y],
         )  # fmt: skip
+
+
+def _scatter(time: FloatArray) -> float:
+    steps = np.diff(time)
+    period = float(np.median(steps)) if len(steps) else 0.0
+    if period <= 0:
+        return 0.0
+    # a step has two ends
+    off = scipy.stats.median_abs_deviation(steps, scale="normal") / np.sqrt(2)
+    return float(off) / period
 
 
 def _fields(record: Record) -> dict[str, Any]:

@@ -215,7 +215,6 @@ def _estimate(
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
         # what rounding leaves wants nothing
         wanted=values[:count] if minimum.exact else (minimum.unbounded * structure.scale)[:count],
-        scatter=max(getattr(r.data, "scatter", 0.0) for r in readings),
     )
     return Estimate(
         model=model,

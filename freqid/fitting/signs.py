@@ -28,8 +28,6 @@ _CONTRADICTED, _LEAST_TAKEN = 3.5, 0.05
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
 _NONE = 0.02
-# and of a period that stamps are off even ticks, rms, from which it matters whose times they are
-_SCATTER = 0.05
 # a response that rounding moves by so much is worth a word beside noise
 _ROUNDED = 1e-6
 
@@ -64,7 +62,6 @@ class Evidence:
     rounding: tuple[float, str] = (0.0, "")
     tied: Sequence[tuple[Parameter, str, float]] = ()
     wanted: FloatArray | None = None
-    scatter: float = 0.0
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -208,20 +205,6 @@ def aliased(e: Evidence) -> Iterator[Finding]:
             "record was decimated, and is folded into what is fitted; use "
             "decimate(factor, keep_input=True), or antialias=True",
             number=e.aliased,
-        )
-
-
-@sign
-def scattered(e: Evidence) -> Iterator[Finding]:
-    """Stamps that are taken for the times of the samples."""
-    if e.scatter > _SCATTER:
-        yield Finding(
-            "stamps",
-            f"stamps are {100 * e.scatter:.2g} % of a sample (rms) off even ticks, and taken for "
-            "the times of the samples; where the sampler was even and only the stamping late that "
-            "is wrong: leave them out, Record(u, y, dt)",
-            "minor",
-            e.scatter,
         )
 
 

@@ -33,6 +33,7 @@ from freqid.fitting.suspects.scores import Asked, Glance, of_several, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import silent, unheard
 from freqid.fitting.suspects.spread import compared
+from freqid.fitting.suspects.ticks import late_stamps
 from freqid.fitting.suspects.turned import turned
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
@@ -188,14 +189,14 @@ class Inquiry:
         scene, named = self.scene, self.named
         if scene is None:
             nothing = unheard(self.minimum, self.model, self.readings)
-            return nothing or self._turned(None)
+            return nothing or turned(self, None) or late_stamps(self.minimum, self.readings)
         if found := silent(scene):
-            return self._turned(scene, quiet=True) or found
+            return turned(self, scene, quiet=True) or found
         if found := leaking(scene, self.model, self._std):
             return found
         if found := begun_in_motion(self.minimum, scene, self.readings):
             return found
-        if turn := self._turned(scene):
+        if turn := turned(self, scene):
             return turn
         if not named:
             return []
@@ -217,9 +218,6 @@ class Inquiry:
         lacking = [a for a in named if a.harm >= LITTLE]
         more = [self._finding(scene, a) for a in lacking if a not in said]
         return [*confirmed(self, scene, said, found), *more]
-
-    def _turned(self, scene: Scene | None, quiet: bool = False) -> list[Finding]:
-        return turned(self, scene, quiet)
 
     def _negligible(self, scene: Scene, a: Asked) -> bool:
         """Whether it is certain only because next to nothing else is left of the data."""

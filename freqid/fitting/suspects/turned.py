@@ -58,7 +58,7 @@ class _Turn:
     back: Callable[[Reading], Reading]
 
 
-def turned(inquiry: Asking, scene: Scene | None, quiet: bool) -> list[Finding]:
+def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Finding]:
     """A finding where the plant explains the data turned back, and them alone, with sense.
 
     Asked where values are not physical, a mode has gone out of sight, or much is left of an
