@@ -8,15 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from freqid.checks import (
-    InputError,
-    choice,
-    flag,
-    had_elsewhere,
-    listed,
-    named_values,
-    whole,
-)
+from freqid.checks import InputError, had_elsewhere, listed, named_values, whole
 from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
@@ -25,6 +17,7 @@ from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.data_notes import notes_of
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fed_back import FED_BACK, fed_back
+from freqid.fitting.fit_options import check_words
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
@@ -128,23 +121,18 @@ def fit(
     >>> round(est["a"], 6), round(est["b"], 6)
     (100.0, 100.0)
     """
-    choice("domain", domain, ("frequency", "time"))
-    choice("initial_state", initial_state, ("estimate", "zero", "steady"))
+    check_words({
+        "domain": domain, "initial_state": initial_state, "n_starts": n_starts, "seed": seed,
+        "start": start, "loss": loss, "error": error, "offset": offset, "reference": reference,
+        "progress": progress,
+    })  # fmt: skip
+    fitter_of(model)
     asked_model, near, meant = model, isinstance(start, Near), getattr(start, "meant", None)
     start = None if start is None else named_values("start", start)
-    auto = isinstance(n_starts, str) and n_starts == "auto"
-    count = None if auto else whole("n_starts", n_starts, most=_STARTS)
-    whole("seed", seed, least=0)
-    fitter_of(model)
-    choice("loss", loss, ("linear", "huber"))
-    choice("error", error, ("linear", "log"))
-    if offset is not None:
-        choice("offset", offset, ("estimate",))
-    if not isinstance(reference, bool):
-        choice("reference", reference, ("auto",))
+    auto = isinstance(n_starts, str)
+    count = None if auto else whole("n_starts", n_starts)
     passed: list[str] = []
     asked_hold = hold
-    flag("progress", progress)
     if isinstance(data, Stream):
         band = data.band if band is None else band
         data, told, hold = _in_one_pass(data, hold, band, progress, {
@@ -216,10 +204,6 @@ def fit(
     given |= {"reference": True, "separate": own, "progress": progress}
     through = fit(asked_model, given_sets, **given)
     return dataclasses.replace(through, notes=[FED_BACK, *through.notes])
-
-
-# starts that may be asked for: more would never end
-_STARTS = 100_000
 
 
 def _in_one_pass(

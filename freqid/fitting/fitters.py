@@ -50,22 +50,23 @@ def fits(kind: type, black_box: bool = False) -> Callable[[F], F]:
 
     def mark(function: F) -> F:
         def checked(model: object, readings: Sequence[Reading], options: SearchOptions) -> Estimate:
-            if options.start is not None:
-                raise InputError(
-                    "start has no meaning for a black box, which needs none; leave it out"
-                )
-            if options.separate:
-                raise InputError("separate needs a GreyBox: a black box has no parameters")
-            if options.estimated_hold:
-                raise InputError(
-                    "hold='estimate' needs a GreyBox; a black box can imitate any delay"
-                )
+            without_parameters(options)
             return function(model, readings, options)
 
         FITTERS[kind] = checked if black_box else function
         return function
 
     return mark
+
+
+def without_parameters(options: SearchOptions) -> None:
+    """ValueError for what only a model with parameters has a use for."""
+    if options.start is not None:
+        raise InputError("start has no meaning for a black box, which needs none; leave it out")
+    if options.separate:
+        raise InputError("separate needs a GreyBox: a black box has no parameters")
+    if options.estimated_hold:
+        raise InputError("hold='estimate' needs a GreyBox; a black box can imitate any delay")
 
 
 def fitter_of(model: object) -> Fitter:

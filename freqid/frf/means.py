@@ -96,8 +96,8 @@ def periodic(
             "that each began anew by etfe"
         )
         raise InputError(
-            f"records hold {min(counts) + skip} periods of {n * first.dt:g} s, {skip} of them "
-            "skipped; two are needed to tell the noise"
+            f"records hold {min(counts) + skip} periods of {n * first.dt:g} s ({n} samples), "
+            f"{skip} of them skipped; two are needed to tell the noise"
             + (join if len(sets) > first.n_inputs and not skip else "")
         )
     if len(sets) < first.n_inputs:

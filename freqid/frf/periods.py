@@ -79,9 +79,10 @@ def check_period(name: str, x: FloatArray, n: int, period: float) -> None:
 
 def _repeats(x: FloatArray, n: int) -> float:
     """Part of a signal's power (samples, channels) that n samples repeat; about 0 for noise."""
-    rows = x[: len(x) // n * n].reshape(-1, n, x.shape[1])
-    P, power = len(rows), float((rows**2).mean())
-    if P < 2 or not power:
+    P = len(x) // n
+    rows = x[: P * n].reshape(P, n, x.shape[1])
+    power = float((rows**2).mean()) if P >= 2 else 0.0
+    if not power:
         return 0.0
     share = float((rows.mean(axis=0) ** 2).mean()) / power
     return (P * share - 1) / (P - 1)

@@ -190,6 +190,8 @@ def simulate(
     x0 = np.zeros(n) if initial_state is None else numbers("initial_state", initial_state)
     if x0.shape != (n,):
         raise InputError(f"initial_state has shape {x0.shape}; the model has {n} states")
+    if not np.isfinite(x0).all():
+        raise InputError(f"initial_state={initial_state!r:.80} must be finite numbers")
     if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
         raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
     if not plant.dt:

@@ -61,6 +61,22 @@ def test_failures_are_rows(tmp_path):
     assert table["a"].isna().tolist() == [False, True, True, True]
 
 
+@pytest.mark.parametrize("verdicts", [True, False])
+def test_a_fleet_of_which_nothing_could_be_fitted_has_the_columns_of_one_that_could(
+    tmp_path, verdicts
+):
+    asked = {"verdicts": verdicts, "n_jobs": 1}
+    good = fq.fit_many(LAG, runs(2), **asked)
+    path = tmp_path / "t.parquet"
+    for _ in range(2):
+        bad = fq.fit_many(LAG, runs(2), path, band=(1e6, 2e6), **asked)
+        assert list(bad.columns) == list(good.columns)
+        assert bad["a"].isna().all()
+        assert bad["error"].str.contains("Nyquist").all()
+    with pytest.raises(ValueError, match="fewer than three rows"):
+        fq.plot_fleet(bad, "a")
+
+
 def test_processes_give_the_same_rows(tmp_path):
     records = runs(20, samples=150)
     alone = fq.fit_many(LAG, records, n_jobs=1, verdicts=False)
@@ -210,6 +226,17 @@ def test_what_is_refused(tmp_path):
         fq.fit_many(LAG, runs(1), tmp_path / "t.csv")
     with pytest.raises(ValueError, match="not a model"):
         fq.fit_many("lag", runs(1))
+    for name, value in {
+        "hold": "x", "band": (10, 1), "weights": "loud", "n_starts": 0, "error": "sum",
+        "start": {"c": 1.0}, "seed": "a", "initial_state": "w", "reference": "w",
+        "separate": "c", "offset": "w", "domain": "z", "loss": "l1",
+    }.items():  # fmt: skip
+        # the records are not looked at, so that their rows cannot say it one by one
+        with pytest.raises(ValueError, match=f"^{name}"):
+            fq.fit_many(LAG, ["no such file.csv"], tmp_path / "t.parquet", **{name: value})
+    for name, value in {"hold": "estimate", "start": {"a": 1.0}, "separate": "a"}.items():
+        with pytest.raises(ValueError, match=rf"^{name}.*black box"):
+            fq.fit_many(fq.OutputError(1), ["no such file.csv"], **{name: value})
     (tmp_path / "t.parquet").write_text("no table")
     with pytest.raises(ValueError, match=r"t\.parquet"):
         fq.fit_many(LAG, runs(1), tmp_path / "t.parquet")

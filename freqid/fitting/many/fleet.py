@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
 from freqid.data import Bar, FrequencyResponse, Record, configured, every_core, read, unordered
 from freqid.fitting.entry import fit
-from freqid.fitting.fitters import fitter_of
+from freqid.fitting.fit_options import check_options
 from freqid.fitting.many.identity import fingerprint
 from freqid.fitting.many.known import Known, prints_of
 from freqid.fitting.many.rows import (
     Row,
     Source,
     Task,
-    columns_of_rows,
     free_of_columns,
+    in_columns,
     lost_rows,
     rows_of,
 )
@@ -80,7 +80,8 @@ def fit_many(
     [100.0, 100.0, 100.0]
     """
 
-    fitter_of(model)
+    options = _checked("option", fit, fit_options)
+    check_options(model, options)
     processes(n_jobs)
     flag("verdicts", verdicts)
     if progress is not None:
@@ -94,13 +95,13 @@ def fit_many(
     free_of_columns(model)
     task = Task(
         model,
-        _checked("option", fit, fit_options),
+        options,
         _checked("reading", read, named_values("reading", reading)),
         verdicts,
     )
     if path is None:
         tables = list(_fitted_in_chunks(task, list(named.items()), size, n_jobs, progress, 0))
-        return _joined(tables, named)
+        return _joined(tables, named, task)
     prints = prints_of(model, named)
     store = TableStore(path, fingerprint(task), "other fits")
     known = Known(named, prints, store)
@@ -117,7 +118,7 @@ def fit_many(
             store.keep(number, table, {name: prints[name] for name in table["name"]})
             kept.append(table)
             number += 1
-        whole_table = _joined(kept, named)
+        whole_table = _joined(kept, named, task)
         store.finish(whole_table, prints)
     return whole_table
 
@@ -151,7 +152,9 @@ def _fitted_in_chunks(
             advance(len(jobs[at]))
 
 
-def _joined(tables: Sequence[pd.DataFrame], named: Mapping[str, Source]) -> pd.DataFrame:
+def _joined(
+    tables: Sequence[pd.DataFrame], named: Mapping[str, Source], task: Task
+) -> pd.DataFrame:
     """The rows of all chunks, in the order of the records."""
     import pandas as pd
 
@@ -159,7 +162,7 @@ def _joined(tables: Sequence[pd.DataFrame], named: Mapping[str, Source]) -> pd.D
     table = pd.concat(tables, ignore_index=True).infer_objects()
     order = {name: i for i, name in enumerate(named)}
     table = table.sort_values("name", key=lambda names: names.map(order), ignore_index=True)
-    return table[columns_of_rows(table)]
+    return in_columns(table, task)
 
 
 def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source]:

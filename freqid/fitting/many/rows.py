@@ -31,6 +31,8 @@ _SAID = (
     "cost", "fit_percent", "converged", "verdict", "witness", "warnings", "seconds", "error"
 )  # fmt: skip
 
+_OF_VERDICTS = ("verdict", "witness", "warnings")
+
 # the reason of a row without a process, and how reasons begin that may be others the next time
 _ENDED = "the process that computed it was ended: out of memory, or by the plant"
 _PASSING = (
@@ -152,10 +154,17 @@ def _told(name: str, error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-def columns_of_rows(table: pd.DataFrame) -> list[str]:
-    """Name first, parameters, then what is said of the fit."""
+def in_columns(table: pd.DataFrame, task: Task) -> pd.DataFrame:
+    """Name first, parameters, then what is said of the fit, also where none was possible."""
+    if "cost" not in table.columns:
+        names = (
+            [p.name for p in task.model.free_parameters] if isinstance(task.model, GreyBox) else []
+        )
+        said = [c for c in _SAID if task.verdicts or c not in _OF_VERDICTS]
+        missing = [*names, *(f"{n}_std" for n in names), *said]
+        table = table.assign(**{c: np.nan for c in missing if c not in table.columns})
     parameters = [c for c in table.columns if c not in ("name", *_SAID)]
-    return ["name", *parameters, *(c for c in _SAID if c in table.columns)]
+    return table[["name", *parameters, *(c for c in _SAID if c in table.columns)]]
 
 
 def free_of_columns(model: object) -> None:

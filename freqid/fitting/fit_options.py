@@ -1,0 +1,68 @@
+"""Options of ``fit`` as far as they can be checked without data: the words, and the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from freqid.checks import InputError, choice, flag, listed, named_values, unknown, whole
+from freqid.data import as_band
+from freqid.fitting.fitters import SearchOptions, fitter_of, without_parameters
+from freqid.fitting.grey_box import checked_start
+from freqid.fitting.noise_models import NoiseModel
+from freqid.lti import as_hold
+from freqid.models import GreyBox
+
+# keyword arguments of ``fit``, by name
+Options = Mapping[str, Any]
+
+# starts that may be asked for: more would never end
+_STARTS = 100_000
+_WORDS = {
+    "domain": ("frequency", "time"),
+    "initial_state": ("estimate", "zero", "steady"),
+    "loss": ("linear", "huber"),
+    "error": ("linear", "log"),
+}
+
+
+def check_words(options: Options) -> None:
+    """ValueError for a value that means nothing, whatever model and data."""
+    for name, words in _WORDS.items():
+        if name in options:
+            choice(name, options[name], words)
+    count = options.get("n_starts", "auto")
+    if not (isinstance(count, str) and count == "auto"):
+        whole("n_starts", count, most=_STARTS)
+    whole("seed", options.get("seed", 0), least=0)
+    named_values("start", options.get("start"))
+    if options.get("offset") is not None:
+        choice("offset", options["offset"], ("estimate",))
+    reference = options.get("reference", "auto")
+    if not isinstance(reference, bool):
+        choice("reference", reference, ("auto",))
+    flag("progress", options.get("progress", False))
+
+
+def check_options(model: object, options: Options) -> None:
+    """ValueError for what no data could make right for this model: a fleet is not begun with it."""
+    fitter_of(model)
+    check_words(options)
+    as_band(options.get("band"))
+    hold = options.get("hold")
+    for each in hold.values() if isinstance(hold, Mapping) else (hold,):
+        if each is not None and not (isinstance(each, str) and each == "estimate"):
+            as_hold(each, 1.0)
+    if isinstance(options.get("weights"), str):
+        choice("weights", options["weights"], tuple(NoiseModel.named))
+    own = options.get("separate", ())
+    separate = (own,) if isinstance(own, str) else tuple(listed("separate", own))
+    start = options.get("start")
+    if not isinstance(model, GreyBox):
+        estimated = isinstance(hold, str) and hold == "estimate"
+        without_parameters(SearchOptions(start=start, separate=separate, estimated_hold=estimated))
+        return
+    checked_start(model, start)
+    for name in separate:
+        if name not in model.values:
+            raise InputError(unknown("separate", name, model.values))
