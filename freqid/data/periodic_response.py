@@ -23,6 +23,7 @@ class PeriodicResponse(FrequencyResponse):
             experiments.
         noise: covariance of these means, outputs first, (E, K, outputs + inputs, the same).
         freedom: degrees of freedom of that.
+        pooled: neighbouring lines whose scatter was taken together for that.
         settled: how often chance makes the first of the periods differ so much from the others,
             which a transient does, too; None where that is not known.
 
@@ -35,6 +36,7 @@ class PeriodicResponse(FrequencyResponse):
     outputs: ComplexArray
     noise: ComplexArray
     freedom: int
+    pooled: int
     settled: float | None
 
     def __init__(
@@ -56,6 +58,7 @@ class PeriodicResponse(FrequencyResponse):
         noise: Any = None,
         freedom: int = 0,
         settled: float | None = None,
+        pooled: int = 1,
     ) -> None:
         super().__init__(
             frequency, response, variance, dt, hold, coherence, input_spectrum, input_names,
@@ -74,7 +77,7 @@ class PeriodicResponse(FrequencyResponse):
                 raise InputError(f"{name} must be finite")
         self.__dict__.update(
             inputs=frozen(U), outputs=frozen(Y), noise=frozen(C),
-            freedom=whole("freedom", freedom),
+            freedom=whole("freedom", freedom), pooled=whole("pooled", pooled),
             settled=None if settled is None else finite("settled", settled),
         )  # fmt: skip
 
@@ -91,10 +94,11 @@ class PeriodicResponse(FrequencyResponse):
         more: dict[str, Any] = {
             "inputs": self.inputs[..., at], "outputs": self.outputs[..., at],
             "noise": self.noise[:, at], "freedom": self.freedom, "settled": self.settled,
+            "pooled": self.pooled,
         }  # fmt: skip
         return PeriodicResponse(**kept.__dict__, **more)
 
     def plain(self) -> FrequencyResponse:
         """The response alone, its means and their noise left out."""
-        own = ("inputs", "outputs", "noise", "freedom", "settled")
+        own = ("inputs", "outputs", "noise", "freedom", "settled", "pooled")
         return FrequencyResponse(**{k: v for k, v in self.__dict__.items() if k not in own})

@@ -128,11 +128,11 @@ def periodic(
         excited &= ~folded
     if not excited.any():
         raise InputError(f"input has no energy in band={limits}; widen it")
-    mean, noise, freedom = means([each.at(excited) for each in found], first.n_outputs)
+    mean, noise, pooled = means([each.at(excited) for each in found], first.n_outputs)
     spectra = [_amplitudes(r.outputs, n, skip, P) for r in sets if isinstance(r, Record)]
     told = [c for Y in spectra if (c := settled(Y[..., excited])) is not None]
     chance = min(min(told) * len(told), 1.0) if told else None
-    return _packed(first, f[excited], mean, noise, freedom, chance)
+    return _packed(first, f[excited], mean, noise, P, pooled, chance)
 
 
 def _experiments(
@@ -199,7 +199,8 @@ def _packed(
     f: FloatArray,
     mean: ComplexArray,
     C: ComplexArray,
-    freedom: int,
+    periods: int,
+    pooled: int,
     chance: float | None,
 ) -> PeriodicResponse:
     p = first.n_outputs
@@ -223,6 +224,6 @@ def _packed(
         variance=np.moveaxis(variance, 0, -1),
         input_spectrum=(np.abs(U) ** 2).mean(axis=1),
         input_names=first.input_names, output_names=first.output_names,
-        inputs=U, outputs=Y, noise=C, freedom=freedom, conditions=first.conditions,
-        units=units_of(first), settled=chance,
+        inputs=U, outputs=Y, noise=C, freedom=(periods - 1) * pooled, pooled=pooled,
+        conditions=first.conditions, units=units_of(first), settled=chance,
     )  # fmt: skip

@@ -59,7 +59,7 @@ class PeriodMeans:
 
 def means(sets: Sequence[PeriodMeans], p: int) -> tuple[ComplexArray, ComplexArray, int]:
     """Means (E, channels, K) of experiments of as many periods, their covariance (E, K, channels,
-    channels) and its freedom; the first ``p`` channels are outputs.
+    channels) and of how many lines each is; the first ``p`` channels are outputs.
 
     With few periods lines beside one lend it their noise. What the outputs do beside the plant's
     answer to the inputs, Y − G U, is as smooth as they are; in a loop the noise of Y and of U alone
@@ -80,7 +80,7 @@ def means(sets: Sequence[PeriodMeans], p: int) -> tuple[ComplexArray, ComplexArr
     # what does not scatter at all is still rounded
     rounding = (np.finfo(float).eps * np.abs(mean).max(axis=-1)) ** 2  # (E, channels)
     C = C + rounding[:, None, :, None] * np.eye(channels)
-    return mean, C, (P - 1) * width
+    return mean, C, width
 
 
 def _ratio(mean: ComplexArray, p: int) -> ComplexArray:

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from freqid.checks import FloatArray, InputError, an, whole
+from freqid.checks import FloatArray, InputError, whole
 from freqid.data import (
     Band,
     DataSet,
     FrequencyResponse,
-    PeriodicResponse,
     Record,
     StampedRecord,
     as_band,
 )
-from freqid.fitting import Estimate, in_order_of, line_errors, met, offset_is_free
+from freqid.fitting import in_order_of, line_errors, met, offset_is_free
 from freqid.lti import Hold
 from freqid.models import ModelLike, as_model
 from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
@@ -233,22 +232,6 @@ def _row(
     }  # fmt: skip
 
 
-def _of_means(est: Estimate, freedom: int) -> dict[str, float]:
-    """The same where the variances are of few periods: a mean of F(2, 2ν), next to normal."""
-    v = min(d.freedom for d in est.data if isinstance(d, PeriodicResponse))
-    if v < 3:
-        raise InputError(f"data have {v} degrees of freedom of their noise; measure more periods")
-    mean, spread = v / (v - 1), np.sqrt(v**3 / ((v - 1) ** 2 * (v - 2)))
-    ratio = 2 * est.cost / freedom / mean
-    z = (ratio - 1) * mean / spread * np.sqrt(freedom / 2)
-    return {
-        "cost": float(est.cost),
-        "expected": freedom / 2 * mean,
-        "ratio": float(ratio),
-        "p_value": float(scipy.stats.norm.sf(z)),
-    }
-
-
 def _correlation(a: FloatArray, b: FloatArray, lags: int) -> FloatArray:
     """Normalised correlation Σ a(t) b(t − τ) for τ from −lags to lags."""
     from scipy.signal import correlate
@@ -257,26 +240,3 @@ def _correlation(a: FloatArray, b: FloatArray, lags: int) -> FloatArray:
     full = correlate(a, b, mode="full", method="fft") / (size if size > 0 else 1)
     middle = len(b) - 1
     return np.asarray(full[middle - lags : middle + lags + 1])
-
-
-def cost_test(est: Estimate) -> dict[str, float]:
-    """Cost of ``est``, a fit with known noise (weights 1/variance), against what that explains.
-
-    2·V is then chi-square with as many degrees of freedom as real values less parameters (Pintelon
-    and Schoukens, 2012, section 11.4.3). Returns cost, expected, ratio and p_value: a small p says
-    that the model is too simple, one next to 1 that the variances are too large. Variances that
-    are estimates themselves, those of ``periodic``, raise what is expected and its scatter: each
-    term is then F-distributed.
-    """
-    an("est", est, Estimate)
-    freedom = max(est.n_rows - len(est.names), 1)
-    if any(isinstance(d, PeriodicResponse) for d in est.data):
-        return _of_means(est, freedom)
-    # a complex error of unit variance has half of it in each of its parts
-    twice = 2 * est.cost
-    return {
-        "cost": float(est.cost),
-        "expected": freedom / 2,
-        "ratio": float(twice / freedom),
-        "p_value": float(scipy.stats.chi2.sf(twice, freedom)),
-    }

@@ -384,6 +384,9 @@ def test_single_periods_are_told_where_they_belong():
     n = len(PERIOD)
     parts = [slice(i * n, (i + 1) * n) for i in range(4)]
     single = [fq.Record(whole.u[part], whole.y[part], DT, hold="bl") for part in parts]
+    # without a word of numpy's beside it
+    with pytest.raises(ValueError, match=r"0 periods of 1000 s \(500000 samples\)"):
+        fq.periodic(measured(0, 3), period=1000.0)
     with pytest.raises(ValueError, match=r"join periods that followed .* by etfe"):
         fq.periodic(single, 1.0)
     joined = fq.Record(*(np.concatenate([getattr(r, x) for r in single]) for x in "uy"), DT)

@@ -52,6 +52,10 @@ def test_a_delay_needs_a_hold_that_keeps_its_value():
 
 
 def test_a_band_limited_input_has_no_beginning():
+    for start in (np.nan, np.inf):
+        # before numpy computes with it, and warns
+        with pytest.raises(ValueError, match=r"initial_state=.* finite"):
+            fq.simulate(LAG, np.ones(20), 0.01, initial_state=[start])
     with pytest.raises(ValueError, match="initial_state has no meaning for a band-limited"):
         fq.simulate(LAG, np.ones(20), 0.01, hold="bl", initial_state=[1.0])
 
