@@ -33,5 +33,6 @@ from freqid.data.running import alone, configured, every_core, in_turn, unordere
 from freqid.data.selection import as_holds, check_hold, flat
 from freqid.data.sources import in_python, source, that_estimates
 from freqid.data.stamped_record import StampedRecord
+from freqid.data.stream_chain import files_of
 from freqid.data.stream_sources import open
 from freqid.data.streams import Stream

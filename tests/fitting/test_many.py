@@ -215,6 +215,43 @@ def test_on_a_cluster(two_workers):
         same(alone, fq.fit_many(LAG, records, n_jobs=2, verdicts=False, chunk=3))
 
 
+def test_a_finished_table_comes_in_the_order_of_the_call(tmp_path):
+    """Or a column that is put beside it belongs to other rows."""
+    records = {f"axis {i}": r for i, r in enumerate(runs(4))}
+    path = tmp_path / "t.parquet"
+    first = fq.fit_many(LAG, records, path, verdicts=False, n_jobs=1)
+    turned = dict(reversed(records.items()))
+    again = fq.fit_many(LAG, turned, path, verdicts=False, n_jobs=1)
+    assert again["name"].tolist() == list(turned)
+    same(first, again[::-1].reset_index(drop=True))
+    with pytest.raises(ValueError, match=r"a row 'axis 3', which is not asked for"):
+        fq.fit_many(LAG, {n: records[n] for n in list(records)[:3]}, path, verdicts=False)
+
+
+@pytest.mark.parametrize("verdicts", [True, False])
+def test_tied_parameters_have_columns_as_they_have_rows(verdicts):
+    plant = LAG.tie(b="2.5 * a")
+    records = [fq.simulate(plant, r.u, r.dt).with_noise(0.05, seed=1) for r in runs(3)]
+    table = fq.fit_many(plant, records, verdicts=verdicts, n_jobs=1)
+    one = fq.fit(plant, records[1]).parameters
+    for name in ("a", "b"):
+        assert table[name][1] == pytest.approx(one["value"][name], rel=1e-6)
+        assert table[f"{name}_std"][1] == pytest.approx(one["std"][name], rel=1e-4)
+
+
+def test_patterns_and_series_name_their_records(tmp_path):
+    for i in (2, 10):
+        fq.write(runs(1)[0], tmp_path / f"run{i}.csv")
+    asked = {"verdicts": False, "n_jobs": 1}
+    table = fq.fit_many(LAG, str(tmp_path / "run*.csv"), **asked)
+    assert [name.rsplit("/")[-1] for name in table["name"]] == ["run2.csv", "run10.csv"]
+    with pytest.raises(FileNotFoundError, match="nothing"):
+        fq.fit_many(LAG, [tmp_path / "nothing*.csv"], **asked)
+    named = fq.fit_many(LAG, pd.Series(runs(2), index=["x", "y"]), **asked)
+    assert named["name"].tolist() == ["x", "y"]
+    assert fq.fit_many(LAG, pd.Series(runs(2)), **asked)["name"].tolist()[0] == "record 0"
+
+
 def test_what_is_refused(tmp_path):
     with pytest.raises(ValueError, match="records"):
         fq.fit_many(LAG, [])
@@ -224,6 +261,10 @@ def test_what_is_refused(tmp_path):
         fq.fit_many(LAG, runs(1), bnad=(1, 2))
     with pytest.raises(ValueError, match=r"\.parquet"):
         fq.fit_many(LAG, runs(1), tmp_path / "t.csv")
+    (tmp_path / "folder.parquet").mkdir()
+    with pytest.raises(ValueError, match="is a folder"):
+        fq.fit_many(LAG, runs(1), tmp_path / "folder.parquet")
+    assert not list(tmp_path.glob(".*"))
     with pytest.raises(ValueError, match="not a model"):
         fq.fit_many("lag", runs(1))
     for name, value in {

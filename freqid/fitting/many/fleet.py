@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
-from freqid.data import Bar, FrequencyResponse, Record, configured, every_core, read, unordered
+from freqid.data import (
+    Bar,
+    FrequencyResponse,
+    Record,
+    configured,
+    every_core,
+    files_of,
+    read,
+    unordered,
+)
 from freqid.fitting.entry import fit
 from freqid.fitting.fit_options import check_options
 from freqid.fitting.many.identity import fingerprint
@@ -55,7 +64,7 @@ def fit_many(
 
     Args:
         model: as in ``fit``.
-        records: Records, FrequencyResponses or paths, or these by name.
+        records: Records, FrequencyResponses, paths or patterns of paths, or these by name.
         path: a .parquet file for the table. Finished rows are safe beside it: asked again after an
             interruption, only what is missing is computed. Another job on the same path is
             refused.
@@ -87,6 +96,8 @@ def fit_many(
     if progress is not None:
         flag("progress", progress)
     path = None if path is None else path_of("path", path)
+    if path is not None and path.is_dir():
+        raise InputError(f"path={str(path)!r} is a folder; give the name of a .parquet file")
     asked = None if chunk is None else whole("chunk", chunk)
     named = _named(records)
     if not named:
@@ -106,11 +117,11 @@ def fit_many(
     store = TableStore(path, fingerprint(task), "other fits")
     known = Known(named, prints, store)
     if (finished := known.finished()) is not None:
-        return finished
+        return _joined([finished], named, task)
     with store:
         # which another job may have finished by now
         if (finished := known.finished()) is not None:
-            return finished
+            return _joined([finished], named, task)
         number = known.begun()
         missing = [(name, named[name]) for name in named if name not in known.names]
         kept = list(known.tables)
@@ -168,16 +179,21 @@ def _joined(
 def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source]:
     if isinstance(records, (str, Path, Record, FrequencyResponse)):
         records = [records]
-    if isinstance(records, Mapping):
-        for name, r in records.items():
+    # a pandas.Series has items, too, whose names are texts or no names
+    items = list(records.items()) if hasattr(records, "items") else []
+    if isinstance(records, Mapping) or (items and all(isinstance(n, str) for n, _ in items)):
+        for name, r in items:
             _source(f"records[{name!r}]", r)
-        each = [(str(name), r) for name, r in records.items()]
+        each = [(str(name), r) for name, r in items]
         if len(dict(each)) < len(each):
             raise InputError("records: two of its names are the same text; names must differ")
         return dict(each)
     named: dict[str, Source] = {}
-    for i, r in enumerate(listed("records", records)):
+    given = listed("records", records)
+    for i, r in enumerate(given):
         _source(f"records[{i}]", r)
+    every = [f for r in given for f in (files_of(r) if isinstance(r, (str, Path)) else [r])]
+    for i, r in enumerate(every):
         name = str(r) if isinstance(r, (str, Path)) else f"record {i}"
         if name in named:
             raise InputError(f"records: {name} is there twice")

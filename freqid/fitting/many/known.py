@@ -69,10 +69,10 @@ class Known:
         """
         for name in table["name"]:
             if name not in self.named:
-                raise self.store.other()
+                raise self.store.other(why=f" (a row {name!r}, which is not asked for)")
             changed = rows.get(name) != self.prints[name]
             if changed and not isinstance(self.named[name], (str, Path)):
-                raise self.store.other()
+                raise self.store.other(why=f" ({name!r} is another record)")
         return all(rows.get(name) == self.prints[name] for name in table["name"])
 
     def _take(self, table: pd.DataFrame, rows: Mapping[str, str]) -> None:

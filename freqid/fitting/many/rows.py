@@ -111,7 +111,8 @@ def _meant(model: object, options: Mapping[str, object]) -> dict[str, float] | N
 
 def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
     """What is said of one record; an error is a row, too."""
-    if done is not None and not task.verdicts:
+    tied = getattr(task.model, "ties", {})
+    if done is not None and not task.verdicts and not tied:
         return _values(done.values, done.std, done.cost, done.fit_percent, True) | {"error": ""}
     try:
         options = dict(task.options)
@@ -121,12 +122,13 @@ def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
             options["start"] = near
         est = fit(task.model, data, **options)  # type: ignore[arg-type]
         uninterrupted(est.message)
-        std = np.sqrt(np.diag(est.covariance_matrix)).tolist()
-        values, errors = est.values.tolist(), dict(zip(est.names, std, strict=True))
-        row = _values(
-            dict(zip(est.names, values, strict=True)), errors, est.cost, est.fit_percent,
-            est.converged,
-        )  # fmt: skip
+        std = np.sqrt(np.diag(est.covariance_matrix))
+        values = dict(zip(est.names, est.values.tolist(), strict=True))
+        errors = dict(zip(est.names, std.tolist(), strict=True))
+        for name in tied:
+            values[name] = float(est.parameters["value"][name])
+            errors[name] = float(est.parameters["std"][name])
+        row = _values(values, errors, est.cost, est.fit_percent, est.converged)
         if task.verdicts:
             row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
             row |= {"warnings": "; ".join(est.warnings)}
@@ -154,12 +156,17 @@ def _told(name: str, error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
+def _named(model: object) -> list[str]:
+    """Parameters that a row has a value of."""
+    if not isinstance(model, GreyBox):
+        return []
+    return [*(p.name for p in model.free_parameters), *model.ties]
+
+
 def in_columns(table: pd.DataFrame, task: Task) -> pd.DataFrame:
     """Name first, parameters, then what is said of the fit, also where none was possible."""
     if "cost" not in table.columns:
-        names = (
-            [p.name for p in task.model.free_parameters] if isinstance(task.model, GreyBox) else []
-        )
+        names = _named(task.model)
         said = [c for c in _SAID if task.verdicts or c not in _OF_VERDICTS]
         missing = [*names, *(f"{n}_std" for n in names), *said]
         table = table.assign(**{c: np.nan for c in missing if c not in table.columns})
@@ -169,7 +176,7 @@ def in_columns(table: pd.DataFrame, task: Task) -> pd.DataFrame:
 
 def free_of_columns(model: object) -> None:
     """ValueError for parameters that are called as a column of the table is."""
-    names = [p.name for p in model.free_parameters] if isinstance(model, GreyBox) else []
+    names = _named(model)
     for name in (*names, *(f"{n}_std" for n in names)):
         if name in ("name", *_SAID):
             raise InputError(

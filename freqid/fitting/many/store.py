@@ -143,15 +143,15 @@ class TableStore:
             raise self.other(path)
         return table, table.attrs.pop(_ROWS, {})
 
-    def other(self, path: Path | None = None) -> InputError:
-        """The error for a file, or chunks, of another job."""
+    def other(self, path: Path | None = None, why: str = "") -> InputError:
+        """The error for a file, or chunks, of another job, and ``why`` it is one."""
         at = self.path if path is None else path
         if at.parent == self.parts or (path is None and not self.path.is_file()):
             return InputError(
-                f"{self.parts} holds {self.what}, not finished; give another path, or remove that "
-                "folder to lose them"
+                f"{self.parts} holds {self.what}{why}, not finished; give another path, or remove "
+                "that folder to lose them"
             )
-        return InputError(f"{at} holds {self.what}; give another path or remove it")
+        return InputError(f"{at} holds {self.what}{why}; give another path or remove it")
 
 
 def _sum_of(path: Path) -> str:
