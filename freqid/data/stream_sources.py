@@ -67,6 +67,10 @@ def open(
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
         found = of_array(source, columns, size, type(source).__name__)
+    elif hasattr(source, "columns"):
+        raise InputError(
+            f"source is a {type(source).__name__}, a table in memory; take Record.from_frame of it"
+        )
     elif callable(source) or isinstance(source, Iterable):
         found = _of_blocks(source, columns)
     else:
@@ -188,6 +192,8 @@ def _chosen(
                 raise InputError(unknown(argument, name, names))
         picked.append(some)
     u, y = picked
+    if both := set(u or []) & set(y or []):
+        raise InputError(f"inputs and outputs share {', '.join(sorted(both))}; a channel is one")
     rest = [n for n in names if n not in (u or []) + (y or [])]
     if u is None and y is None:
         if {"u", "y"} <= set(names):

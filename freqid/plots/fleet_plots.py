@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.plots.style import drawing, ink
-from freqid.validation import LEVEL, fitted_rows, fleet_alarms
+from freqid.validation import FEWEST, LEVEL, fitted_rows, fleet_alarms
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +26,7 @@ def plot_fleet(
     """A parameter over the rows of ``fit_many``, with 95 % intervals and alarms.
 
     Alarms are those of ``fleet_alarms``, at ``level`` for all rows together: so many fleets without
-    a change show one.
+    a change show one. Fewer than three rows are drawn without.
 
     Args:
         table: of ``fit_many``.
@@ -38,8 +38,10 @@ def plot_fleet(
     Returns the axes. Raises ValueError for an unknown column or a table in which nothing was
     fitted.
     """
-    marked = fleet_alarms(table, parameter, by=by, machine=machine, level=level)
     values, std, kept = fitted_rows(table, parameter)
+    marked = np.zeros(len(table), bool)
+    if kept.sum() >= FEWEST:
+        marked = fleet_alarms(table, parameter, by=by, machine=machine, level=level)
     x = np.arange(len(table)) if by is None else table[by].to_numpy()
     names = np.zeros(len(table), int) if machine is None else table[machine].to_numpy()
     with drawing(ax) as axis:

@@ -27,6 +27,8 @@ _LEAST, _FEWEST = 4, 6
 _CUT = 4.0
 # orders that are tried for each unit of one over the level, and numbers in them at the most
 _ORDERS, _NUMBERS = 20, 20_000_000
+# fitted rows that a table has to have to be asked
+FEWEST = 3
 # runs of rows grow by this factor, and borders of one are looked for so many rows off at most
 _LONGER, _REACH = 1.4, 200
 
@@ -73,6 +75,11 @@ def fleet_alarms(
     for name, column in (("by", by), ("machine", machine)):
         if column is not None and (not isinstance(column, str) or column not in columns):
             raise InputError(unknown(name, column, columns))
+    if kept.sum() < FEWEST:
+        raise InputError(
+            f"parameter={parameter!r}: fewer than three rows were fitted, {int(kept.sum())}; "
+            "changes need that many to show"
+        )
     rows = np.flatnonzero(kept)
     if by is not None:
         at = _there(table, "by", by, rows)
@@ -100,20 +107,33 @@ def _there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> A
 
 
 def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Values and standard errors of a parameter, and which rows have both."""
+    """Values and standard errors of a parameter, and which rows have both; ValueError for none."""
     if not hasattr(table, "columns"):
         raise InputError(f"table is a {type(table).__name__}; expected what fit_many returns")
-    known = [c[: -len("_std")] for c in table.columns if str(c).endswith("_std")]
+    if not hasattr(table, "iloc"):
+        kind = type(table).__module__.partition(".")[0]
+        raise InputError(f"table is a table of {kind}; give table.to_pandas()")
+    columns = [str(c) for c in table.columns]
+    known = [c for c in columns if f"{c}_std" in columns]
+    if parameter in columns and parameter not in known:
+        raise InputError(f"parameter={parameter!r}: the table has no column {parameter}_std")
     if not isinstance(parameter, str) or parameter not in known:
         raise InputError(unknown("parameter", parameter, known))
-    values = table[parameter].to_numpy(dtype=float)
-    std = table[f"{parameter}_std"].to_numpy(dtype=float)
+    try:
+        values = table[parameter].to_numpy(dtype=float)
+        std = table[f"{parameter}_std"].to_numpy(dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"parameter={parameter!r}: its columns hold no numbers ({error})"
+        ) from None
     kept = np.isfinite(values) & np.isfinite(std)
     if (std[kept] < 0).any():
         row = int(np.argmax(kept & (std < 0)))
         raise InputError(f"table: {parameter}_std={std[row]:g} in row {row} is no standard error")
-    if kept.sum() < 3:
-        raise InputError(f"parameter={parameter!r}: fewer than three rows were fitted")
+    if not kept.any():
+        raise InputError(
+            f"parameter={parameter!r}: no row was fitted; the column error says why, where it is"
+        )
     return values, std, kept
 
 

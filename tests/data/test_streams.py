@@ -405,3 +405,11 @@ def test_samples_whose_squares_are_beyond_numbers_are_told():
         fq.h1(fq.Record(u, y, 0.01), segment=20)
     with pytest.raises(InputError, match=r"ndarray: squares of the samples are beyond numbers"):
         fq.h1(fq.open(np.column_stack([u, y]), dt=0.01), segment=20)
+
+
+def test_a_table_in_memory_and_a_channel_at_both_ends_are_no_stream():
+    table = pd.DataFrame({"u": np.arange(50.0), "y": np.arange(50.0)})
+    with pytest.raises(ValueError, match=r"source is a DataFrame.*Record\.from_frame"):
+        fq.open(table, dt=0.1)
+    with pytest.raises(ValueError, match="inputs and outputs share u"):
+        fq.open(table.to_numpy(), "u", ["u", "y"], dt=0.1)

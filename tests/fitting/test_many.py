@@ -73,7 +73,7 @@ def test_a_fleet_of_which_nothing_could_be_fitted_has_the_columns_of_one_that_co
         assert list(bad.columns) == list(good.columns)
         assert bad["a"].isna().all()
         assert bad["error"].str.contains("Nyquist").all()
-    with pytest.raises(ValueError, match="fewer than three rows"):
+    with pytest.raises(ValueError, match="no row was fitted"):
         fq.plot_fleet(bad, "a")
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import polars as pl
 import pytest
 
 import freqid as fq
@@ -128,10 +129,22 @@ def test_what_is_refused():
         fq.fleet_alarms(table, "k", machine="robot")
     with pytest.raises(ValueError, match="fewer than three"):
         fq.fleet_alarms(table[:2], "k")
+    with pytest.raises(ValueError, match="no column k_std"):
+        fq.fleet_alarms(table.drop(columns="k_std"), "k")
+    with pytest.raises(ValueError, match="holds no numbers"):
+        fq.fleet_alarms(table.assign(k="stiff"), "k")
+    with pytest.raises(ValueError, match=r"a table of polars; give table.to_pandas\(\)"):
+        fq.fleet_alarms(pl.from_pandas(table[["k", "k_std"]]), "k")
     with pytest.raises(ValueError, match="row 4 has none"):
         fq.fleet_alarms(
             table.assign(day=[np.nan if i == 4 else i for i in range(60)]), "k", by="day"
         )
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_the_first_days_of_a_fleet_are_drawn(rows):
+    axes = fq.plot_fleet(fleet([2, 0], 20)[:rows], "k")
+    assert f"{rows} fits" in axes.get_title()
 
 
 def test_the_picture_of_machines():
