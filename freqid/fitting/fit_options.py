@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 from freqid.checks import InputError, choice, flag, listed, named_values, unknown, whole
 from freqid.data import as_band
@@ -12,6 +13,8 @@ from freqid.fitting.grey_box import checked_start
 from freqid.fitting.noise_models import NoiseModel
 from freqid.lti import as_hold
 from freqid.models import GreyBox
+
+T = TypeVar("T")
 
 # keyword arguments of ``fit``, by name
 Options = Mapping[str, Any]
@@ -66,3 +69,16 @@ def check_options(model: object, options: Options) -> None:
     for name in separate:
         if name not in model.values:
             raise InputError(unknown("separate", name, model.values))
+
+
+def known_options(
+    what: str, function: Callable[..., object], options: Mapping[str, T]
+) -> dict[str, T]:
+    """The options; ValueError for one that the function does not have."""
+    parameters = list(inspect.signature(function).parameters.values())
+    # the first is what is fitted or read
+    known = [p.name for p in parameters[1:] if p.name != "data"]
+    for name in options:
+        if name not in known:
+            raise InputError(unknown(what, name, known))
+    return dict(options)

@@ -124,7 +124,7 @@ def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatA
         std = table[f"{parameter}_std"].to_numpy(dtype=float)
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"parameter={parameter!r}: its columns hold no numbers ({error})"
+            f"parameter={parameter!r}: its column holds no numbers ({error})"
         ) from None
     kept = np.isfinite(values) & np.isfinite(std)
     if (std[kept] < 0).any():

@@ -10,9 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, an, flag, listed, processes, whole
-from freqid.data import Bar, Record, in_turn
-from freqid.fitting import Estimate, Near, Weights, fit, uninterrupted
+from freqid.checks import InputError, an, flag, processes, whole
+from freqid.data import Bar, DataSet, Record, as_data_sets, in_turn
+from freqid.fitting import (
+    Estimate,
+    Near,
+    Weights,
+    check_options,
+    fit,
+    known_options,
+    uninterrupted,
+)
 from freqid.models import GreyBox
 from freqid.validation.comparison import compare
 
@@ -72,15 +80,6 @@ def hold_bias(
     )
 
 
-def _shared(options: Options) -> None:
-    """ValueError for parameters that each experiment has for itself: another one has others."""
-    if options.get("separate"):
-        raise InputError(
-            f"separate={options['separate']!r}: a parameter of each experiment for itself says "
-            "nothing of another one; leave separate out"
-        )
-
-
 def _mode_values(est: Estimate) -> pd.DataFrame:
     """Frequency and damping of each mode, value and std, under names that count them."""
     import pandas as pd
@@ -113,8 +112,7 @@ def cross_validate(
     """
     import pandas as pd
 
-    _shared(options)
-    sets = listed("records", records)
+    sets = _repeats(model, records, options)
     if len(sets) < 2:
         raise InputError(f"records holds {len(sets)}; cross-validation needs two or more repeats")
     processes(n_jobs)
@@ -124,13 +122,14 @@ def cross_validate(
     return pd.DataFrame(rows)
 
 
-def _held_out(model: object, sets: Sequence[Record], options: Options, i: int) -> dict[str, object]:
+def _held_out(
+    model: object, sets: Sequence[DataSet], options: Options, i: int
+) -> dict[str, object]:
     """A row: what the fit to all repeats but one explains of that one."""
-    est = fit(model, [r for k, r in enumerate(sets) if k != i], **options)
-    uninterrupted(est.message)
+    est = _fitted(model, sets, options, [k for k in range(len(sets)) if k != i])
     fits = compare(est, sets[i]).fit_percent
     named = {f"fit {n}": float(v) for n, v in zip(sets[i].output_names, fits, strict=True)}
-    return {"held_out": i, **named, **dict(zip(est.names, est.values, strict=True))}
+    return {"held_out": i, **named, **_values(est)}
 
 
 def bootstrap(
@@ -145,19 +144,20 @@ def bootstrap(
 ) -> pd.DataFrame:
     """Estimates from repeats drawn again with replacement: their scatter without a noise model.
 
-    ``options`` go to ``fit``; ``seed`` is that of the ``n`` resamples, each of which starts from
-    the estimate of all repeats. ``n_jobs`` is a number of processes (extra ``parallel``), None this
-    one, or what ``joblib.parallel_config`` says (``backend="dask"`` for a cluster), with the same
-    numbers; with ``progress`` the screen shows how many are done. Returns a
-    DataFrame (n, parameters) whose ``describe`` and ``quantile`` give error bars. Raises ValueError
-    for fewer than three records.
+    ``options`` go to ``fit``, a list of weights with its records; ``seed`` is that of the ``n``
+    resamples, each of which starts from the estimate of all repeats. ``n_jobs`` is a number of
+    processes (extra ``parallel``), None this one, or what ``joblib.parallel_config`` says
+    (``backend="dask"`` for a cluster), with the same numbers; with ``progress`` the screen shows
+    how many are done. Returns a DataFrame (n, parameters) whose ``describe`` and ``quantile`` give
+    error bars; NaN where all that were drawn know a parameter by their conditions. Raises
+    ValueError for fewer than three records.
 
     Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6.
     """
     import pandas as pd
 
-    _shared(options)
-    sets, count = listed("records", records), whole("n", n)
+    sets, count = _repeats(model, records, options), whole("n", n)
+    processes(n_jobs)
     if len(sets) < 3:
         raise InputError(f"records holds {len(sets)}; a bootstrap needs three or more repeats")
     flag("progress", progress)
@@ -167,7 +167,6 @@ def bootstrap(
     if hasattr(whole_fit.model, "values"):
         free = [p.name for p in whole_fit.model.free_parameters]
         options = {**options, "start": Near({k: whole_fit[k] for k in free}), "n_starts": 1}
-    processes(n_jobs)
     drawn = [tuple(sorted(rng.integers(0, len(sets), len(sets)).tolist())) for _ in range(count)]
     # few repeats have few resamples: of four there are 35, in whatever order they were drawn
     each = list(dict.fromkeys(drawn))
@@ -175,13 +174,48 @@ def bootstrap(
     with Bar(progress, count, 0, "resamples") as advance:
         values = in_turn(work, each, n_jobs, lambda i: advance(times[each[i]]))
     known = dict(zip(each, values, strict=True))
-    return pd.DataFrame([known[d] for d in drawn], columns=list(whole_fit.names))
+    columns = list(_values(whole_fit))
+    return pd.DataFrame([known[d] for d in drawn], columns=columns)
 
 
 def _drawn_again(
-    model: object, sets: Sequence[Record], options: Options, which: Sequence[int]
-) -> FloatArray:
+    model: object, sets: Sequence[DataSet], options: Options, which: Sequence[int]
+) -> dict[str, float]:
     """The estimate from some of the repeats, some of them more than once."""
+    return _values(_fitted(model, sets, options, which))
+
+
+def _repeats(
+    model: object, records: Sequence[Record] | Mapping[str, Record], options: Options
+) -> list[DataSet]:
+    """The repeats; ValueError for options that no fit to some of them could take."""
+    if options.get("separate"):
+        raise InputError(
+            f"separate={options['separate']!r}: a parameter of each experiment for itself says "
+            "nothing of another one; leave separate out"
+        )
+    check_options(model, known_options("option", fit, options))
+    return list(as_data_sets(list(records.values()) if isinstance(records, Mapping) else records))
+
+
+def _fitted(
+    model: object, sets: Sequence[DataSet], options: Options, which: Sequence[int]
+) -> Estimate:
+    """The fit to some of the repeats, each with the weights that are its own."""
+    weights, start = options.get("weights"), options.get("start")
+    if isinstance(weights, (list, tuple)) and len(weights) == len(sets):
+        options = {**options, "weights": [weights[i] for i in which]}
+    if isinstance(start, Near):
+        # what all of these know by their conditions is no unknown of theirs
+        known = set.intersection(*(set(sets[i].conditions) for i in which))
+        options = {**options, "start": Near({n: v for n, v in start.items() if n not in known})}
     est = fit(model, [sets[i] for i in which], **options)
     uninterrupted(est.message)
-    return est.values
+    return est
+
+
+def _values(est: Estimate) -> dict[str, float]:
+    """All that was estimated, tied parameters too."""
+    values = dict(zip(est.names, est.values.tolist(), strict=True))
+    tied = getattr(est.model, "ties", {})
+    return values | {n: float(est.parameters["value"][n]) for n in tied}

@@ -250,6 +250,8 @@ def test_patterns_and_series_name_their_records(tmp_path):
     named = fq.fit_many(LAG, pd.Series(runs(2), index=["x", "y"]), **asked)
     assert named["name"].tolist() == ["x", "y"]
     assert fq.fit_many(LAG, pd.Series(runs(2)), **asked)["name"].tolist()[0] == "record 0"
+    begun = fq.fit_many(LAG, runs(2), start=pd.Series({"a": 30.0}), **asked)
+    assert (begun["error"] == "").all()
 
 
 def test_what_is_refused(tmp_path):

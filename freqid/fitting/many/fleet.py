@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from freqid.checks import InputError, flag, listed, named_values, path_of, processes, unknown, whole
+from freqid.checks import InputError, flag, listed, named_values, path_of, processes, whole
 from freqid.data import (
     Bar,
     FrequencyResponse,
@@ -20,11 +19,10 @@ from freqid.data import (
     unordered,
 )
 from freqid.fitting.entry import fit
-from freqid.fitting.fit_options import check_options
+from freqid.fitting.fit_options import check_options, known_options
 from freqid.fitting.many.identity import fingerprint
 from freqid.fitting.many.known import Known, prints_of
 from freqid.fitting.many.rows import (
-    Row,
     Source,
     Task,
     free_of_columns,
@@ -89,7 +87,9 @@ def fit_many(
     [100.0, 100.0, 100.0]
     """
 
-    options = _checked("option", fit, fit_options)
+    options = known_options("option", fit, fit_options)
+    if "start" in options:
+        options["start"] = named_values("start", options["start"])
     check_options(model, options)
     processes(n_jobs)
     flag("verdicts", verdicts)
@@ -107,7 +107,7 @@ def fit_many(
     task = Task(
         model,
         options,
-        _checked("reading", read, named_values("reading", reading)),
+        known_options("reading", read, named_values("reading", reading)),
         verdicts,
     )
     if path is None:
@@ -205,14 +205,3 @@ def _source(name: str, given: object) -> None:
     if not isinstance(given, (str, Path, Record, FrequencyResponse)):
         kind = type(given).__name__
         raise InputError(f"{name} is a {kind}; expected a Record, a FrequencyResponse or a path")
-
-
-def _checked(what: str, function: Callable[..., object], options: Mapping[str, Any]) -> Row:
-    """ValueError for an option that the function does not have."""
-    parameters = list(inspect.signature(function).parameters.values())
-    # the first is what is fitted or read
-    known = [p.name for p in parameters[1:] if p.name != "data"]
-    for name in options:
-        if name not in known:
-            raise InputError(unknown(what, name, known))
-    return dict(options)
