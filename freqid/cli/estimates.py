@@ -101,7 +101,8 @@ def fit(
         estimate.save(out, overwrite=force)
     if report is not None:
         on = other if isinstance(other, fq.Record) else None
-        estimate.report(report, title=f"{model} from {data.name}", validation=on)
+        title = f"{model} from {data.name}"
+        estimate.report(report, title=title, validation=on, overwrite=force)
     if plot is not None:
         beside = fq.compare(estimate, record, band=band)
         write_picture(plot, beside.plot(zoom=isinstance(record, fq.Record)))

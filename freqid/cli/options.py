@@ -123,9 +123,10 @@ class Asked:
         """The model, fixed, bounded and believed in as was asked."""
         box = self.order, self.zeros, self.poles, self.feedthrough, self.stable, self.delay
         found = model_of(self.model, *box)
-        if isinstance(found, GreyBox) and self.fix:
-            # what is fixed and begun from is fixed there
-            found = found.with_values(**{n: v for n, v in self.values().items() if n in self.fix})
+        kept = {*(self.fix or ()), *(name for name, *_ in self.bounds or ())}
+        if isinstance(found, GreyBox) and kept:
+            # what is fixed and begun from is fixed there, and a start lies inside its bounds
+            found = found.with_values(**{n: v for n, v in self.values().items() if n in kept})
         return with_options(found, self.fix or (), self.bounds or (), self.prior or ())
 
     def grey_box(self) -> GreyBox:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,6 +108,13 @@ def kept_step(frame: pd.DataFrame) -> float | None:
 def kept_reference(frame: pd.DataFrame) -> str | None:
     """The column of the reference, where the table was written from a record that had one."""
     return "reference" if {_LOOP, "reference"} <= set(map(str, frame.columns)) else None
+
+
+def kept_of_record(columns: Collection[str]) -> str:
+    """What only a record in memory has of what columns keep, in words."""
+    if {_LOOP, "reference"} <= set(columns):
+        return "a reference, through which its loop has to be fitted"
+    return "clocks that are apart by an unknown time" if _APART in columns else ""
 
 
 def kept_notes(frame: pd.DataFrame) -> tuple[str, ...]:

@@ -31,6 +31,7 @@ class _Arrays:
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
     numbers: dict[str, dict[str, float]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    hollow: dict[str, str] = field(default_factory=dict)
 
     def add(self, name: str, array: Source) -> None:
         """Note an array: one of samples, or a number."""
@@ -47,6 +48,11 @@ class _Arrays:
         if array.ndim in (1, 2) and array.shape[0] > 1 and array.size:
             self.shapes[name] = tuple(int(size) for size in array.shape)
             self.units[name] = unit_of(array.attrs)
+            # zarr leaves out chunks that hold nothing but the fill value, and so does a copy that
+            # was cut off
+            there, whole = getattr(array, "nchunks_initialized", 0), getattr(array, "nchunks", 0)
+            if there < whole:
+                self.hollow[name] = f"{there} of {whole} chunks, the rest is {array.fill_value:g}"
         elif array.size == 1:
             folder = self.numbers.setdefault(_folder(name), {})
             folder[_leaf(name)] = float(np.ravel(array[()])[0])
@@ -140,7 +146,14 @@ class _Arrays:
                     yield np.column_stack([flat[name][:, i] for name, i in wanted])
 
         units = {n: self.units[full] for n, (_, full, _) in zip(names, channels, strict=True)}
-        return Found(blocks, names, count, dt, str(self.path), units=units, clock=clock)
+        hollow = {
+            n: self.hollow[full]
+            for n, (_, full, _) in zip(names, channels, strict=True)
+            if full in self.hollow
+        }
+        return Found(
+            blocks, names, count, dt, str(self.path), units=units, clock=clock, hollow=hollow
+        )
 
     def _of_group(self, group: str | None) -> dict[str, tuple[int, ...]]:
         if group is None:
@@ -224,7 +237,8 @@ def of_zarr(path: Path, asked: Asked) -> Found:
             arrays.add(path.name, root)
             arrays.add_clocks("", root.attrs)
             found = of_array(root, asked.columns, asked.block, str(path))
-            return dataclasses.replace(found, dt=arrays.step([path.name]))
+            hollow = {n: told for told in arrays.hollow.values() for n in found.names}
+            return dataclasses.replace(found, dt=arrays.step([path.name]), hollow=hollow)
         arrays.add_clocks("", root.attrs)
         for name, item in root.members(max_depth=None):
             is_array = isinstance(item, zarr.Array)

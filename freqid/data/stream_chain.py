@@ -70,7 +70,12 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None, held: bool) -> 
 
     origin = f"{len(each)} files from {first.origin} to {each[-1].origin}"
     units = {name: unit for found in reversed(each) for name, unit in found.units.items() if unit}
-    return Found(blocks, names, sum(lengths), first.dt, origin, first.hold, first.conditions, units)
+    return Found(
+        blocks, names, sum(lengths), first.dt, origin, first.hold, first.conditions, units,
+        lost=next((found.lost for found in each if found.lost), ""),
+        slow=frozenset().union(*(found.slow for found in each)),
+        hollow={n: told for found in each for n, told in found.hollow.items()},
+    )  # fmt: skip
 
 
 def _check_channels(found: Found, names: Sequence[str], first: Found, held: bool) -> None:

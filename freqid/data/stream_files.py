@@ -14,7 +14,7 @@ from freqid.data.readers.kinds import damaged, existing, missing, refusing
 from freqid.data.readers.parquet import field_units
 from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
-from freqid.data.remembered import is_kept, kept_conditions, kept_hold
+from freqid.data.remembered import is_kept, kept_conditions, kept_hold, kept_of_record
 from freqid.data.stream_arrays import of_hdf5, of_zarr
 from freqid.data.stream_found import Asked, Found, Source, even, of_array, places
 from freqid.data.stream_views import from_the_first
@@ -142,7 +142,19 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     conditions = {} if told is None else kept_conditions(told)
     units = {named(n)[0]: told_units.get(n) or named(n)[1] for n in columns}
     dt = None if clock is None else clock.step
-    return Found(blocks, names, count, dt, str(path), hold, conditions, units, clock)
+    each = zip(columns, names, strict=True)
+    slow = frozenset(name for column, name in each if 2 * _blanks(file, column) >= count > 0)
+    lost = kept_of_record(every)
+    return Found(
+        blocks, names, count, dt, str(path), hold, conditions, units, clock, lost, slow
+    )  # fmt: skip
+
+
+def _blanks(file: Source, name: str) -> int:
+    """Rows in which a column has none, as far as the footer knows."""
+    metadata, number = file.metadata, file.schema_arrow.names.index(name)
+    told = [metadata.row_group(g).column(number).statistics for g in range(metadata.num_row_groups)]
+    return sum(t.null_count for t in told if t is not None and t.has_null_count)
 
 
 def _stamps(file: Source, time: str) -> tuple[list[int], Array]:

@@ -65,6 +65,11 @@ class Found:
     units: Mapping[str, str] = field(default_factory=dict)
     # where the sample time comes of a time
     clock: Clock | None = None
+    # what a record of the file has and a stream has not, in words, and channels of slower outputs
+    lost: str = ""
+    slow: frozenset[str] = frozenset()
+    # chunks that a folder does not hold, in words, by channel
+    hollow: Mapping[str, str] = field(default_factory=dict)
 
 
 def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: str) -> Found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -86,6 +87,23 @@ def open(
         u_names, y_names = _chosen(found.names, inputs, outputs)
     except InputError as error:
         raise InputError(f"{found.origin}: {error}") from None
+    if found.lost and (inputs is None or outputs is None):
+        raise InputError(
+            f"{found.origin} keeps {found.lost}, which a stream has not: read() it, or name inputs "
+            "and outputs to leave that out"
+        )
+    if slow := [n for n in (*u_names, *y_names) if n in found.slow]:
+        raise InputError(
+            f"{found.origin}: {slow[0]!r} is blank in half of its rows or more, as an output "
+            "slower than its input is; read() takes both"
+        )
+    for name in (*u_names, *y_names):
+        if name in found.hollow:
+            warnings.warn(
+                f"{found.origin}: {name!r} has {found.hollow[name]}: where a copy was cut off that "
+                "is no signal; chunks that are that value say so with write_empty_chunks=True",
+                stacklevel=2,
+            )
     pick = [found.names.index(n) for n in (*u_names, *y_names)]
     factors = _factors(scale, [*u_names, *y_names])
 

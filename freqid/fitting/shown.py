@@ -60,18 +60,24 @@ class Shown:
         return nyquist(self, ax=ax, **options)
 
     def report(
-        self, path: str | Path, title: str | None = None, *, validation: Record | None = None
+        self,
+        path: str | Path,
+        title: str | None = None,
+        *,
+        validation: Record | None = None,
+        overwrite: bool = False,
     ) -> None:
         """Write one self-contained HTML page about the estimate, which works offline.
 
         A sentence on whether it may be trusted, the parameters with error and bias bars, response
         and simulation to zoom into, residual tests, warnings, and the call that made it. Another
         record as ``validation`` is simulated, too, and has a say in the verdict. Raises ValueError
-        for another suffix than .html, or without the extra ``report``.
+        for another suffix than .html, without the extra ``report``, or for a file that is there and
+        is no such page, without ``overwrite``.
         """
         from freqid.pages import write_report
 
-        write_report(self, path, title, validation)  # type: ignore[arg-type]
+        write_report(self, path, title, validation, overwrite)  # type: ignore[arg-type]
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the estimate to a .json file that ``freqid.load`` reads, in any later process.

@@ -115,10 +115,10 @@ def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatA
         raise InputError(f"table is a table of {kind}; give table.to_pandas()")
     columns = [str(c) for c in table.columns]
     known = [c for c in columns if f"{c}_std" in columns]
-    if parameter in columns and parameter not in known:
-        raise InputError(f"parameter={parameter!r}: the table has no column {parameter}_std")
-    if not isinstance(parameter, str) or parameter not in known:
+    if not isinstance(parameter, str) or parameter not in columns:
         raise InputError(unknown("parameter", parameter, known))
+    if parameter not in known:
+        raise InputError(f"parameter={parameter!r}: the table has no column {parameter}_std")
     try:
         values = table[parameter].to_numpy(dtype=float)
         std = table[f"{parameter}_std"].to_numpy(dtype=float)

@@ -147,3 +147,12 @@ def test_what_is_to_be_done_is_said_as_it_is_typed(folder, capsys):
     table.assign(time=np.arange(len(table))).to_csv("steps.csv", index=False)
     assert run("show", "steps.csv") == 0
     assert "give --units time=ms where they are milliseconds" in capsys.readouterr().out
+
+
+def test_a_start_inside_of_its_bounds_is_one(folder, capsys):
+    """The value of the built-in model, which nobody typed, lay outside of them."""
+    code = run("fit", "log.csv", "--model", "first-order", "--start", "a=15", "--bounds", "a", "1",
+               "60")  # fmt: skip
+    assert code == 0, capsys.readouterr().err
+    assert run("fit", "log.csv", "--model", "first-order", "--bounds", "a", "1", "60") == 2
+    assert "a=100" in capsys.readouterr().err

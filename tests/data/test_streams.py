@@ -414,3 +414,45 @@ def test_a_table_in_memory_and_a_channel_at_both_ends_are_no_stream():
         fq.open(table, dt=0.1)
     with pytest.raises(ValueError, match="inputs and outputs share u"):
         fq.open(table.to_numpy(), "u", ["u", "y"], dt=0.1)
+
+
+def loop_and_slow_output(folder):
+    u = fq.white_noise(4000, seed=1)
+    record = fq.simulate(fq.first_order(), u, 1e-3)
+    fq.write(fq.Record(record.u, record.y, 1e-3, reference=u), folder / "loop.parquet")
+    fq.write(record.decimate(10, keep_input=True), folder / "slow.parquet")
+
+
+def test_what_a_stream_has_not_is_not_left_out_in_silence(tmp_path):
+    """A loop that was opened without its reference came out at -289 where 100 was true."""
+    loop_and_slow_output(tmp_path)
+    with pytest.raises(ValueError, match=r"loop\.parquet keeps a reference.*read\(\) it"):
+        fq.open(tmp_path / "loop.parquet")
+    assert fq.open(tmp_path / "loop.parquet", "u", "y").n_samples == 4000
+    with pytest.raises(ValueError, match=r"'y' is blank in half of its rows .* read\(\)"):
+        fq.open(tmp_path / "slow.parquet")
+    assert fq.read(tmp_path / "slow.parquet").factor == 10
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_chunks_that_a_folder_lacks_are_said(tmp_path, whole):
+    zarr = pytest.importorskip("zarr")
+    record = fq.simulate(fq.first_order(), fq.white_noise(4000, seed=1), 1e-3)
+    if whole:
+        both = np.column_stack([record.u, record.y])
+        array = zarr.create_array(
+            tmp_path / "log.zarr", shape=both.shape, dtype=both.dtype, chunks=(1000, 2)
+        )
+        array[:] = both
+        lost = tmp_path / "log.zarr/c/1/0"
+    else:
+        group = zarr.open_group(tmp_path / "log.zarr", mode="w")
+        for name, samples in (("u", record.u), ("y", record.y)):
+            group.create_array(name, shape=samples.shape, dtype=samples.dtype, chunks=(1000,))[
+                :
+            ] = samples
+        lost = tmp_path / "log.zarr/y/c/1"
+    fq.open(tmp_path / "log.zarr", "u", "y", dt=1e-3)
+    lost.unlink()
+    with pytest.warns(UserWarning, match=r"has 3 of 4 chunks, the rest is 0: .* cut off"):
+        fq.open(tmp_path / "log.zarr", "u", "y", dt=1e-3)

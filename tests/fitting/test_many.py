@@ -254,6 +254,15 @@ def test_patterns_and_series_name_their_records(tmp_path):
     assert (begun["error"] == "").all()
 
 
+def test_a_table_beside_its_logs_is_no_log(tmp_path):
+    for i in (1, 2):
+        fq.write(runs(1)[0], tmp_path / f"run{i}.parquet")
+    out = tmp_path / "estimates.parquet"
+    for _ in range(2):
+        table = fq.fit_many(LAG, sorted(tmp_path.glob("*.parquet")), out, verdicts=False)
+        assert [Path(name).stem for name in table["name"]] == ["run1", "run2"]
+
+
 def test_what_is_refused(tmp_path):
     with pytest.raises(ValueError, match="records"):
         fq.fit_many(LAG, [])

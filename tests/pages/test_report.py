@@ -80,3 +80,16 @@ def test_one_record_of_two_inputs_shows_the_response_of_each(tmp_path):
         f, shown = np.array(points["x"]), np.array(points["y"])
         G = plant.frequency_response(2 * np.pi * f, fq.ZeroOrderHold(1e-2)).response[pair]
         np.testing.assert_allclose(shown, np.abs(G), atol=0.03)
+
+
+def test_a_page_of_something_else_is_not_replaced(tmp_path):
+    record = fq.simulate(fq.first_order(), fq.white_noise(300, seed=1), 1e-3)
+    est, page = fq.fit(fq.first_order(), record), tmp_path / "mine.html"
+    page.write_text("<html>my notes</html>")
+    with pytest.raises(ValueError, match="is there already"):
+        est.report(page)
+    assert "my notes" in page.read_text()
+    est.report(page, overwrite=True)
+    # a report takes the place of another
+    est.report(page, title="Again")
+    assert "Again" in page.read_text(encoding="utf-8")

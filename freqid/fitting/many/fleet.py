@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 from freqid.checks import InputError, flag, listed, named_values, path_of, processes, whole
 from freqid.data import (
@@ -100,6 +100,10 @@ def fit_many(
         raise InputError(f"path={str(path)!r} is a folder; give the name of a .parquet file")
     asked = None if chunk is None else whole("chunk", chunk)
     named = _named(records)
+    if path is not None:
+        # a pattern may take in the table of an earlier call
+        own = path.resolve()
+        named = {n: r for n, r in named.items() if not _is_path(r) or Path(r).resolve() != own}
     if not named:
         raise InputError("records=[] holds nothing to be fitted")
     size = asked or (_CHUNK if verdicts else _chunk(named.values()))
@@ -192,13 +196,17 @@ def _named(records: Iterable[Source] | Mapping[str, Source]) -> dict[str, Source
     given = listed("records", records)
     for i, r in enumerate(given):
         _source(f"records[{i}]", r)
-    every = [f for r in given for f in (files_of(r) if isinstance(r, (str, Path)) else [r])]
+    every = [f for r in given for f in (files_of(r) if _is_path(r) else [r])]
     for i, r in enumerate(every):
-        name = str(r) if isinstance(r, (str, Path)) else f"record {i}"
+        name = str(r) if _is_path(r) else f"record {i}"
         if name in named:
             raise InputError(f"records: {name} is there twice")
         named[name] = r
     return named
+
+
+def _is_path(source: object) -> TypeGuard[str | Path]:
+    return isinstance(source, (str, Path))
 
 
 def _source(name: str, given: object) -> None:

@@ -6,8 +6,8 @@ import base64
 from importlib import resources
 from pathlib import Path
 
-from freqid.checks import InputError, path_of
-from freqid.data import Record, whole_file
+from freqid.checks import InputError, flag, path_of
+from freqid.data import Record, check_replacing, whole_file
 from freqid.fitting import Estimate
 from freqid.models import GreyBox
 from freqid.pages.report.figures import figures
@@ -15,9 +15,16 @@ from freqid.pages.report.recipe import recipe
 from freqid.pages.report.sentences import bias, data, verdict
 from freqid.pages.report.tables import correlations, modes, parameters, spread, tests
 
+# what tells such a page from another, and in how many bytes of its beginning
+_MARK, _HEAD = b'content="freqid report"', 1000
+
 
 def write_report(
-    est: Estimate, path: str | Path, title: str | None = None, validation: Record | None = None
+    est: Estimate,
+    path: str | Path,
+    title: str | None = None,
+    validation: Record | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write the page; see ``Estimate.report``."""
     try:
@@ -27,6 +34,8 @@ def write_report(
     path = path_of("path", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"path={str(path)!r} must end in .html")
+    if not (flag("overwrite", overwrite) or _is_report(path)):
+        check_replacing(path, overwrite=False)
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("freqid.pages.report", ""),
         autoescape=True,
@@ -64,3 +73,11 @@ def _plotly() -> str:
     """The basic bundle of plotly.js (MIT license), packed; the page unpacks it by itself."""
     packed = resources.files("freqid.pages.report").joinpath("plotly-basic.min.js.gz")
     return base64.b64encode(packed.read_bytes()).decode("ascii")
+
+
+def _is_report(path: Path) -> bool:
+    """Whether a file is a page of this kind, which a new one may replace."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return _MARK in file.read(_HEAD)
