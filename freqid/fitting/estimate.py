@@ -29,7 +29,7 @@ from freqid.fitting.search.verdict import Witness
 from freqid.fitting.shown import Shown
 from freqid.fitting.tied import with_tied
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
-from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.fitting.uncertainty.minimum import Minimum, Spread, quantile
 from freqid.fitting.uncertainty.profiles import profile_intervals
 from freqid.lti import Hold
 from freqid.models import GreyBox
@@ -180,11 +180,12 @@ class Estimate(Questioned, Shown):
             },
             index=pd.Index(list(self.names), name="parameter"),
         )
-        return with_tied(free, self, Z95)
+        return with_tied(free, self, quantile(self.problem, 0.95))
 
     def _limits(self, std: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends of 95 % intervals, inside the bounds."""
-        lower, upper = self.values - Z95 * std, self.values + Z95 * std
+        half = quantile(self.problem, 0.95) * std
+        lower, upper = self.values - half, self.values + half
         if (
             self.problem is None
             or not isinstance(self.model, GreyBox)
@@ -276,7 +277,6 @@ class Estimate(Questioned, Shown):
         this one. Raises ValueError for an unknown method or a level outside (0, 1).
         """
         import pandas as pd
-        from scipy.stats import norm
 
         choice("method", method, ("linear", "profile"))
         flag("progress", progress)
@@ -293,7 +293,7 @@ class Estimate(Questioned, Shown):
             std = np.sqrt(np.diag(self.covariance_matrix))
             jobs = processes(n_jobs)
             return profile_intervals(self.minimum, self.scatter.change, std, level, progress, jobs)
-        half = norm.ppf((1 + level) / 2) * np.sqrt(np.diag(self.covariance_matrix))
+        half = quantile(self.problem, level) * np.sqrt(np.diag(self.covariance_matrix))
         return pd.DataFrame(
             {"lower": self.values - half, "upper": self.values + half},
             index=pd.Index(list(self.names), name="parameter"),

@@ -19,6 +19,8 @@ Grade = Literal["trust", "doubt", "do not use"]
 _MANY = 10
 # relative standard error from which a value is not told
 _VAGUE = 0.5
+# values more than unknowns from which these tell the noise
+_TELLING = 5
 # how often chance makes a gap to a black box as large that is next to none
 _BESIDE = 0.3
 # what makes numbers useless where it is what explains most of what is wrong, and the chance up to
@@ -73,7 +75,7 @@ def verdict(est: Estimate) -> Verdict:
         return Verdict("do not use", reasons)
     if est.witness.verdict == "lacking":
         reasons.append(est.witness.sentence)
-    reasons += _lonely(est) + _spent(est)
+    reasons += _lonely(est) + _barely(est)
     reasons += _open(est, std) or _untold(est, std) or _once(est, std)
     if reasons:
         return Verdict("doubt", reasons)
@@ -86,14 +88,16 @@ def _useless(warning: str) -> bool:
     return getattr(warning, "kind", "") in _USELESS and chance < _SURE
 
 
-def _spent(est: Estimate) -> list[str]:
-    """As many unknowns as values: they take up any noise whole, and nothing tells their errors."""
-    if est.problem is None or est.problem.prior is not None or est.problem.spare > 0:
+def _barely(est: Estimate) -> list[str]:
+    """So few values more than unknowns that what they tell of the noise is a guess."""
+    if est.problem is None or est.problem.prior is not None or est.minimum.exact:
         return []
-    rows = est.problem.objective.n_rows
+    spare = est.problem.spare
+    if not 0 < spare < _TELLING:
+        return []
     return [
-        f"not told: {rows} values of the data are explained by as many unknowns, those of initial "
-        "states included, so that nothing tells their errors; use a longer record"
+        f"barely told: {spare} values more than unknowns, those of initial states included, tell "
+        "how large the noise is; use a longer record or a wider band"
     ]
 
 

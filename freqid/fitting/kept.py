@@ -20,6 +20,7 @@ from freqid.fitting.met import data_digest, remembered
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.tied import with_tied
 from freqid.fitting.uncertainty.kept_box import KeptBox
+from freqid.fitting.uncertainty.minimum import quantile
 from freqid.models import GreyBox, hold_of_dict, hold_to_dict, model_of_dict, model_to_dict
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def written(est: Estimate) -> Written:
         "values": est.values,
         "lower": table["lower"].to_numpy(),
         "upper": table["upper"].to_numpy(),
+        "quantile": quantile(est.problem, 0.95),
         "nominal": est.nominal,
         "covariance": est.covariance_matrix,
         "n_evaluations": est.n_evaluations,
@@ -168,7 +170,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         verdict=Verdict(verdict["grade"], list(verdict["reasons"])),
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"], w.get("p_value"))
                   for w in kept["findings"]],
-        _parameters=with_tied(table, est, Z95),
+        _parameters=with_tied(table, est, kept.get("quantile", Z95)),
         digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip

@@ -129,9 +129,24 @@ class Minimum:
         if names:
             scale = self.structure.scale  # type: ignore[attr-defined]
             size = np.sqrt(self.objective.energy)
-            return determined(J, self.x, names, size, scale)
-        half = np.linalg.pinv(J)
-        return Determined(half, np.zeros(len(half), bool), [])
+            found = determined(J, self.x, names, size, scale)
+        else:
+            half = np.linalg.pinv(J)
+            found = Determined(half, np.zeros(len(half), bool), [])
+        if self.prior is not None or self.spare > 0 or self._told_apart:
+            return found
+        # they take up any noise whole
+        text = (
+            f"{self.objective.n_rows} values of the data are explained by as many unknowns, those "
+            "of initial states included, so that nothing tells their errors; use a longer record"
+        )
+        loose = np.full(len(found.half), bool(names))
+        return Determined(found.half, loose, [*found.sentences, text])
+
+    @property
+    def _told_apart(self) -> bool:
+        """Whether the noise is told by more than what a model leaves."""
+        return any(isinstance(e, PeriodicExperiment) for e in self.experiments)
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -243,6 +258,16 @@ class Spread:
         """Covariance of the unknowns with ``unknown`` for what is infinite."""
         inner = self.of_unknowns
         return np.where(np.isfinite(inner), inner, unknown)
+
+
+def quantile(minimum: Minimum | None, level: float) -> float:
+    """Half an interval in standard errors: Student's where what is left tells the noise, which the
+    periods of periodic data tell, too; else the normal one.
+    """
+    if minimum is None or minimum.prior is not None:
+        return float(scipy.stats.norm.ppf((1 + level) / 2))
+    known = [e.data.freedom for e in minimum.experiments if isinstance(e, PeriodicExperiment)]
+    return float(scipy.stats.t.ppf((1 + level) / 2, minimum.freedom + 2 * sum(known)))
 
 
 def root(matrix: FloatArray) -> FloatArray:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # standard errors within which an end is looked for, and evaluations of each fit on the way
 _REACH, _LIMIT = 10.0, 60
+# and the nearest that one can be
+_NEAREST = 1e-3
 # relative standard error that is down to rounding
 _ROUNDED = 1e-12
 
@@ -35,11 +37,11 @@ def profile_intervals(
     """Lower and upper end of each parameter's interval by profile likelihood.
 
     A value is inside when the cost, a prior's part in it included, minimised over all others,
-    exceeds the least by no more than σ² χ²(level); where weights leave the noise coloured the
-    threshold is widened as its standard error is. ``scale`` and ``std`` (P,) are the size of each
-    unknown and the standard error of each parameter. Infinite where nothing holds the parameter
-    within ten standard errors. ``n_jobs`` is a number of processes, None this
-    one; ``progress`` shows how many ends are found.
+    exceeds the least by no more than σ² χ²(level), within the bounds of the search; where weights
+    leave the noise coloured the threshold is widened as its standard error is. ``scale`` and
+    ``std`` (P,) are the size of each unknown and the standard error of each parameter. Infinite
+    where nothing holds the parameter within ten standard errors. ``n_jobs`` is a number of
+    processes, None this one; ``progress`` shows how many ends are found.
 
     Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
     """
@@ -85,7 +87,9 @@ def _end_of(minimum: Minimum, asked: tuple[int, float, float]) -> float:
 
 
 def _end(minimum: Minimum, index: int, step: float, rise: float) -> float:
-    """Where the profile has risen by ``rise``, in multiples of a signed step from the estimate."""
+    """Where the profile has risen by ``rise``, in multiples of a signed step from the estimate, or
+    the bound that comes before.
+    """
     at, others = minimum.x[index], np.delete(minimum.x, index)
     least = minimum.point.cost
 
@@ -102,10 +106,17 @@ def _end(minimum: Minimum, index: int, step: float, rise: float) -> float:
             return np.inf
         return (found.cost - least) / rise - 1
 
-    reach = 2.0
+    structure = minimum.objective.structure
+    bound = float((structure.upper if step > 0 else structure.lower)[index])
+    room = (bound - at) / step
+    if room <= _NEAREST:
+        return bound
+    reach = min(2.0, room)
     while excess(reach) < 0:
-        reach *= 1.5
+        if reach >= room:
+            return bound
+        reach = min(1.5 * reach, room)
         if reach > _REACH:
             return float(np.sign(step) * np.inf)
-    root = scipy.optimize.brentq(excess, 1e-3, reach, xtol=1e-3, rtol=1e-4)
+    root = scipy.optimize.brentq(excess, _NEAREST, reach, xtol=1e-3, rtol=1e-4)
     return float(at + root * step)
