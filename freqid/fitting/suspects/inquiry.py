@@ -18,6 +18,7 @@ from freqid.fitting.suspects import changing, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
+from freqid.fitting.suspects.coarse import coarse
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, unmirrored
@@ -183,7 +184,8 @@ class Inquiry:
         """Sentences on the strongest suspects, or that there has to be one."""
         found = self._on_suspects()
         serious = any(f.severity == "serious" for f in found)
-        return found if serious else [*beyond_noise(self.minimum), *found]
+        more = beyond_noise(self.minimum) + coarse(self.scene, self._std)
+        return found if serious else [*more, *found]
 
     def _on_suspects(self) -> list[Finding]:
         scene, named = self.scene, self.named

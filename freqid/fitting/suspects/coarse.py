@@ -1,0 +1,96 @@
+"""What a sensor of few digits does to an output that hardly moves: an error that does not average.
+
+Rounding to steps q turns a value x with noise of standard deviation σ into x + e(x) on average,
+
+    e(x) = Σ_k (−1)ᵏ q/(πk) exp(−2π²k²σ²/q²) sin(2πk x/q),
+
+(Widrow and Kollár, Quantization Noise, 2008). While x moves over many steps that is as good as
+noise; on a plateau quieter than a step it is a constant, which no residual shows because the gain
+takes it up.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.fitting.findings import Finding
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.seen import Seen
+
+# terms of the series, and those that are none, in steps
+_TERMS, _NONE = 6, 1e-4
+# part of a step that values are off whole numbers of it
+_EVEN = 1e-3
+# standard errors, and part of itself, by which a parameter may be off without a word: where all of
+# the noise is rounding one standard error is what it makes of each
+_SMALL, _HARMLESS = 2.0, 1e-3
+
+
+def coarse(scene: Scene | None, std: FloatArray) -> list[Finding]:
+    """A finding where steps of a sensor may move a parameter by more than its error bar."""
+    if scene is None:
+        return []
+    moved, largest = [], 0.0
+    for number, s in enumerate(scene.seen):
+        for step, rows in _rounded(s):
+            columns = [np.zeros((len(rows), len(other.left))) for other in scene.seen]
+            columns[number] = rows
+            moved += [scene.moved(row) for row in scene.stacked(columns)]
+            largest = max(largest, step)
+    if not moved:
+        return []
+    size = np.sqrt(np.sum(np.square(moved), axis=0))
+    shifts = size / np.where(std > 0, std, np.inf)
+    shift, change = float(np.max(shifts, initial=0.0)), scene.relative(size)
+    if shift < _SMALL or change < _HARMLESS:
+        return []
+    names, worst = getattr(scene.structure, "names", ()), int(np.argmax(shifts))
+    what, part = "parameters", ""
+    if names and scene.x[worst]:
+        what, part = names[worst], f" ({100 * size[worst] / abs(scene.x[worst]):.2g} %)"
+    text = (
+        f"an output rests between steps of {largest:.3g} of its sensor, which the noise is too "
+        f"small to even out: {what} may be off by {shift:.2g} standard errors{part}, and no "
+        "residual shows it; let the input move, or use a finer sensor"
+    )
+    return [Finding("coarse", text, number=shift)]
+
+
+def _rounded(s: Seen) -> list[tuple[float, FloatArray]]:
+    """Of each output in steps these, and rows (2·terms, rows) of the error where the phase of its
+    values within a step is not known: a sine and a cosine of each term, which is one of both.
+    """
+    if s.record is None:
+        return []
+    N, _ = s.grid
+    errors = s.signals(s.unweighted(s.left[None])[0])
+    found = []
+    for o, signal in enumerate(s.record.outputs[:N].T):
+        step = _step(signal)
+        if not step:
+            continue
+        fitted = signal + errors[o]
+        variance = max(float(np.mean(errors[o] ** 2)) - step**2 / 12, 0.0)
+        waves = []
+        for k in range(1, _TERMS + 1):
+            size = step / (np.pi * k) * np.exp(-2 * (np.pi * k / step) ** 2 * variance)
+            if size < _NONE * step:
+                break
+            turn = 2 * np.pi * k / step * fitted
+            waves += [size * np.sin(turn), size * np.cos(turn)]
+        if waves:
+            signals = np.zeros((len(waves), s.n_outputs, N))
+            signals[:, o] = np.array(waves) / np.sqrt(2)
+            found.append((step, s.sampled(signals)))
+    return found
+
+
+def _step(signal: FloatArray) -> float:
+    """What all differences of a signal's values are whole multiples of; 0 where there is none."""
+    gaps = np.diff(np.unique(signal))
+    if not len(gaps):
+        return 0.0
+    step = float(gaps.min())
+    off = np.abs(gaps / step - np.round(gaps / step))
+    return step if off.max() < _EVEN else 0.0
