@@ -17,6 +17,7 @@ from freqid.checks import FloatArray
 from freqid.fitting.findings import Finding
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
+from freqid.fitting.suspects.sentences import farthest
 
 # terms of the series, and those that are none, in steps
 _TERMS, _NONE = 6, 1e-4
@@ -41,18 +42,13 @@ def coarse(scene: Scene | None, std: FloatArray) -> list[Finding]:
     if not moved:
         return []
     size = np.sqrt(np.sum(np.square(moved), axis=0))
-    shifts = size / np.where(std > 0, std, np.inf)
-    shift, change = float(np.max(shifts, initial=0.0)), scene.relative(size)
-    if shift < _SMALL or change < _HARMLESS:
+    shift, what = farthest(scene, size, std)
+    if shift < _SMALL or scene.relative(size) < _HARMLESS:
         return []
-    names, worst = getattr(scene.structure, "names", ()), int(np.argmax(shifts))
-    what, part = "parameters", ""
-    if names and scene.x[worst]:
-        what, part = names[worst], f" ({100 * size[worst] / abs(scene.x[worst]):.2g} %)"
     text = (
         f"an output rests between steps of {largest:.3g} of its sensor, which the noise is too "
-        f"small to even out: {what} may be off by {shift:.2g} standard errors{part}, and no "
-        "residual shows it; let the input move, or use a finer sensor"
+        f"small to even out: that may move {what}, and no residual shows it; let the input move, "
+        "or use a finer sensor"
     )
     return [Finding("coarse", text, number=shift)]
 

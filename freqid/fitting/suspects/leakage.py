@@ -14,6 +14,7 @@ from freqid.data import AveragedResponse
 from freqid.fitting.findings import Finding
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
+from freqid.fitting.suspects.sentences import farthest
 from freqid.models import Model
 
 # standard errors, and part of itself, by which a parameter may be moved without a word
@@ -28,14 +29,9 @@ def leaking(scene: Scene, model: Model, std: FloatArray) -> list[Finding]:
     if not rows.any():
         return []
     moved = -scene.moved(rows)
-    shifts = np.abs(moved) / np.where(std > 0, std, np.inf)
-    shift, change = float(np.max(shifts, initial=0.0)), scene.relative(moved)
-    if shift < _SMALL or change < _HARMLESS:
+    shift, what = farthest(scene, moved, std)
+    if shift < _SMALL or scene.relative(moved) < _HARMLESS:
         return []
-    names, worst = getattr(scene.structure, "names", ()), int(np.argmax(shifts))
-    what, part = "parameters", ""
-    if names and scene.x[worst]:
-        what, part = names[worst], f" ({100 * moved[worst] / scene.x[worst]:+.2g} %)"
     shortest = min(
         len(d.memory) * d.dt
         for s in scene.seen
@@ -43,7 +39,7 @@ def leaking(scene: Scene, model: Model, std: FloatArray) -> list[Finding]:
     )
     text = (
         f"the plant answers for longer than segments of {shortest:.4g} s show: what they cut off "
-        f"moves {what} by {shift:.2g} standard errors{part}; fit the record itself or "
+        f"moves {what}; fit the record itself or "
         "local_rational(record), or take longer segments"
     )
     return [Finding("short segments", text, number=shift)]

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from freqid.checks import FloatArray
+from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Score
 
 # the cure of each
@@ -67,3 +71,15 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "unexplained": f"{detail} explain more of the output than the model makes of them",
         "another mode": detail or "a black box with one mode more explains the data better",
     }[name]
+
+
+def farthest(scene: Scene, moved: FloatArray, std: FloatArray) -> tuple[float, str]:
+    """By how many standard errors (P,) a change of the unknowns (P,) moves one at the most, and
+    that in words: which, by how many, and by what part of it.
+    """
+    shifts = np.abs(moved) / np.where(std > 0, std, np.inf)
+    worst, shift = int(np.argmax(shifts)), float(np.max(shifts, initial=0.0))
+    names, what, part = getattr(scene.structure, "names", ()), "parameters", ""
+    if names and scene.x[worst]:
+        what, part = names[worst], f" ({100 * moved[worst] / scene.x[worst]:+.2g} %)"
+    return shift, f"{what} by {shift:.2g} standard errors{part}"
