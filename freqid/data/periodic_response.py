@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from freqid.checks import ComplexArray, InputError, finite, numbers, whole
+from freqid.checks import ComplexArray, InputError, State, finite, numbers, whole
 from freqid.data.entries import frozen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
@@ -80,6 +80,10 @@ class PeriodicResponse(FrequencyResponse):
             freedom=whole("freedom", freedom), pooled=whole("pooled", pooled),
             settled=None if settled is None else finite("settled", settled),
         )  # fmt: skip
+
+    def __setstate__(self, state: State) -> None:
+        """Restore; what was written before lacks what was not known then."""
+        super().__setstate__({"settled": None, "pooled": 1} | state)
 
     @that_follows
     def with_conditions(self, **conditions: float) -> PeriodicResponse:

@@ -11,6 +11,8 @@ takes it up.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from freqid.checks import FloatArray
@@ -20,9 +22,9 @@ from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.suspects.sentences import farthest
 
 # terms of the series, and those that are none, in steps
-_TERMS, _NONE = 6, 1e-4
-# part of a step that values are off whole numbers of it
-_EVEN = 1e-3
+_TERMS, _NONE = 6, 1e-3
+# part of a step that values are off whole numbers of it, and samples that are looked at first
+_EVEN, _SHOWN = 1e-3, 10_000
 # standard errors, and part of itself, by which a parameter may be off without a word: where all of
 # the noise is rounding one standard error is what it makes of each
 _SMALL, _HARMLESS = 2.0, 1e-3
@@ -34,10 +36,10 @@ def coarse(scene: Scene | None, std: FloatArray) -> list[Finding]:
         return []
     moved, largest = [], 0.0
     for number, s in enumerate(scene.seen):
-        for step, rows in _rounded(s):
-            columns = [np.zeros((len(rows), len(other.left))) for other in scene.seen]
-            columns[number] = rows
-            moved += [scene.moved(row) for row in scene.stacked(columns)]
+        for step, row in _rounded(s):
+            columns = [np.zeros((1, len(other.left))) for other in scene.seen]
+            columns[number] = row
+            moved.append(scene.moved(scene.stacked(columns)[0]))
             largest = max(largest, step)
     if not moved:
         return []
@@ -53,40 +55,39 @@ def coarse(scene: Scene | None, std: FloatArray) -> list[Finding]:
     return [Finding("coarse", text, number=shift)]
 
 
-def _rounded(s: Seen) -> list[tuple[float, FloatArray]]:
-    """Of each output in steps these, and rows (2·terms, rows) of the error where the phase of its
-    values within a step is not known: a sine and a cosine of each term, which is one of both.
+def _rounded(s: Seen) -> Iterator[tuple[float, FloatArray]]:
+    """Of each output in steps these, and rows (1, rows) of the error where the phase of its values
+    within a step is not known: a sine and a cosine of each term, which is one of both.
     """
     if s.record is None:
-        return []
+        return
     N, _ = s.grid
-    errors = s.signals(s.unweighted(s.left[None])[0])
-    found = []
+    left = s.unweighted(s.left[None])[0]
     for o, signal in enumerate(s.record.outputs[:N].T):
         step = _step(signal)
         if not step:
             continue
-        fitted = signal + errors[o]
-        variance = max(float(np.mean(errors[o] ** 2)) - step**2 / 12, 0.0)
-        waves = []
-        for k in range(1, _TERMS + 1):
-            size = step / (np.pi * k) * np.exp(-2 * (np.pi * k / step) ** 2 * variance)
-            if size < _NONE * step:
-                break
-            turn = 2 * np.pi * k / step * fitted
-            waves += [size * np.sin(turn), size * np.cos(turn)]
-        if waves:
-            signals = np.zeros((len(waves), s.n_outputs, N))
-            signals[:, o] = np.array(waves) / np.sqrt(2)
-            found.append((step, s.sampled(signals)))
-    return found
+        variance = max(float(2 * np.sum(np.abs(left[o]) ** 2)) / N**2 - step**2 / 12, 0.0)
+        order = np.arange(1, _TERMS + 1)
+        size = step / (np.pi * order) * np.exp(-2 * (np.pi * order / step) ** 2 * variance)
+        terms = order[size >= _NONE * step]
+        if not len(terms):
+            continue
+        fitted = signal + s.signals(left)[o]
+        for k in terms:
+            for wave in (np.sin, np.cos):
+                error = np.zeros((1, s.n_outputs, N))
+                error[0, o] = size[k - 1] / np.sqrt(2) * wave(2 * np.pi * k / step * fitted)
+                yield step, s.sampled(error)
 
 
 def _step(signal: FloatArray) -> float:
     """What all differences of a signal's values are whole multiples of; 0 where there is none."""
-    gaps = np.diff(np.unique(signal))
-    if not len(gaps):
-        return 0.0
-    step = float(gaps.min())
-    off = np.abs(gaps / step - np.round(gaps / step))
-    return step if off.max() < _EVEN else 0.0
+    # most signals are in no steps, which some of their samples show
+    for some in (signal[:_SHOWN], signal):
+        gaps = np.diff(np.unique(some))
+        step = float(gaps.min(initial=np.inf))
+        off = np.abs(gaps / step - np.round(gaps / step))
+        if off.max(initial=0.0) >= _EVEN:
+            return 0.0
+    return step if len(gaps) else 0.0
