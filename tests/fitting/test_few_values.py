@@ -48,9 +48,8 @@ def test_a_single_value_more_is_students_and_no_trust():
 
 def test_of_many_values_the_interval_is_the_normal_one():
     table = fq.fit(LAG, measured(1)).parameters
-    assert ((table["upper"] - table["value"]) / table["std"]).tolist() == pytest.approx(
-        [1.96, 1.96], abs=3e-3
-    )
+    half = (table["upper"] - table["value"]) / table["std"]
+    assert half.tolist() == pytest.approx([1.959964] * 2, rel=1e-6)
 
 
 @pytest.mark.study

@@ -15,19 +15,30 @@ def process(K, tau):
 PLANT = fq.GreyBox(process, [fq.Parameter("K", K), fq.Parameter("tau", TAU)])
 
 
-def stepped(quantum, seed):
+def stepped(quantum, seed, gain=K):
     u = np.r_[np.zeros(20), np.full(220, 20.0)]
-    y = fq.simulate(PLANT, u, 10.0).y + 0.1 * np.random.default_rng(seed).standard_normal(240)
+    y = fq.simulate(PLANT.with_values(K=gain), u, 10.0).y + 0.1 * np.random.default_rng(
+        seed
+    ).standard_normal(240)
     return fq.Record(u, np.round(y / quantum) * quantum, 10.0)
 
 
-@pytest.mark.parametrize("quantum", [0.1, 0.5])
-def test_the_last_step_of_a_converter_is_no_limit(quantum):
+def test_the_last_step_of_a_converter_is_no_limit():
     """Of 24 seven were: what noise lifts to the last step it adds, a limit takes away."""
     for seed in range(8):
-        est = fq.fit(PLANT, stepped(quantum, seed), start={"K": 1.0, "tau": 70.0})
+        est = fq.fit(PLANT, stepped(0.1, seed), start={"K": 1.0, "tau": 70.0})
         assert est.verdict.trusted, est.warnings
         assert est["K"] == pytest.approx(K, rel=0.02)
+
+
+@pytest.mark.parametrize("gain", [0.8, 0.805])
+def test_a_step_that_is_coarser_than_the_noise_is_said_and_no_limit_either(gain):
+    """The second of these gains is five error bars off, and was trusted."""
+    for seed in range(4):
+        est = fq.fit(PLANT, stepped(0.5, seed, gain), start={"K": 1.0, "tau": 70.0})
+        assert {w.kind for w in est.warnings} == {"coarse"}
+        assert est["K"] == pytest.approx(gain, rel=0.015)
+        assert est.parameters["std"]["K"] < 1e-3 * gain
 
 
 def test_a_half_that_stands_still_is_no_error():

@@ -21,6 +21,9 @@ from freqid.fitting.uncertainty.gradient_noise import score_covariance
 
 # a cost of this part of the data's energy is nothing but rounding
 _ROUNDING = 1e-18
+# values that tell the noise from which its size is as good as known: Student's quantile at 95 % is
+# then a hundredth larger
+_MANY = 100
 # a value so near to a bound, as a part of its size, is at it
 _AT_BOUND = 1e-6
 
@@ -261,13 +264,17 @@ class Spread:
 
 
 def quantile(minimum: Minimum | None, level: float) -> float:
-    """Half an interval in standard errors: Student's where what is left tells the noise, which the
-    periods of periodic data tell, too; else the normal one.
+    """Half an interval in standard errors: Student's where few values tell the noise, those that
+    are left and those of periods of periodic data; else the normal one, as the error bars
+    themselves are of many values.
     """
-    if minimum is None or minimum.prior is not None:
+    freedom = np.inf
+    if minimum is not None and minimum.prior is None:
+        known = [e.data.freedom for e in minimum.experiments if isinstance(e, PeriodicExperiment)]
+        freedom = minimum.freedom + 2 * sum(known)
+    if freedom >= _MANY:
         return float(scipy.stats.norm.ppf((1 + level) / 2))
-    known = [e.data.freedom for e in minimum.experiments if isinstance(e, PeriodicExperiment)]
-    return float(scipy.stats.t.ppf((1 + level) / 2, minimum.freedom + 2 * sum(known)))
+    return float(scipy.stats.t.ppf((1 + level) / 2, freedom))
 
 
 def root(matrix: FloatArray) -> FloatArray:
