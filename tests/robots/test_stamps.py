@@ -248,6 +248,7 @@ def at_even_ticks(off, late, noise=0.0, seed=3, clocks=(True, False)):
     return plant, fq.Record.from_logs(5e-4 * stamps[0], record.u, 5e-3 * stamps[1], y)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("off", "late", "clocks"),
     [
