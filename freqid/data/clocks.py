@@ -18,6 +18,7 @@ _DENOMINATORS = 64
 _CALM, _FOLLOWING = 0.4, 0.1
 # part of a period that stamps of even ticks are off by, of stamps and of the program that made them
 _STEADY = 0.1
+# part of one that may be no drift between clocks of which one is even and stamped badly
 _EVEN = 0.5
 # a period's and a start's part that rounding hides at best
 _DIGITS, _EXACT = 1e-13, 1e-7

@@ -61,7 +61,7 @@ def record_of(
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
     if reference is None:
-        reference = kept_reference(frame)
+        reference = kept_reference(frame.columns)
     told = kept_channels(frame, signals, reference)
     u_names, y_names = _channels(signals, inputs, outputs, reference, told)
     between = kept_hold(frame, u_names) if hold is None else hold

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -105,14 +105,14 @@ def kept_step(frame: pd.DataFrame) -> float | None:
     return positive(_STEP, _one(frame, _STEP), "s") if _STEP in frame.columns else None
 
 
-def kept_reference(frame: pd.DataFrame) -> str | None:
+def kept_reference(columns: Iterable[object]) -> str | None:
     """The column of the reference, where the table was written from a record that had one."""
-    return "reference" if {_LOOP, "reference"} <= set(map(str, frame.columns)) else None
+    return "reference" if {_LOOP, "reference"} <= set(map(str, columns)) else None
 
 
 def kept_of_record(columns: Collection[str]) -> str:
     """What only a record in memory has of what columns keep, in words."""
-    if {_LOOP, "reference"} <= set(columns):
+    if kept_reference(columns):
         return "a reference, through which its loop has to be fitted"
     return "clocks that are apart by an unknown time" if _APART in columns else ""
 

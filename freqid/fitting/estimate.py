@@ -29,7 +29,7 @@ from freqid.fitting.search.verdict import Witness
 from freqid.fitting.shown import Shown
 from freqid.fitting.tied import with_tied
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
-from freqid.fitting.uncertainty.minimum import Minimum, Spread, quantile
+from freqid.fitting.uncertainty.minimum import Minimum, Spread, quantile, values_that_tell
 from freqid.fitting.uncertainty.profiles import profile_intervals
 from freqid.lti import Hold
 from freqid.models import GreyBox
@@ -171,26 +171,24 @@ class Estimate(Questioned, Shown):
         lower, upper = self._limits(std)
         free = pd.DataFrame(
             {
-                "value": self.values,
-                "std": std,
-                "lower": lower,
-                "upper": upper,
-                "nominal": self.nominal,
-                "unit": list(self.units),
+                "value": self.values, "std": std, "lower": lower, "upper": upper,
+                "nominal": self.nominal, "unit": list(self.units),
             },
             index=pd.Index(list(self.names), name="parameter"),
-        )
-        return with_tied(free, self, quantile(self.problem, 0.95))
+        )  # fmt: skip
+        return with_tied(free, self, quantile(self.told_by, 0.95))
+
+    @cached_property
+    def told_by(self) -> float:
+        """How many values tell the size of the noise; infinite where it is known otherwise."""
+        return values_that_tell(self.problem)
 
     def _limits(self, std: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ends of 95 % intervals, inside the bounds."""
-        half = quantile(self.problem, 0.95) * std
+        half = quantile(self.told_by, 0.95) * std
         lower, upper = self.values - half, self.values + half
-        if (
-            self.problem is None
-            or not isinstance(self.model, GreyBox)
-            or self.scatter.given is not None
-        ):
+        own = self.problem is not None and isinstance(self.model, GreyBox)
+        if not own or self.scatter.given is not None:
             return lower, upper
         return self.minimum.inside_bounds(self.scatter.change, std, lower, upper)
 
@@ -293,7 +291,7 @@ class Estimate(Questioned, Shown):
             std = np.sqrt(np.diag(self.covariance_matrix))
             jobs = processes(n_jobs)
             return profile_intervals(self.minimum, self.scatter.change, std, level, progress, jobs)
-        half = quantile(self.problem, level) * np.sqrt(np.diag(self.covariance_matrix))
+        half = quantile(self.told_by, level) * np.sqrt(np.diag(self.covariance_matrix))
         return pd.DataFrame(
             {"lower": self.values - half, "upper": self.values + half},
             index=pd.Index(list(self.names), name="parameter"),

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from freqid.checks import InputError, choice, flag, listed, named_values, unknown, whole
 from freqid.data import as_band
+from freqid.fitting.cost.places import check_separate
 from freqid.fitting.fitters import SearchOptions, fitter_of, without_parameters
 from freqid.fitting.grey_box import checked_start
 from freqid.fitting.noise_models import NoiseModel
@@ -53,8 +54,9 @@ def check_options(model: object, options: Options) -> None:
     check_words(options)
     as_band(options.get("band"))
     hold = options.get("hold")
-    for each in hold.values() if isinstance(hold, Mapping) else (hold,):
-        if each is not None and not (isinstance(each, str) and each == "estimate"):
+    estimated = isinstance(hold, str) and hold == "estimate"
+    if hold is not None and not estimated:
+        for each in hold.values() if isinstance(hold, Mapping) else (hold,):
             as_hold(each, 1.0)
     if isinstance(options.get("weights"), str):
         choice("weights", options["weights"], tuple(NoiseModel.named))
@@ -62,13 +64,10 @@ def check_options(model: object, options: Options) -> None:
     separate = (own,) if isinstance(own, str) else tuple(listed("separate", own))
     start = options.get("start")
     if not isinstance(model, GreyBox):
-        estimated = isinstance(hold, str) and hold == "estimate"
         without_parameters(SearchOptions(start=start, separate=separate, estimated_hold=estimated))
         return
     checked_start(model, start)
-    for name in separate:
-        if name not in model.values:
-            raise InputError(unknown("separate", name, model.values))
+    check_separate(model, separate)
 
 
 def known_options(

@@ -13,7 +13,7 @@ import numpy as np
 from freqid.checks import InputError, path_of
 from freqid.data import DataSet, Record, whole_file
 from freqid.fitting.clock_offset import NAME, behind_offset
-from freqid.fitting.estimate import Z95, Estimate
+from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.grades import Verdict
 from freqid.fitting.met import data_digest, remembered
@@ -62,7 +62,7 @@ def written(est: Estimate) -> Written:
         "values": est.values,
         "lower": table["lower"].to_numpy(),
         "upper": table["upper"].to_numpy(),
-        "quantile": quantile(est.problem, 0.95),
+        "told_by": est.told_by,
         "nominal": est.nominal,
         "covariance": est.covariance_matrix,
         "n_evaluations": est.n_evaluations,
@@ -154,6 +154,8 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         band=None if kept["band"] is None else tuple(kept["band"]), weights=kept["weights"],
         call=str(kept["call"]), notes=list(kept["notes"]),
     )  # fmt: skip
+    # what an older file does not say
+    told_by = float(kept.get("told_by", np.inf))
     witness, verdict, said = kept["witness"], kept["verdict"], kept.get("remembered")
     table = pd.DataFrame(
         {
@@ -170,7 +172,8 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
         verdict=Verdict(verdict["grade"], list(verdict["reasons"])),
         warnings=[Finding(w["kind"], w["sentence"], w["severity"], w["number"], w.get("p_value"))
                   for w in kept["findings"]],
-        _parameters=with_tied(table, est, kept.get("quantile", Z95)),
+        told_by=told_by,
+        _parameters=with_tied(table, est, quantile(told_by, 0.95)),
         digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip

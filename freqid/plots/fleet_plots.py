@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.plots.style import drawing, ink
-from freqid.validation import FEWEST, LEVEL, fitted_rows, fleet_alarms
+from freqid.validation import FEWEST, LEVEL, check_columns, fitted_rows, fleet_alarms
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +39,7 @@ def plot_fleet(
     fitted.
     """
     values, std, kept = fitted_rows(table, parameter)
+    check_columns(table, by=by, machine=machine)
     marked = np.zeros(len(table), bool)
     if kept.sum() >= FEWEST:
         marked = fleet_alarms(table, parameter, by=by, machine=machine, level=level)

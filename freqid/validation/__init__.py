@@ -3,7 +3,7 @@
 It may import checks, lti, data, models and fitting.
 """
 
-from freqid.validation.changes import FEWEST, LEVEL, fitted_rows, fleet_alarms
+from freqid.validation.changes import FEWEST, LEVEL, check_columns, fitted_rows, fleet_alarms
 from freqid.validation.comparison import Comparison, compare
 from freqid.validation.cost_tests import cost_test
 from freqid.validation.repeats import bootstrap, cross_validate, hold_bias

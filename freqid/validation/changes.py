@@ -71,10 +71,7 @@ def fleet_alarms(
     if not 0 < finite("level", level) < 1:
         raise InputError(f"level={level!r} must be a probability, above 0 and below 1")
     values, std, kept = fitted_rows(table, parameter)
-    columns = [str(c) for c in table.columns]
-    for name, column in (("by", by), ("machine", machine)):
-        if column is not None and (not isinstance(column, str) or column not in columns):
-            raise InputError(unknown(name, column, columns))
+    check_columns(table, by=by, machine=machine)
     if kept.sum() < FEWEST:
         raise InputError(
             f"parameter={parameter!r}: fewer than three rows were fitted, {int(kept.sum())}; "
@@ -104,6 +101,14 @@ def _there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> A
     if seen.isna().any():
         raise InputError(f"{argument}={column!r}: row {rows[int(seen.isna().argmax())]} has none")
     return seen.to_numpy()
+
+
+def check_columns(table: pd.DataFrame, **named: str | None) -> None:
+    """ValueError for a column, by the argument that names it, that the table has not."""
+    columns = [str(c) for c in table.columns]
+    for argument, column in named.items():
+        if column is not None and (not isinstance(column, str) or column not in columns):
+            raise InputError(unknown(argument, column, columns))
 
 
 def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:

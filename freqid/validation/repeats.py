@@ -216,6 +216,4 @@ def _fitted(
 
 def _values(est: Estimate) -> dict[str, float]:
     """All that was estimated, tied parameters too."""
-    values = dict(zip(est.names, est.values.tolist(), strict=True))
-    tied = getattr(est.model, "ties", {})
-    return values | {n: float(est.parameters["value"][n]) for n in tied}
+    return dict(est.parameters["value"])

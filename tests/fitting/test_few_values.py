@@ -1,6 +1,7 @@
 """Hardly more values than unknowns: what is known of errors then, and what is said of it."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy
 
@@ -44,6 +45,38 @@ def test_a_single_value_more_is_students_and_no_trust():
         ends = est.intervals(level=level).loc["a"]
         wide = (ends["upper"] - ends["lower"]) / 2 / est.parameters["std"]["a"]
         assert wide == pytest.approx(scipy.stats.t.ppf((1 + level) / 2, 1), rel=1e-6)
+
+
+def test_profiles_and_estimates_that_were_kept_count_the_values_too(tmp_path):
+    """They had the normal quantile, 6.5 times too small."""
+    inside = profiled = 0
+    for seed in range(12):
+        est = fq.fit(LAG, measured(seed), band=(10, 11.5))
+        table, ends = est.parameters, est.intervals("profile").loc["a"]
+        profiled += ends["lower"] <= 100 <= ends["upper"]
+        inside += table["lower"]["a"] <= 100 <= table["upper"]["a"]
+        assert ends["upper"] - ends["lower"] > 4 * 1.96 * table["std"]["a"]
+    assert min(profiled, inside) >= 10
+    tied = fq.fit(LAG.tie(b="a"), measured(1), band=(10, 11.5))
+    for _ in range(2):
+        tied.save(tmp_path / "few.json", overwrite=True)
+        again = fq.load(tmp_path / "few.json")
+        pd.testing.assert_frame_equal(again.parameters, tied.parameters)
+        pd.testing.assert_frame_equal(again.intervals(), tied.intervals())
+        tied = again
+
+
+@pytest.mark.study
+def test_a_bound_of_few_values_has_the_interval_of_few():
+    """What ends on a bound has an interval that holds as often as another."""
+    held, at_bound = [], 0
+    for seed in range(120):
+        est = fq.fit(LAG.with_values(a=90).with_bounds(a=(1, 100)), measured(seed), band=(10, 12))
+        low, high = est.parameters.loc["a", ["lower", "upper"]]
+        at_bound += est["a"] == pytest.approx(100)
+        held.append(low <= 100 <= high)
+    assert 30 < at_bound < 90
+    assert np.mean(held) > 0.9
 
 
 def test_of_many_values_the_interval_is_the_normal_one():

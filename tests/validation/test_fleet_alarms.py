@@ -145,6 +145,9 @@ def test_what_is_refused():
 def test_the_first_days_of_a_fleet_are_drawn(rows):
     axes = fq.plot_fleet(fleet([2, 0], 20)[:rows], "k")
     assert f"{rows} fits" in axes.get_title()
+    for name in ("by", "machine"):
+        with pytest.raises(ValueError, match=f"{name}='day'"):
+            fq.plot_fleet(fleet([2, 0], 20)[:rows], "k", **{name: "day"})
 
 
 def test_the_picture_of_machines():

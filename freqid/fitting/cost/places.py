@@ -20,10 +20,8 @@ class Place:
     known: Mapping[str, float]
 
 
-def places_of(
-    model: GreyBox, data: Sequence[DataSet], separate: Sequence[str]
-) -> tuple[list[Place], list[str]]:
-    """One place a data set, and notes on conditions; ValueError for names that the model lacks."""
+def check_separate(model: GreyBox, separate: Sequence[str]) -> None:
+    """ValueError for parameters that no experiment can have for itself."""
     for name in separate:
         if name not in model.values:
             raise InputError(unknown("separate", name, model.values))
@@ -31,6 +29,13 @@ def places_of(
             raise InputError(f"separate={name!r} is fixed or tied; free it first: model.free(name)")
         if name in model.delay_sources:
             raise InputError(f"separate={name!r} is a delay, which all experiments share")
+
+
+def places_of(
+    model: GreyBox, data: Sequence[DataSet], separate: Sequence[str]
+) -> tuple[list[Place], list[str]]:
+    """One place a data set, and notes on conditions; ValueError for names that the model lacks."""
+    check_separate(model, separate)
     places = []
     for number, d in enumerate(data):
         for name in d.conditions:

@@ -111,8 +111,7 @@ def _meant(model: object, options: Mapping[str, object]) -> dict[str, float] | N
 
 def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
     """What is said of one record; an error is a row, too."""
-    tied = getattr(task.model, "ties", {})
-    if done is not None and not task.verdicts and not tied:
+    if done is not None and not task.verdicts and not getattr(task.model, "ties", {}):
         return _values(done.values, done.std, done.cost, done.fit_percent, True) | {"error": ""}
     try:
         options = dict(task.options)
@@ -122,13 +121,10 @@ def _fitted(task: Task, name: str, data: object, done: Done | None) -> Row:
             options["start"] = near
         est = fit(task.model, data, **options)  # type: ignore[arg-type]
         uninterrupted(est.message)
-        std = np.sqrt(np.diag(est.covariance_matrix))
-        values = dict(zip(est.names, est.values.tolist(), strict=True))
-        errors = dict(zip(est.names, std.tolist(), strict=True))
-        for name in tied:
-            values[name] = float(est.parameters["value"][name])
-            errors[name] = float(est.parameters["std"][name])
-        row = _values(values, errors, est.cost, est.fit_percent, est.converged)
+        told = est.parameters
+        row = _values(
+            dict(told["value"]), dict(told["std"]), est.cost, est.fit_percent, est.converged
+        )  # fmt: skip
         if task.verdicts:
             row |= {"verdict": est.verdict.grade, "witness": est.witness.verdict}
             row |= {"warnings": "; ".join(est.warnings)}

@@ -68,17 +68,21 @@ def _rounded(s: Seen) -> Iterator[tuple[float, FloatArray]]:
         if not step:
             continue
         variance = max(float(2 * np.sum(np.abs(left[o]) ** 2)) / N**2 - step**2 / 12, 0.0)
-        order = np.arange(1, _TERMS + 1)
-        size = step / (np.pi * order) * np.exp(-2 * (np.pi * order / step) ** 2 * variance)
-        terms = order[size >= _NONE * step]
-        if not len(terms):
+        terms = [k for k, size in enumerate(_series(step, variance), 1) if size >= _NONE * step]
+        if not terms:
             continue
         fitted = signal + s.signals(left)[o]
-        for k in terms:
+        for k, size in zip(terms, _series(step, variance), strict=False):
             for wave in (np.sin, np.cos):
                 error = np.zeros((1, s.n_outputs, N))
-                error[0, o] = size[k - 1] / np.sqrt(2) * wave(2 * np.pi * k / step * fitted)
+                error[0, o] = size / np.sqrt(2) * wave(2 * np.pi * k / step * fitted)
                 yield step, s.sampled(error)
+
+
+def _series(step: float, variance: float) -> FloatArray:
+    """Sizes of the terms of e(x) where x has noise of this variance, the first one first."""
+    k = np.arange(1, _TERMS + 1)
+    return step / (np.pi * k) * np.exp(-2 * (np.pi * k / step) ** 2 * variance)
 
 
 def _step(signal: FloatArray) -> float:

@@ -183,9 +183,9 @@ class Inquiry:
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects, or that there has to be one."""
         found = self._on_suspects()
-        serious = any(f.severity == "serious" for f in found)
-        more = beyond_noise(self.minimum) + coarse(self.scene, self._std)
-        return found if serious else [*more, *found]
+        if any(f.severity == "serious" for f in found):
+            return found
+        return [*beyond_noise(self.minimum), *coarse(self.scene, self._std), *found]
 
     def _on_suspects(self) -> list[Finding]:
         scene, named = self.scene, self.named

@@ -136,7 +136,8 @@ class Minimum:
         else:
             half = np.linalg.pinv(J)
             found = Determined(half, np.zeros(len(half), bool), [])
-        if self.prior is not None or self.spare > 0 or self._told_apart:
+        periodic = any(isinstance(e, PeriodicExperiment) for e in self.experiments)
+        if self.prior is not None or self.spare > 0 or periodic:
             return found
         # they take up any noise whole
         text = (
@@ -145,11 +146,6 @@ class Minimum:
         )
         loose = np.full(len(found.half), bool(names))
         return Determined(found.half, loose, [*found.sentences, text])
-
-    @property
-    def _told_apart(self) -> bool:
-        """Whether the noise is told by more than what a model leaves."""
-        return any(isinstance(e, PeriodicExperiment) for e in self.experiments)
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -190,7 +186,7 @@ class Minimum:
     ) -> tuple[FloatArray, FloatArray]:
         """Ends of 95 % intervals (P,) cut at the bounds; of what is at one, from there on.
 
-        That end is the quantile of the normal variable that the data alone would give, of which
+        That end is the quantile of the variable that the data alone would give, of which
         only what lies inside the bound is possible.
         """
         low, high = self.structure.lower * scale, self.structure.upper * scale
@@ -198,15 +194,15 @@ class Minimum:
         lower, upper = np.clip(lower, low, high), np.clip(upper, low, high)
         if not (np.isfinite(low).any() or np.isfinite(high).any()):
             return lower, upper
-        beyond = self.unbounded * scale
+        beyond, own = self.unbounded * scale, scatter_of(values_that_tell(self))
         for i, at in enumerate(value):
             if not np.isfinite(std[i]) or std[i] == 0:
                 continue
             for bound, sign in ((low[i], 1.0), (high[i], -1.0)):
                 if np.isfinite(bound) and abs(at - bound) <= _AT_BOUND * size[i]:
                     outside = sign * (beyond[i] - bound) / std[i]
-                    tail = scipy.stats.norm.sf(-outside)
-                    reach = scipy.stats.norm.isf(0.05 * tail) + outside
+                    tail = own.sf(-outside)
+                    reach = own.isf(0.05 * tail) + outside
                     end = bound + sign * std[i] * float(max(reach, 0.0))
                     if sign > 0:
                         lower[i], upper[i] = bound, min(end, high[i])
@@ -263,18 +259,26 @@ class Spread:
         return np.where(np.isfinite(inner), inner, unknown)
 
 
-def quantile(minimum: Minimum | None, level: float) -> float:
-    """Half an interval in standard errors: Student's where few values tell the noise, those that
-    are left and those of periods of periodic data; else the normal one, as the error bars
-    themselves are of many values.
+def values_that_tell(minimum: Minimum | None) -> float:
+    """How many values tell the noise: those that are left, and those of periods of periodic data;
+    infinite where it is known otherwise.
     """
-    freedom = np.inf
-    if minimum is not None and minimum.prior is None:
-        known = [e.data.freedom for e in minimum.experiments if isinstance(e, PeriodicExperiment)]
-        freedom = minimum.freedom + 2 * sum(known)
-    if freedom >= _MANY:
-        return float(scipy.stats.norm.ppf((1 + level) / 2))
-    return float(scipy.stats.t.ppf((1 + level) / 2, freedom))
+    if minimum is None or minimum.prior is not None:
+        return np.inf
+    known = [e.data.freedom for e in minimum.experiments if isinstance(e, PeriodicExperiment)]
+    return float(minimum.freedom + 2 * sum(known))
+
+
+def scatter_of(count: float) -> Any:
+    """The distribution of an error in its standard errors, which ``count`` values tell: Student's
+    of few, the normal one of many.
+    """
+    return scipy.stats.norm if count >= _MANY else scipy.stats.t(count)
+
+
+def quantile(count: float, level: float) -> float:
+    """Half an interval in standard errors, which ``count`` values tell."""
+    return float(scatter_of(count).ppf((1 + level) / 2))
 
 
 def root(matrix: FloatArray) -> FloatArray:

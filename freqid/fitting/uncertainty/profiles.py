@@ -12,13 +12,14 @@ from freqid.checks import FloatArray, InputError
 from freqid.data import Bar, in_turn
 from freqid.fitting.cost.objective import Structure
 from freqid.fitting.search.descent import minimise
-from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.uncertainty.minimum import Minimum, quantile, values_that_tell
 from freqid.lti import Realisation
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# standard errors within which an end is looked for, and evaluations of each fit on the way
+# steps within which an end is looked for, each half the distance to the linear interval's end, and
+# evaluations of each fit on the way
 _REACH, _LIMIT = 10.0, 60
 # and the nearest that one can be
 _NEAREST = 1e-3
@@ -37,11 +38,12 @@ def profile_intervals(
     """Lower and upper end of each parameter's interval by profile likelihood.
 
     A value is inside when the cost, a prior's part in it included, minimised over all others,
-    exceeds the least by no more than σ² χ²(level), within the bounds of the search; where weights
-    leave the noise coloured the threshold is widened as its standard error is. ``scale`` and
-    ``std`` (P,) are the size of each unknown and the standard error of each parameter. Infinite
-    where nothing holds the parameter within ten standard errors. ``n_jobs`` is a number of
-    processes, None this one; ``progress`` shows how many ends are found.
+    exceeds the least by no more than σ² t²(level), Student's where few values tell the noise,
+    within the bounds of the search; where weights leave the noise coloured the threshold is widened
+    as its standard error is. ``scale`` and ``std`` (P,) are the size of each unknown and the
+    standard error of each parameter. Infinite where nothing holds the parameter within five times
+    the interval that its standard error gives. ``n_jobs`` is a number of processes, None this one;
+    ``progress`` shows how many ends are found.
 
     Source: Seber and Wild, Nonlinear Regression, 1989, section 5.2.
     """
@@ -49,13 +51,15 @@ def profile_intervals(
 
     noise, own = minimum.noise_variance, std / scale
     white = noise * np.diag(minimum.determined.inverse)
-    quantile = float(scipy.stats.chi2.ppf(level, 1))
-    ends = minimum.x[:, None] + np.sqrt(quantile) * own[:, None] * np.array([-1, 1])
+    half = quantile(values_that_tell(minimum), level)
+    ends = minimum.x[:, None] + half * own[:, None] * np.array([-1, 1])
     ends[~np.isfinite(own)] = -np.inf, np.inf
     # an error that is down to rounding has no profile
     told = np.flatnonzero(np.isfinite(own) & (own > _ROUNDED * np.abs(minimum.x)))
-    rise = {i: noise * max(own[i] ** 2 / white[i], 1e-12) * quantile for i in told}
-    each = [(int(i), side * float(own[i]), float(rise[i])) for i in told for side in (-1, 1)]
+    rise = {i: noise * max(own[i] ** 2 / white[i], 1e-12) * half**2 for i in told}
+    each = [
+        (int(i), side * half * float(own[i]) / 2, float(rise[i])) for i in told for side in (-1, 1)
+    ]
     with Bar(progress, len(each), 0, "ends of profiles") as advance:
         found = in_turn(partial(_end_of, minimum), each, n_jobs, lambda _: advance(1))
     ends[told] = np.reshape(found, (-1, 2))
