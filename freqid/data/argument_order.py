@@ -26,7 +26,7 @@ def in_either_order(made: _Made) -> _Made:
     def told(self: object, *given: object, **named: object) -> None:
         first, third, rest = given[:2], given[2:5], given[5:]
         number = len(third) > 0 and third[0] is not None and np.asarray(third[0]).ndim == 0
-        if not number and not (len(third) > 1 and isinstance(third[1], Hold)):
+        if not number and not (len(third) > 1 and isinstance(third[1], Hold | str)):
             return made(self, *given, **named)
         if len(third) == len(_OTHER):
             dt, hold, variance = third

@@ -29,7 +29,7 @@ from freqid.data.entries import frozen, shaped
 from freqid.data.remembered import response_columns
 from freqid.data.sources import that_follows
 from freqid.data.units import as_units, quotient
-from freqid.lti import Hold
+from freqid.lti import Hold, as_hold
 
 if TYPE_CHECKING:
     import control
@@ -46,7 +46,8 @@ class FrequencyResponse:
         response: complex, (outputs, inputs, K), or (K,) for one input and one output.
         variance: variance of the complex response, shaped like it.
         dt: sample time in s; 0 for a continuous-time response.
-        hold: what the input did between its samples; None where it does not apply.
+        hold: what the input did between its samples, a name meaning one at dt; None where it does
+            not apply.
         coherence: between 0 and 1, shaped like the response.
         input_spectrum: energy |U|² of each input at the frequencies, (inputs, K): the weight of
             the bias integral (paper, eq. 2).
@@ -85,7 +86,7 @@ class FrequencyResponse:
         response: ArrayLike,
         variance: ArrayLike | None = None,
         dt: float = 0.0,
-        hold: Hold | None = None,
+        hold: Hold | str | None = None,
         coherence: ArrayLike | None = None,
         input_spectrum: ArrayLike | None = None,
         input_names: Sequence[str] | None = None,
@@ -115,7 +116,7 @@ class FrequencyResponse:
             frequency=frozen(f),
             response=frozen(G),
             dt=dt,
-            hold=hold,
+            hold=None if hold is None else as_hold(hold, dt),
             variance=shaped("variance", variance, G.shape),
             coherence=shaped("coherence", coherence, G.shape, most=1.0),
             input_spectrum=shaped("input_spectrum", input_spectrum, (m, K)),
@@ -194,7 +195,7 @@ class FrequencyResponse:
 
     @classmethod
     def from_control(
-        cls, frd: control.FrequencyResponseData, hold: Hold | None = None
+        cls, frd: control.FrequencyResponseData, hold: Hold | str | None = None
     ) -> FrequencyResponse:
         """A response from ``control.FrequencyResponseData``; ValueError for anything else."""
         if not hasattr(frd, "omega") or not hasattr(frd, "frdata"):

@@ -1,5 +1,6 @@
 """A response's arguments by position: those of its signature, and those of 0.1.0."""
 
+import numpy as np
 import pytest
 
 import freqid as fq
@@ -44,3 +45,20 @@ def test_an_argument_that_is_given_twice_is_refused(given, named, what):
 def test_an_array_for_a_sample_time_is_named():
     with pytest.raises(ValueError, match="dt="):
         fq.FrequencyResponse(F, G, dt=V)
+
+
+def test_a_hold_by_its_name_is_one_at_dt():
+    """Found: the name was kept as it was, and a fit read it as band-limited: d = 218 for 10."""
+    plant, f = fq.two_mass(), np.linspace(10, 80, 100)
+    G = plant.frequency_response(2 * np.pi * f, hold=fq.ZeroOrderHold(5e-3)).response
+    for seen in (
+        fq.FrequencyResponse(f, G, dt=5e-3, hold="zoh"),
+        fq.FrequencyResponse(f, G, None, 5e-3, "zoh"),
+        fq.FrequencyResponse(f, G, 5e-3, "zoh"),
+    ):
+        assert seen.hold == fq.ZeroOrderHold(5e-3)
+        assert fq.fit(plant, seen)["d"] == pytest.approx(10, rel=1e-6)
+    assert fq.FrequencyResponse(f, G, hold="bl").hold == fq.BandLimited()
+    for wrong in ({"hold": "zoh"}, {"hold": "xyz", "dt": 0.1}, {"hold": 5}):
+        with pytest.raises(ValueError, match="hold="):
+            fq.FrequencyResponse(f, G, **wrong)

@@ -255,7 +255,13 @@ def as_hold(hold: Hold | str | None, dt: float, remembered: Hold | None = None) 
     if hold is None and remembered is not None:
         return remembered
     if isinstance(hold, str) and hold in Hold.named:
-        return Hold.named[hold].at(dt)
+        kind = Hold.named[hold]
+        if issubclass(kind, PeriodicHold) and not dt > 0:
+            raise InputError(
+                f"hold={hold!r} means one at the sample time, which is {dt:g} s here; give dt, or "
+                f"{kind.__name__}(period)"
+            )
+        return kind.at(dt)
     names = ", ".join(map(repr, Hold.named))
     kinds = ", ".join(
         f"{kind.__name__}({'period' if issubclass(kind, PeriodicHold) else ''})"
