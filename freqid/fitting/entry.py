@@ -146,8 +146,8 @@ def fit(
     estimated = isinstance(hold, str) and hold == "estimate"
     skip_zero = isinstance(model, GreyBox) and model.integrates
     late = isinstance(model, GreyBox) and bool(model.delay_sources)
-    if late and (domain == "time" or initial_state == "zero"):
-        raise InputError("a delay needs domain='frequency' and no initial state at rest")
+    if late and domain == "time" and initial_state != "zero":
+        raise InputError("a delay needs domain='frequency', or initial_state='zero'")
     if late and estimated:
         raise InputError(
             "hold='estimate' and input_delay, or an unknown offset of the clocks: a longer hold is "

@@ -2,6 +2,7 @@
 
 import control
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.signal
 
@@ -323,3 +324,33 @@ def test_one_more_mode_behind_a_delay_is_named(masses, delay):
         return
     assert est.warnings[0].kind == "another mode"
     assert not est.verdict.trusted
+
+
+@pytest.mark.parametrize("steps", [0, 0.18, 1, 3.4, 7])
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_a_late_plant_begins_at_rest(steps, noise):
+    """Refused before: what the input did before the record is known to be nothing."""
+    record = late_record(steps)
+    e = np.random.default_rng(9).standard_normal(record.n_samples)
+    record = fq.Record(record.u, record.y + noise * record.y.std() * e, DT)
+    for band in (None, (0, 20)):
+        est = fq.fit(lag(b=60, a=25), record, initial_state="zero", band=band)
+        table = est.parameters
+        true = pd.Series({"b": 50.0, "a": 20.0, "Td": steps * DT})
+        error = (table["value"] - true).abs()
+        assert (error < (4 * table["std"] if noise else 1e-10 * (true + 1))).all()
+        assert est.verdict.trusted
+    with pytest.raises(ValueError, match="initial_state='zero'"):
+        fq.fit(lag(), record, domain="time")
+
+
+@pytest.mark.parametrize("steps", [0.18, 1, 3.4])
+def test_derivatives_of_late_samples_are_those_of_differences(steps):
+    record = late_record(steps)
+    est = fq.fit(lag(Td=steps * DT), record, initial_state="zero")
+    objective, x = est.minimum.objective, 1.05 * est.minimum.x
+    at = objective.point(x)
+    for i, step in enumerate(1e-6 * x):
+        below, above = (objective.point(x + s * step * np.eye(3)[i]).cost for s in (-1, 1))
+        gradient = 2 * at.jacobian[:, i] @ at.residual
+        assert (above - below) / (2 * step) == pytest.approx(gradient, rel=1e-5)

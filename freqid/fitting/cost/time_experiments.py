@@ -7,8 +7,9 @@ import scipy
 
 from freqid.checks import Array, FloatArray
 from freqid.data import Record
+from freqid.fitting.cost.late_samples import late_input
 from freqid.frf import Spectra
-from freqid.lti import Linearisation, PeriodicHold, Realisation, Sampled
+from freqid.lti import PeriodicHold, Realisation, Sampled
 from freqid.models import FreeMotion, forcing, propagate
 
 
@@ -16,8 +17,8 @@ class TimeExperiment:
     """Output error in the time domain, on all samples or on the DFT lines of a band.
 
     The initial state is either free or that of the sampled model at rest, x(0) = Γ⁺ u(0): under a
-    first-order hold the input then ramps up from zero over the period before the record. Without
-    a hold the matrices are those of a sampled model already.
+    first-order hold the input then ramps up from zero over the period before the record, and late
+    inputs were zero there. Without a hold the matrices are those of a sampled model already.
     """
 
     def __init__(
@@ -46,7 +47,7 @@ class TimeExperiment:
 
     def at(self, realisation: Realisation) -> TimeEvaluation:
         """Evaluate at one trial point."""
-        return TimeEvaluation(self, realisation.for_place(self.place).linearisation)
+        return TimeEvaluation(self, realisation.for_place(self.place))
 
     def rows(self, y: Array) -> FloatArray:
         """(…, outputs, N) as real rows."""
@@ -59,38 +60,40 @@ class TimeExperiment:
 class TimeEvaluation:
     """The samples at one trial point, with a motion (n, N) of the input alone and free ones."""
 
-    def __init__(self, experiment: TimeExperiment, lin: Linearisation) -> None:
-        e, self.lin = experiment, lin
-        self.experiment = e
-        at, d = lin
+    def __init__(self, experiment: TimeExperiment, realisation: Realisation) -> None:
+        e, self.lin = experiment, realisation.linearisation
+        self.experiment, self.u = e, e.u
+        at, d = self.lin
         if e.hold is None:
             none = np.zeros_like(at.B)
             self.sampled = Sampled(at.A, at.B, none)
             self.change = Sampled(d.A, d.B, np.zeros_like(d.B))
-        else:
+        elif realisation.delay is None:
             self.sampled, self.change = e.hold.sampled_derivatives(at.A, at.B, d.A, d.B)
+        else:
+            self.sampled, self.change, self.u = late_input(realisation, e.hold, e.u)
         every = e.factor
         self.transient: FloatArray | None = None
-        push = forcing(self.sampled, e.u)
+        push = forcing(self.sampled, self.u)
         if e.free_state:
-            self.free = FreeMotion(self.sampled.phi, e.u.shape[1])
+            self.free = FreeMotion(self.sampled.phi, self.u.shape[1])
             self.x = self.free.particular(push)
             self.mix, self.transient = _independent(
                 e.rows((at.C @ self.free.motions)[..., ::every]), len(at.A)
             )
         else:
-            self.x = propagate(self.sampled.phi, push, self.sampled.gamma_next @ e.u[:, 0])
-        self.residual = e.rows((at.C @ self.x + at.D @ e.u)[:, ::every] - e.y)
+            self.x = propagate(self.sampled.phi, push, self.sampled.gamma_next @ self.u[:, 0])
+        self.residual = e.rows((at.C @ self.x + at.D @ self.u)[:, ::every] - e.y)
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
         e, d, at = self.experiment, self.lin.derivative, self.lin.at
         x = self._states(initial)
-        push = self.change.phi @ x + forcing(self.change, e.u)
+        push = self.change.phi @ x + forcing(self.change, self.u)
         if e.free_state:
             dx = self.free.particular(push)
         else:
-            dx = propagate(self.sampled.phi, push, self.change.gamma_next @ e.u[:, 0])
-        dy = at.C @ dx + d.C @ x + d.D @ e.u
+            dx = propagate(self.sampled.phi, push, self.change.gamma_next @ self.u[:, 0])
+        dy = at.C @ dx + d.C @ x + d.D @ self.u
         return e.rows(dy[..., :: e.factor])
 
     def changed_midway(self, initial: FloatArray | None) -> FloatArray:
@@ -99,10 +102,10 @@ class TimeEvaluation:
         """
         e, d, at = self.experiment, self.lin.derivative, self.lin.at
         x = self._states(initial)
-        changed = np.arange(e.u.shape[1]) >= e.factor * (e.y.shape[1] // 2)
-        push = (self.change.phi @ x + forcing(self.change, e.u)) * changed
+        changed = np.arange(self.u.shape[1]) >= e.factor * (e.y.shape[1] // 2)
+        push = (self.change.phi @ x + forcing(self.change, self.u)) * changed
         dx = propagate(self.sampled.phi, push, np.zeros(push.shape[:-1]))
-        dy = at.C @ dx + (d.C @ x + d.D @ e.u) * changed
+        dy = at.C @ dx + (d.C @ x + d.D @ self.u) * changed
         return np.asarray(dy[..., :: e.factor])
 
     def _states(self, initial: FloatArray | None) -> FloatArray:
