@@ -38,6 +38,11 @@ class Finding(str):
         self.kind, self.severity, self.number, self.p_value = kind, severity, number, p_value
         return self
 
+    def saying(self, more: str, severity: Severity | None = None) -> Finding:
+        """The same with more to say, and of another weight where one is given."""
+        text = f"{self[len(self.kind) + 2 :]}; {more}"
+        return Finding(self.kind, text, severity or self.severity, self.number, self.p_value)
+
     def __getnewargs__(  # type: ignore[override]
         self,
     ) -> tuple[str, str, Severity, float | None, float | None]:

@@ -8,7 +8,7 @@ from freqid.models.grey_box import GreyBox
 from freqid.models.mechanics import mechanical
 from freqid.models.model import Model
 from freqid.models.observed_order import observed_order
-from freqid.models.output_error import DiscreteModel, OutputError, coefficients_of
+from freqid.models.output_error import DiscreteModel, OutputError, coefficients_of, invert_hold
 from freqid.models.parameter import Parameter
 from freqid.models.plants import PLANTS, drivetrain, first_order, two_mass
 from freqid.models.simulation import (

@@ -28,7 +28,8 @@ _MOST = 16
 
 @dataclass(frozen=True)
 class Element:
-    """A parameter's force per motion: ``name``, ``force`` b (n,) and ``motion`` c (n,).
+    """A parameter's force per motion: ``name``, ``force`` b (n,) and ``motion`` c (n,), of which
+    the ``whole`` acts.
 
     The largest part of the motion counts once. ``damps`` says that the force answers to a velocity;
     ``along`` is the input (n,) that acts at the same place, where one does.
@@ -39,10 +40,22 @@ class Element:
     motion: FloatArray
     damps: bool
     along: FloatArray | None
+    whole: float
+
+    @property
+    def rubs(self) -> str:
+        """Where friction beside it acts."""
+        if self.along is not None:
+            return f"of the input turns round with what {self.name} damps"
+        return f"beside {self.name} turns round with what that one damps"
+
+    def matrices(self, model: Model) -> StateSpace:
+        """Of the plant that force and motion belong to."""
+        return model.state_space()
 
     def moves(self, s: Seen, model: Model) -> ComplexArray:
         """The lines (K,) of the motion as the fit has it."""
-        A, B, _, _ = model.state_space()
+        A, B, _, _ = self.matrices(model)
         plant = StateSpace(A, B, self.motion[None], 0 * B[:1])
         return s.moved(self._response(s, plant, s.reading.hold))[0]
 
@@ -59,7 +72,7 @@ class Element:
         return self._driven(s, model, np.sign(self.force @ self.along) * self.along, shape)
 
     def _driven(self, s: Seen, model: Model, at: FloatArray, shape: ComplexArray) -> FloatArray:
-        A, _, C, D = model.state_space()
+        A, _, C, D = self.matrices(model)
         # what acts inside is held as the first input is
         hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
         G = self._response(s, StateSpace(A, at[:, None], C, 0 * D[:, :1]), hold)
@@ -90,7 +103,9 @@ def elements(model: Model) -> list[Element]:
         force, motion = U[:, 0] * sizes[0] * scale[:, 0] * most, Vt[0] / most
         along = [B for B in at.B.T if _parallel(force, B)]
         damps = float(force @ motion) < 0
-        found.append(Element(name, force, motion, damps, along[0] if along else None))
+        found.append(
+            Element(name, force, motion, damps, along[0] if along else None, model.values[name])
+        )
     return found if len(found) <= _MOST else []
 
 

@@ -16,7 +16,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.bent_modes import DAMPED, PULLED, pulled
+from freqid.fitting.suspects.bent_modes import DAMPED, pulled
 from freqid.fitting.suspects.order import BENT
 from freqid.fitting.suspects.parts import Parting, confirming
 from freqid.fitting.suspects.scene import Scene, lines_beside
@@ -77,15 +77,10 @@ def confirmed(
 
     def judged(f: Finding, a: Asked) -> Finding:
         changes = a.name == "unsteady" and a.test.gain >= _MUCH * scene.moving
-        pull = pulled(inquiry, scene, a) if a.name in BENT else 0.0
-        if a.harm >= _MUCH or changes or pull >= PULLED:
-            return f
-        so = (
-            f"; it moves a mode's decay by {100 * pull:.2g} %"
-            if pull
-            else ", so that this harms little"
-        )
-        return Finding(f.kind, f"{f[len(f.kind) + 2 :]}; {agree}{so}", "minor", f.number)
+        pull = pulled(inquiry, scene, a) if a.name in BENT else None
+        if a.harm >= _MUCH or a.much or changes or (pull and pull.harms):
+            return f.saying(str(pull)) if pull else f
+        return f.saying(f"{agree}; {pull or 'so that this harms little'}", "minor")
 
     return [judged(f, a) for f, a in zip(found, said, strict=True)]
 

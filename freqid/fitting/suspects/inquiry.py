@@ -112,9 +112,9 @@ class Inquiry:
             told = [(c, t) for c, t in tried if t and (t.size > 0 or not c.onesided)]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
-                p = of_several(t.p_value, c.trials)
-                p = max(min(p, 1.0), c.chance)
-                found.append(Asked(name, t, c.unit, p, c.detail, c.trials, c.certain))
+                p = max(min(of_several(t.p_value, c.trials), 1.0), c.chance)
+                much = abs(t.size) >= c.harmful
+                found.append(Asked(name, t, c.unit, p, c.detail, c.trials, c.certain, much))
         found = asked_again(self, scene, found, self._std)
         found += unlike(self, scene)
         found = midway(self, scene, found)

@@ -8,17 +8,23 @@ sweep it stands where the sweep is not.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.findings import FOLDED
 from freqid.fitting.suspects.elements import Element, elements
+from freqid.fitting.suspects.far_end import FarEnd, far_ends
+from freqid.fitting.suspects.modal_elements import modal_elements
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.models import GreyBox, Model
+
+Part = TypeVar("Part", Element, FarEnd)
 
 # inputs times outputs that are asked at the most
 _PAIRS = 9
@@ -27,6 +33,35 @@ _PAIRS = 9
 _LEVEL, _LEVELS = 1e-6, 3
 # about how many samples are looked at first
 _GLANCED = 1000
+# change with the level, in %, from which a black box is another: of a gain, of a mode's stiffness,
+# which moves its frequency by half of that, and of its damping
+_GAIN, _STIFFNESS, _DAMPING = 5.0, 2.0, 10.0
+
+
+@dataclass(frozen=True)
+class _Bend:
+    """What bends: in words, its ``whole`` linear part in the unit of its column, where that is
+    known, and the change in % that is ``harmful``.
+    """
+
+    text: str
+    whole: float | None = 1.0
+    harmful: float = _GAIN
+
+    @property
+    def size(self) -> float:
+        """That of a column by which its coefficient is the change in %."""
+        return (self.whole or 100.0) / 100
+
+    @property
+    def unit(self) -> str:
+        """Of the coefficient."""
+        return "%" if self.whole else ""
+
+
+_DRIVE = _Bend("the input's gain changes with its size")
+_FORCE = _Bend("a force bends with the output", None, np.inf)
+_SENSOR = _Bend("the sensor's gain changes with the output's size")
 
 
 @suspect("friction")
@@ -34,12 +69,13 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     """What acts against the direction of motion, however fast that is: Coulomb's.
 
     On an input, an output being the velocity, or the position; of as many inputs as outputs each
-    has its own. Beside each damper of a grey box, with what that one answers to.
+    has its own. Beside each damper, with what that one answers to; at the far end of a black box.
     """
     if not _asked(scene, model):
         return []
     dampers = [each for each in _elements(scene, model) if each[0].damps]
-    count = 2 + len(dampers)
+    ends = _same([[*far_ends(s.own(model))] for s in scene.seen])
+    count = 2 + len(dampers) + len(ends)
     ways: dict[str, Callable[[FloatArray], FloatArray]] = {
         "of the input turns round with the output": _direction,
         "of the input turns round with the slope of the output": lambda y: _direction(
@@ -65,22 +101,27 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
             own = s.own(model)
             velocity = s.signals(e.moves(s, own))
             rows.append(e.answers_input(s, own, s.lines_of(_direction(velocity))))
-        name, along = each[0].name, each[0].along is not None
-        text = f"of the input turns round with what {name} damps"
-        text = text if along else f"beside {name} turns round with what that one damps"
-        unit = _unit(scene) if along else ""
-        found.append(Columns(rows, unit, count, text, onesided=True))
+        unit = _unit(scene) if each[0].along is not None else ""
+        found.append(Columns(rows, unit, count, each[0].rubs, onesided=True))
+    for end in ends:
+        rows = []
+        for far, s in zip(end, scene.seen, strict=True):
+            G = far.response(s, s.own(model))
+            motion = s.signals(s.moved(G))
+            velocity = np.gradient(motion, axis=-1) if far.position else motion
+            rows.append(s.driven(G, -s.lines_of(_direction(velocity))[None]))
+        found.append(Columns(rows, _unit(scene), count, end[0].rubs, onesided=True))
     return found
 
 
 @suspect("nonlinear")
 def nonlinear(scene: Scene, model: Model) -> list[Columns]:
     """A gain that bends: the drive's, the sensor's, a spring's at the output, or that of any spring
-    or damper of a grey box.
+    or damper of a grey box, or of a mode of a black one.
     """
     if not _asked(scene, model):
         return []
-    kinds: dict[str, list[Sequence[FloatArray]]] = {}
+    kinds: dict[_Bend, list[tuple[FloatArray, FloatArray]]] = {}
     springs = _elements(scene, model)
     pairs, alike = _pairs(model), [(i, i) for i in range(model.n_inputs)]
     for s in scene.seen:
@@ -88,28 +129,32 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
         y = _fitted(s)
         bent = s.lines_of(_cube(s.signals(y)))
         if all(_more_than_levels(each) for each in u):
-            kinds.setdefault("the input's gain changes with its size", []).append(
-                _onto(s, model, alike, s.lines_of(_cube(u)), s.lines_of_input)
-            )
-        if all(each[0].damps for each in springs):
-            kinds.setdefault("a force bends with the output", []).append(
-                _onto(s, model, pairs, bent, y)
-            )
+            drive = _onto(s, model, alike, s.lines_of(_cube(u)), s.lines_of_input)
+            kinds.setdefault(_DRIVE, []).append((drive[0], drive[1]))
+        if not isinstance(model, GreyBox) or all(each[0].damps for each in springs):
+            forces = _onto(s, model, pairs, bent, y)
+            kinds.setdefault(_FORCE, []).append((forces[0], forces[1]))
         alone = np.eye(len(y))[:, :, None]
-        sensor = s.rows_of(alone * bent), s.rows_of(alone * y)
-        kinds.setdefault("the sensor's gain changes with the output's size", []).append(sensor)
+        kinds.setdefault(_SENSOR, []).append((s.rows_of(alone * bent), s.rows_of(alone * y)))
     for each in springs:
+        what = _Bend(
+            f"{each[0].name} changes with its motion", each[0].whole,
+            _DAMPING if each[0].damps else _STIFFNESS,
+        )  # fmt: skip
         for e, s in zip(each, scene.seen, strict=True):
             own = s.own(model)
             motion = e.moves(s, own)
             shapes = s.lines_of(_cube(s.signals(motion))), motion
-            bent_too, straight = (e.answers(s, own, shape) for shape in shapes)
-            kinds.setdefault(f"{e.name} changes with its motion", []).append((bent_too, straight))
-    told = {text: rows for text, rows in kinds.items() if len(rows) == len(scene.seen)}
+            rows = [e.answers(s, own, shape) for shape in shapes]
+            kinds.setdefault(what, []).append((rows[0], rows[1]))
+    told = {bend: rows for bend, rows in kinds.items() if len(rows) == len(scene.seen)}
     return [
-        Columns([bent for bent, _ in rows], "", len(told), text, [linear for _, linear in rows])
-        for text, rows in told.items()
-    ]
+        Columns(
+            [bend.size * bent for bent, _ in rows], bend.unit, len(told), bend.text,
+            [linear for _, linear in rows], harmful=bend.harmful,
+        )
+        for bend, rows in told.items()
+    ]  # fmt: skip
 
 
 def _asked(scene: Scene, model: Model) -> bool:
@@ -124,9 +169,14 @@ def _asked(scene: Scene, model: Model) -> bool:
 
 
 def _elements(scene: Scene, model: Model) -> list[tuple[Element, ...]]:
-    """Springs and dampers, each as every experiment met it."""
-    met = [elements(s.own(model)) for s in scene.seen]
-    same = all([e.name for e in found] == [e.name for e in met[0]] for found in met)
+    """Springs and dampers, those of the modes of a black box, each as every experiment met it."""
+    parts = elements if isinstance(model, GreyBox) else modal_elements
+    return _same([parts(s.own(model)) for s in scene.seen])
+
+
+def _same(met: Sequence[Sequence[Part]]) -> list[tuple[Part, ...]]:
+    """Each part of a plant as every experiment met it, where all met the same parts."""
+    same = all([e.rubs for e in found] == [e.rubs for e in met[0]] for found in met)
     return list(zip(*met, strict=True)) if same else []
 
 
@@ -170,9 +220,11 @@ def _onto(
 
 
 def _cube(signal: FloatArray) -> FloatArray:
-    """The cube, in the signal's own size."""
+    """The cube, of which the part that goes with the signal is the signal itself."""
     size = np.sqrt(np.mean(signal**2, axis=-1, keepdims=True))
-    found: FloatArray = signal * (signal / np.where(size > 0, size, 1)) ** 2
+    each = signal / np.where(size > 0, size, 1)
+    fourth = np.mean(each**4, axis=-1, keepdims=True)
+    found: FloatArray = signal * each**2 / np.where(fourth > 0, fourth, 1)
     return found
 
 

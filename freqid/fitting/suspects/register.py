@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -18,7 +19,8 @@ class Columns:
     ``unit`` is that of its size. ``trials`` counts the places that the suspect was looked for in.
     ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
     data themselves show, however little it explains. Lines are weighed by the noise unless
-    ``alike``. ``chance`` is what the data themselves allow at least.
+    ``alike``. ``chance`` is what the data themselves allow at least, ``harmful`` the size that
+    makes a black box another.
     """
 
     columns: Sequence[FloatArray]
@@ -30,6 +32,7 @@ class Columns:
     alike: bool = False
     chance: float = 0.0
     onesided: bool = False
+    harmful: float = math.inf
 
 
 Drawn = Columns | Sequence[Columns] | None

@@ -63,7 +63,7 @@ class Asked:
 
     What is ``certain`` the data themselves show, however little it explains; ``odd`` is a hold that
     no converter has. ``harm`` is the part of the data's energy that a black box lacks for it,
-    infinite where its modes move.
+    infinite where its modes move; ``much`` says that its size makes a black box another.
     """
 
     name: str
@@ -73,6 +73,7 @@ class Asked:
     detail: str = ""
     trials: int = 1
     certain: bool = False
+    much: bool = False
     odd: bool = False
     harm: float = float("nan")
 

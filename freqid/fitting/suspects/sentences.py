@@ -52,6 +52,7 @@ def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
 def words(name: str, size: float, unit: str, detail: str) -> str:
     """What a suspect says of the data, in words."""
     number = f"{size:.3g}{unit}"
+    level = f", by about {size:+.2g} % from small motions to these" if unit else ""
     halves = f" by {100 * abs(size):.3g} % of a parameter" if unit else ""
     return {
         "delay": f"the input acts {size:.3g} s later than the model says",
@@ -63,7 +64,7 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "saturation": f"{detail or 'an output stays at one extreme value'}, as at a limit",
         # a sensor that looks the other way makes it negative
         "friction": f"a friction of {abs(size):.3g}{unit} {detail}",
-        "nonlinear": f"the plant is not linear: {detail}",
+        "nonlinear": f"the plant is not linear: {detail}{level}",
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
         "amplitude": "the parameters change with the level of the input",
