@@ -133,6 +133,7 @@ def fit_many(
     jobs: int | None = None,
     scheduler: str | None = None,
     verdicts: Annotated[bool, Option(negative="--no-verdicts")] = True,
+    force: Force = False,
 ) -> int:
     """Fit one model to many files, a row each; interrupted, it goes on where it was.
 
@@ -149,8 +150,11 @@ def fit_many(
     verdicts
         --no-verdicts leaves out witness, warnings and verdict, which take longer than the fit.
     """
+    # what is replaced stays until all is fitted
+    table_at = out.with_name(f"{out.stem}.new{out.suffix}") if force and out.exists() else out
     # a pattern may take in the table of an earlier call
-    files = [file for file in matching(data) if Path(file).resolve() != out.resolve()]
+    own = {out.resolve(), table_at.resolve()}
+    files = [file for file in matching(data) if Path(file).resolve() not in own]
     if not files:
         raise InputError(f"{' '.join(data)} matches no file but {out}, which is the table's")
     options = search.given()
@@ -158,9 +162,11 @@ def fit_many(
         options["start"] = asked.values()
     with engine(scheduler):
         table = fq.fit_many(
-            asked.plant(), files, out, n_jobs=jobs, verdicts=verdicts, reading=reading.given(),
+            asked.plant(), files, table_at, n_jobs=jobs, verdicts=verdicts, reading=reading.given(),
             **options,
         )  # fmt: skip
+    if table_at != out:
+        table_at.replace(out)
     failed = table[table["error"] != ""]
     print(f"{out}: {len(table)} files, {len(failed)} failed")
     if "verdict" in table:

@@ -1,4 +1,4 @@
-"""Positions of a response's arguments: those of its signature, and the other order in use."""
+"""Arguments that are given in two ways: in the order of a signature or another, by an old name."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from freqid.lti import Hold
 
 _Made = TypeVar("_Made", bound=Callable[..., None])
+_Read = TypeVar("_Read", bound=Callable[..., object])
 
 # as 0.1.0 took the third argument and those after it
 _OTHER = ("dt", "hold", "variance")
@@ -34,3 +35,43 @@ def in_either_order(made: _Made) -> _Made:
         return made(self, *first, **dict(zip(_OTHER, third, strict=False)), **named)
 
     return cast("_Made", told)
+
+
+# of ``read`` after path, inputs and outputs: in its signature, and beginning with the time's column
+_READ = ("dt", "hold", "reference")
+_READ_BY_TIME = ("time", "dt", "sep", "decimal", "units", "resample")
+
+
+def read_in_either_order(read: _Read) -> _Read:
+    """``dt, hold, reference`` after the outputs, or ``time, dt, sep, decimal, units, resample``.
+
+    The name of a column is no sample time, and a number no hold, so what is meant can be told.
+    """
+
+    @wraps(read)
+    def told(*given: object, **named: object) -> object:
+        first, rest = given[:3], given[3:]
+        by_time = len(rest) > len(_READ) or isinstance(rest[0] if rest else None, str)
+        by_time |= len(rest) > 1 and isinstance(rest[1], int | float)
+        order = _READ_BY_TIME if by_time else _READ
+        if len(rest) > len(order) or set(order[: len(rest)]) & set(named):
+            return read(*given, **named)
+        return read(*first, **dict(zip(order, rest, strict=False)), **named)
+
+    return cast("_Read", told)
+
+
+def formerly(**names: str) -> Callable[[_Read], _Read]:
+    """Arguments by the names that they had before: ``band="limits"``."""
+
+    def known(method: _Read) -> _Read:
+        @wraps(method)
+        def told(*given: object, **named: object) -> object:
+            for now, before in names.items():
+                if before in named and now not in named:
+                    named[now] = named.pop(before)
+            return method(*given, **named)
+
+        return cast("_Read", told)
+
+    return known

@@ -16,6 +16,7 @@ import numpy as np
 
 from freqid.checks import InputError, an, finite, flag, listed, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
+from freqid.data.argument_order import read_in_either_order
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
 from freqid.data.readers.table import named, named_with
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 _REPAIR = "cut the record there with slice() or repair the samples first"
 
 
+@read_in_either_order
 @that_reads
 def read(
     path: str | Path,

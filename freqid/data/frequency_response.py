@@ -22,7 +22,7 @@ from freqid.checks import (
     sealed,
     whole,
 )
-from freqid.data.argument_order import in_either_order
+from freqid.data.argument_order import formerly, in_either_order
 from freqid.data.band import Band, chosen
 from freqid.data.conditions import as_conditions
 from freqid.data.entries import frozen, shaped
@@ -46,8 +46,7 @@ class FrequencyResponse:
         response: complex, (outputs, inputs, K), or (K,) for one input and one output.
         variance: variance of the complex response, shaped like it.
         dt: sample time in s; 0 for a continuous-time response.
-        hold: what the input did between its samples, a name meaning one at dt; None where it does
-            not apply.
+        hold: what the input did between its samples, by name one at dt; None where there is none.
         coherence: between 0 and 1, shaped like the response.
         input_spectrum: energy |U|² of each input at the frequencies, (inputs, K): the weight of
             the bias integral (paper, eq. 2).
@@ -158,6 +157,7 @@ class FrequencyResponse:
         ends = self.output_names[output], self.input_names[input]
         return quotient(*(self.units.get(name, "") for name in ends))
 
+    @formerly(band="limits")
     @that_follows
     def select(self, band: tuple[float, float]) -> FrequencyResponse:
         """The frequencies inside ``band`` (Hz), ends included; ValueError if there are none."""

@@ -44,7 +44,8 @@ def open(
         dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set or
             an attribute ``time``, ``dt`` or ``fs``), or instead of it.
         hold: what the input did, where the file does not remember it; a zero-order hold else.
-        columns: names of the channels of arrays and blocks, u and y where not given.
+        columns: names of the channels of arrays and blocks in turn, where these have none: inputs
+            and outputs where not given, or else u and y.
         scale: what samples, integers for the most part, are multiplied by: one for all, one for
             each channel that is taken, inputs first, or some by name.
         group: of an HDF5 or zarr file that holds several groups of arrays.
@@ -60,20 +61,21 @@ def open(
     True
     """
     size = whole("block", block)
+    both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
+    named = both if columns is None and both and len({*both}) == len(both) else columns
     if files := files_of(source):
-        both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
         asked = Asked(size, dt, columns, group, both)
         found = chained([_of_file(file, asked) for file in files], both, hold is not None)
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
-        found = of_array(source, columns, size, type(source).__name__)
+        found = of_array(source, named, size, type(source).__name__)
     elif hasattr(source, "columns"):
         raise InputError(
             f"source is a {type(source).__name__}, a table in memory; take Record.from_frame of it"
         )
     elif callable(source) or isinstance(source, Iterable):
-        found = _of_blocks(source, columns)
+        found = _of_blocks(source, named)
     else:
         raise InputError(
             f"source={type(source).__name__} cannot be opened; expected a path, an array or blocks"
@@ -143,17 +145,20 @@ def _of_blocks(source: Source, columns: Sequence[str] | None) -> Found:
             )
         used = True
         started = source() if callable(source) else source
-        for rows in from_the_first(_alike(started, len(names)), first):
+        for rows in from_the_first(_alike(started, names), first):
             yield rows if list(which) == list(range(len(names))) else rows[:, which]
 
     return Found(blocks, names, None, None, "blocks")
 
 
-def _alike(blocks: Iterable[Array], width: int) -> Iterator[Array]:
-    """Blocks (n, width) of one kind of numbers; ValueError, with the place, for others."""
+def _alike(blocks: Iterable[Source], names: Sequence[str]) -> Iterator[Array]:
+    """Blocks (n, channels) of one kind of numbers; ValueError, with the place, for others."""
     at, kind = 0, ""
     for block in blocks:
-        rows = as_rows(block, f"blocks: the block at sample {at}", width)
+        # a table's columns have names of their own, in any order
+        told = set(names) <= set(getattr(block, "columns", ()))
+        rows = block[list(names)].to_numpy() if told else block
+        rows = as_rows(rows, f"blocks: the block at sample {at}", len(names))
         kind = kind or rows.dtype.kind
         # integers among floating numbers lack their scale
         if (rows.dtype.kind == "f") != (kind == "f"):

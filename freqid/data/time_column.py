@@ -114,9 +114,11 @@ def _found(
     frame: pd.DataFrame, time: str | None, units: Mapping[str, str], dt: float | None
 ) -> str | None:
     if time is not None:
-        if time not in frame.columns:
+        # as the file's header has it, its unit in brackets, or without that
+        plain = time if time in frame.columns else named(time)[0]
+        if plain not in frame.columns:
             raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
-        return time
+        return plain
     told = time_named([str(c) for c in frame.columns])
     if told is not None:
         return told

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, Protocol
 
 if TYPE_CHECKING:
@@ -76,3 +76,15 @@ def between_parts(rows: Sequence[tuple[object, ...]] = ()) -> pd.DataFrame:
     columns = ["between", "parameter", "parts", "value", "shift", "percent", "p_value", "std",
                "widened"]  # fmt: skip
     return pd.DataFrame(rows, columns=columns).set_index(["between", "parameter"])
+
+
+def suspects_table(rows: Mapping[str, Sequence[object]] | None = None) -> pd.DataFrame:
+    """The table of ``Estimate.suspects``, a row each by its name; empty, with its columns, where
+    there is nothing to tell.
+    """
+    import pandas as pd
+
+    columns = ["statistic", "p_value", "size", "unit", "power", "largest_shift"]
+    frame = pd.DataFrame.from_dict(dict(rows or {}), orient="index", columns=columns)
+    frame.index.name = "suspect"
+    return frame

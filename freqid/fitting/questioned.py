@@ -6,7 +6,13 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from freqid.fitting.findings import MUCH_FOLDED, Finding, Inquired, between_parts
+from freqid.fitting.findings import (
+    MUCH_FOLDED,
+    Finding,
+    Inquired,
+    between_parts,
+    suspects_table,
+)
 from freqid.fitting.grades import Verdict, verdict
 from freqid.fitting.search.verdict import Witness
 from freqid.fitting.twins import exchangeable
@@ -71,9 +77,7 @@ class Questioned:
 
         Source: Söderström and Stoica, System Identification, 1989, appendix B.
         """
-        import pandas as pd
-
-        return pd.DataFrame() if self.inquiry is None else self.inquiry.table()
+        return suspects_table() if self.inquiry is None else self.inquiry.table()
 
     @cached_property
     def spread(self) -> pd.DataFrame:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from freqid.data import Record
+    from freqid.data import DataSet
 
 
 class Shown:
@@ -64,16 +64,16 @@ class Shown:
         path: str | Path,
         title: str | None = None,
         *,
-        validation: Record | None = None,
+        validation: DataSet | None = None,
         overwrite: bool = False,
     ) -> None:
         """Write one self-contained HTML page about the estimate, which works offline.
 
         A sentence on whether it may be trusted, the parameters with error and bias bars, response
         and simulation to zoom into, residual tests, warnings, and the call that made it. Another
-        record as ``validation`` is simulated, too, and has a say in the verdict. Raises ValueError
-        for another suffix than .html, without the extra ``report``, or for a file that is there and
-        is no such page, without ``overwrite``.
+        record or response as ``validation`` is compared, too, and has a say in the verdict. Raises
+        ValueError for another suffix than .html, without the extra ``report``, or for a file that
+        is there and is no such page, without ``overwrite``.
         """
         from freqid.pages import write_report
 

@@ -10,6 +10,7 @@ from html import escape
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from freqid.checks import (
     FloatArray,
@@ -254,6 +255,12 @@ class GreyBox(Model):
         array([[-2.]])
         """
         return self._function.at(self.values | values)
+
+    def state_spaces(self, **columns: ArrayLike) -> StateSpace:
+        """The same at many points: of values (S,) each, matrices (S, …)."""
+        rows = np.transpose([*columns.values()])
+        each = [self.state_space(**dict(zip(columns, row, strict=True))) for row in rows]
+        return StateSpace(*map(np.stack, zip(*each, strict=True)))
 
     def linearisation(self) -> Linearisation:
         """The matrices, and their derivatives by the free parameters."""

@@ -178,7 +178,10 @@ def simulate(
     system = plant.state_space()
     inputs = u.reshape(len(u), -1)
     names = plant.inputs or () if input_names is None else listed("input_names", input_names)
-    between = as_holds(hold, dt, ZeroOrderHold(dt), names)
+    if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
+        raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
+    # a sampled model has its hold inside
+    between = as_holds(hold, dt, plant.own_hold or ZeroOrderHold(dt), names)
     for each in InputHolds.each(between, 1):
         if isinstance(each, PeriodicHold) and abs(each.period - dt) > 1e-9 * dt:
             raise InputError(
@@ -192,8 +195,6 @@ def simulate(
         raise InputError(f"initial_state has shape {x0.shape}; the model has {n} states")
     if not np.isfinite(x0).all():
         raise InputError(f"initial_state={initial_state!r:.80} must be finite numbers")
-    if plant.dt and abs(plant.dt - dt) > 1e-9 * dt:
-        raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
     if not plant.dt:
         warn_of_rounding(system, between, np.pi / dt * np.geomspace(0.1, 1, 3))
     keep_freed_memory()

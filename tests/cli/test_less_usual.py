@@ -92,6 +92,17 @@ def test_fleets_begin_where_they_are_told_to(folder, capsys):
     assert "matches no file but" in capsys.readouterr().err
 
 
+def test_a_table_of_other_fits_is_replaced_where_that_is_said(folder, capsys):
+    words = ["fit-many", "log.csv", "--model", "mine.py:plant", "--out", "table.parquet"]
+    assert run(*words, "--no-verdicts") == 0
+    assert run(*words) == 2
+    assert "other fits" in capsys.readouterr().err
+    assert "verdict" not in pd.read_parquet("table.parquet")
+    assert run(*words, "--force") == 0
+    assert pd.read_parquet("table.parquet")["verdict"].iloc[0] == "trust"
+    assert [p.name for p in folder.glob("*table*")] == ["table.parquet"]
+
+
 def test_files_of_a_fleet_that_are_not_to_be_used_are_named(folder, capsys):
     record = fq.read("log.csv")
     turned = fq.Record(record.u, -record.y, record.dt)

@@ -12,7 +12,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse
-from freqid.fitting.findings import Finding, Severity, between_parts
+from freqid.fitting.findings import Finding, Severity, between_parts, suspects_table
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import changing, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
@@ -272,20 +272,16 @@ class Inquiry:
 
     @tuned
     def table(self) -> pd.DataFrame:
-        """The suspects by name: statistic, p_value, size, unit, power, largest_shift."""
-        import pandas as pd
-
-        columns = ["statistic", "p_value", "size", "unit", "power", "largest_shift"]
-        rows = {
+        """The suspects by name, first what is said first; see ``Estimate.suspects``."""
+        said = [HOLDS if a.name == "hold rejected" else (a.name,) for a in self.named[:1]]
+        first = [a for a in self.asked if said and a.name in said[0]]
+        return suspects_table({
             a.name: (
                 a.test.statistic, a.p_value, a.test.size, a.unit, a.test.power,
                 a.test.largest_shift,
             )
-            for a in self.asked
-        }  # fmt: skip
-        frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
-        frame.index.name = "suspect"
-        return frame
+            for a in [*first, *(a for a in self.asked if a not in first)]
+        })  # fmt: skip
 
 
 def _equally_weighted(reading: Reading) -> bool:

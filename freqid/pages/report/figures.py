@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import FrequencyResponse, LocalResponse, Record
+from freqid.data import DataSet, FrequencyResponse, LocalResponse, Record
 from freqid.fitting import Estimate
 from freqid.frf import etfe, local_polynomial
 from freqid.lti import PeriodicHold
@@ -37,6 +37,9 @@ _DATA: Style = {"color": "#7f7f7f"}
 _BLACK, _BLUE, _ORANGE = (Style(color=colour) for colour in COLOURS[:3])
 
 
+_ZOOM = "Drag to zoom, double-click to see all again."
+
+
 class Figure(NamedTuple):
     """A figure with its heading and the sentence under it."""
 
@@ -46,11 +49,19 @@ class Figure(NamedTuple):
     layout: Part
 
 
-def figures(est: Estimate, validation: Record | None = None) -> list[Figure]:
+def figures(est: Estimate, validation: DataSet | None = None) -> list[Figure]:
     """Response of data and model, then measured and simulated outputs, as far as there are any;
-    those of another record for validation at the end.
+    those of other data for validation at the end.
     """
-    own = [*_responses(est), *_residuals(est, records(est)[0] if records(est) else None)]
+    own = _residuals(est, records(est)[0] if records(est) else None)
+    if (measured := _measured(est)) is not None:
+        own = [
+            *_responses(est, measured, "Frequency response, ", _of_the_data(est, measured)),
+            *own,
+        ]
+    if isinstance(validation, FrequencyResponse):
+        other = f"{_ZOOM} The data are the response that was given for validation."
+        return [*own, *_responses(est, validation, "Validation on another response, ", other)]
     return [*own, *_residuals(est, validation, "Validation on another record, ")]
 
 
@@ -66,11 +77,8 @@ def _figure(
     return Figure(title, note, [part | {"legendgroup": part["name"]} for part in data], layout)
 
 
-def _responses(est: Estimate) -> list[Figure]:
+def _responses(est: Estimate, measured: FrequencyResponse, title: str, note: str) -> list[Figure]:
     """Amplitude and phase of data and model, one figure a channel pair."""
-    measured = _measured(est)
-    if measured is None:
-        return []
     low, high = measured.frequency[[0, -1]]
     even = np.linspace(low, high, 600), np.geomspace(max(low, 1e-9), high, 600)
     f = np.unique(np.concatenate(even))
@@ -84,8 +92,8 @@ def _responses(est: Estimate) -> list[Figure]:
     data, fitted = Shown(some, "data", _DATA), Shown(model, "model", _ORANGE)
     return [
         _figure(
-            f"Frequency response, {measured.input_names[i]} to {measured.output_names[o]}",
-            _of_the_data(est, measured),
+            f"{title}{measured.input_names[i]} to {measured.output_names[o]}",
+            note,
             bode_traces(bode_curve(data, model, (o, i), scattered=True), "markers")
             + bode_traces(bode_curve(fitted, model, (o, i))),
             520,
@@ -99,13 +107,12 @@ def _responses(est: Estimate) -> list[Figure]:
 
 def _of_the_data(est: Estimate, measured: FrequencyResponse) -> str:
     """What is said of the points."""
-    zoom = "Drag to zoom, double-click to see all again."
     if isinstance(est.data[0], FrequencyResponse):
-        return f"{zoom} The data are the response that was fitted."
+        return f"{_ZOOM} The data are the response that was fitted."
     if isinstance(measured, LocalResponse):
-        return f"{zoom} The data are told apart by input with local polynomials."
+        return f"{_ZOOM} The data are told apart by input with local polynomials."
     return (
-        f"{zoom} The data are the ratio of the DFTs, whose scatter at weak lines is no fault of "
+        f"{_ZOOM} The data are the ratio of the DFTs, whose scatter at weak lines is no fault of "
         "the model."
     )
 

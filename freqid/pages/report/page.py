@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from freqid.checks import InputError, flag, path_of
-from freqid.data import Record, check_replacing, whole_file
+from freqid.data import DataSet, check_replacing, whole_file
 from freqid.fitting import Estimate
 from freqid.models import GreyBox
 from freqid.pages.report.figures import figures
@@ -23,7 +23,7 @@ def write_report(
     est: Estimate,
     path: str | Path,
     title: str | None = None,
-    validation: Record | None = None,
+    validation: DataSet | None = None,
     overwrite: bool = False,
 ) -> None:
     """Write the page; see ``Estimate.report``."""

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from typing import NamedTuple
 
 from freqid.checks import InputError
-from freqid.data import Record
+from freqid.data import DataSet, FrequencyResponse
 from freqid.fitting import Estimate, Verdict as Graded, data_digest
 from freqid.lti import InputHolds, PeriodicHold
 from freqid.models import GreyBox
@@ -17,8 +17,9 @@ from freqid.validation import compare, hold_bias
 
 # experiments that a page can carry
 _EXPERIMENTS = 50
-# what another record leaves may be so many times as much as the own does, or this many per cent
-_WORSE, _LEAST = 1.0, 5.0
+# what other data leave may be so many times as much as the own do, or this many per cent; of
+# another kind of data it may be half
+_WORSE, _LEAST, _HALF = 1.0, 5.0, 50.0
 
 
 class Verdict(NamedTuple):
@@ -29,8 +30,8 @@ class Verdict(NamedTuple):
     trusted: bool = False
 
 
-def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
-    """Whether an estimate may be trusted, in plain words; another record has its say."""
+def verdict(est: Estimate, validation: DataSet | None = None) -> Verdict:
+    """Whether an estimate may be trusted, in plain words; other data have their say."""
     found = est.verdict
     if validation is not None:
         found = validated(est, validation)
@@ -39,23 +40,29 @@ def verdict(est: Estimate, validation: Record | None = None) -> Verdict:
     return Verdict(found.head, text, found.trusted)
 
 
-def validated(est: Estimate, record: Record) -> Graded:
-    """The verdict with what another record says of the model."""
+def validated(est: Estimate, other: DataSet) -> Graded:
+    """The verdict with what other data say of the model."""
     found = est.verdict
-    known = records(est)
-    if data_digest(record) in map(data_digest, known):
+    kind = "response" if isinstance(other, FrequencyResponse) else "record"
+    if data_digest(other) in map(data_digest, est.data):
         raise InputError(
-            "validation is a record that was fitted, which the estimate explains by itself; give "
+            f"validation is a {kind} that was fitted, which the estimate explains by itself; give "
             "another one"
         )
-    worst = float(compare(est, record, band=est.band).fit_percent.min())
-    own = float(compare(est, known[0], band=est.band).fit_percent.min()) if known else 100.0
-    if worst > own - _WORSE * max(100 - own, _LEAST):
-        said = f"another record is explained to {worst:.4g} %"
+    # the parts of a record and of a response that are explained are two measures
+    alike = [d for d in est.data if isinstance(d, FrequencyResponse) == (kind == "response")]
+    worst = float(compare(est, other, band=est.band).fit_percent.min())
+    least, where = _HALF, ""
+    if alike:
+        own = float(compare(est, alike[0], band=est.band).fit_percent.min())
+        least = own - _WORSE * max(100 - own, _LEAST)
+        where = f" where what was fitted is to {own:.4g} %"
+    if worst > least:
+        said = f"another {kind} is explained to {worst:.4g} %"
         return Graded(found.grade, [*found.reasons, said])
     said = (
-        f"validation: another record is explained to {worst:.4g} % where what was fitted is to "
-        f"{own:.4g} %; the model does not hold there"
+        f"validation: another {kind} is explained to {worst:.4g} %{where}; the model does not hold "
+        "there"
     )
     useless = worst < 0 or found.grade == "do not use"
     return Graded("do not use" if useless else "doubt", [said, *found.reasons])
