@@ -12,7 +12,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Record, rate_factor
-from freqid.fitting.black_box.lag_scan import likely_lags
+from freqid.fitting.black_box.lag_scan import around, far_lags, farthest, likely_lags
 from freqid.fitting.black_box.late import description_length, in_step, whole_samples
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.black_box.refinement import roughly
@@ -26,21 +26,16 @@ from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.log_stage import Smooth, log_targets, told
 from freqid.fitting.search.stopping import Bound
 from freqid.fitting.uncertainty.shared_noise import shared
-from freqid.lti import PeriodicHold
 from freqid.models import GreyBox, observed_order
 
 # lines on which many starts walk together: where responses bend, and evenly
 ROUND_LINES, _EVEN_LINES = 60, 120
 # samples of an unknown delay that are tried
 _DELAYS = 20
-# samples around a likely one that are tried, too
-_NEAR = 3
 # candidates that each take a black box
 _MANY = 8
 # whole samples of delay of each input
 Shifts = tuple[int, ...]
-# the longest delay is such a part of a record, and so many samples
-_LONGEST, _LAGS = 8, 2000
 # lines that each of several black boxes takes at least
 _LEAST_LINES = 100
 
@@ -198,31 +193,15 @@ def _candidates(
     ]  # fmt: skip
     least = -longest if np.isfinite(early).all() and max(early) < 0 else 0
     lags = set(range(least, longest + 1))
-    far = _far(readings[0], len(model.state_space().A), least < 0)
+    far = far_lags(readings[0], len(model.state_space().A), _DELAYS, least < 0)
     if far:
         # of many each would take a black box: those near none, the start's and the likely ones do
-        near = {*range(-_DELAYS, _DELAYS + 1), *_around(own)}
-        lags = (lags & near) | {q for q in _around(far) if q >= 0 or least < 0}
+        near = {*range(-_DELAYS, _DELAYS + 1), *around(own)}
+        lags = (lags & near) | {q for q in around(far) if q >= 0 or least < 0}
     shared = [q for q in sorted(lags) if (q,) * len(own) != own]
     return [own] + [
         tuple(q if free else kept for free, kept in zip(unknown, own, strict=True)) for q in shared
     ]
-
-
-def _around(lags: Sequence[int]) -> list[int]:
-    """Lags next to some."""
-    return [lag + step for lag in lags for step in range(-_NEAR, _NEAR + 1)]
-
-
-def _far(reading: Reading, order: int, early: bool) -> list[int]:
-    """Lags of a whole record that are likely, up to a part of its length."""
-    record = reading.data
-    if not isinstance(record, Record) or not isinstance(reading.hold, PeriodicHold):
-        return []
-    most = min(record.n_samples // _LONGEST, _LAGS)
-    if most <= _DELAYS or reading.hold.period < record.dt * (1 - 1e-9):
-        return []
-    return likely_lags(record, order, -most if early else 0, most)
 
 
 def begun_slowly(
@@ -237,7 +216,7 @@ def begun_slowly(
         return start
     count, M = record.n_samples, record.factor
     means = record.inputs[: count * M].reshape(count, M, -1).mean(axis=1)
-    most = min(count // _LONGEST, _LAGS)
+    most = farthest(count)
     i = structure.physical_names.index(str(*sources))
     early = structure.lower[i] < 0 and np.isfinite(structure.lower[i])
     order = len(structure.at(start).state_space().A)

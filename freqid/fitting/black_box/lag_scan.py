@@ -6,14 +6,43 @@ section 10.1); what it leaves is least near the true one. It only says where to 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
 from freqid.data import Record
+from freqid.fitting.reading import Reading
+from freqid.lti import PeriodicHold
 
 # lags that are named, how far apart they are at least, and the highest order that is tried
 _NAMED, _APART, _ORDER = 3, 3, 8
+# how near to one the true one may be, and the longest, as a part of a record and in samples
+_NEAR, _LONGEST, _LAGS = 3, 8, 2000
+
+
+def farthest(count: int) -> int:
+    """The longest lag that is looked for in so many samples."""
+    return min(count // _LONGEST, _LAGS)
+
+
+def around(lags: Sequence[int]) -> list[int]:
+    """Lags next to some."""
+    return [lag + step for lag in lags for step in range(-_NEAR, _NEAR + 1)]
+
+
+def far_lags(reading: Reading, order: int, tried: int, early: bool = False) -> list[int]:
+    """Lags of a whole record that are likely, up to a part of its length, where these are more than
+    are ``tried`` anyway.
+    """
+    record = reading.data
+    if not isinstance(record, Record) or not isinstance(reading.hold, PeriodicHold):
+        return []
+    most = farthest(record.n_samples)
+    if most <= tried or reading.hold.period < record.dt * (1 - 1e-9):
+        return []
+    return likely_lags(record, order, -most if early else 0, most)
 
 
 def likely_lags(record: Record, order: int, least: int, most: int) -> list[int]:

@@ -11,6 +11,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, Record, channel_counts, common_names, input_dt
 from freqid.fitting.black_box.folded_subspace import identify
+from freqid.fitting.black_box.lag_scan import around, far_lags
 from freqid.fitting.black_box.late import description_length, in_step
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.refinement import first_model
@@ -44,7 +45,7 @@ from freqid.models import (
 _SPREAD = 20
 # evaluations from one start, and of the last descent from the best
 _DESCENT, _LAST = 100, 1000
-# samples of delay that are tried, and how many of these delays are followed
+# samples of delay that are tried beside the likely ones, and how many delays are followed
 _LONGEST, _FOLLOWED = 24, 6
 # eighths of a turn at the top of a response that are tried
 _TURNS = 160
@@ -53,6 +54,8 @@ _TURNS = 160
 _PARALLEL, _PART = 1e-4, 0.1
 # costs that differ by no more than this part are of one minimum
 _SAME = 1e-6
+# variances that an output left open takes at the most, and samples between such delays
+_OPEN, _NEXT = 10.0, 0.5
 
 
 @fits(TransferFunction, black_box=True)
@@ -109,11 +112,22 @@ def fit_transfer_function(
     for _ in range(asked - len(ends)):
         descend(_by_chance(spec.poles, omega, rng), best[2])
     solution, objective, _ = min(ends, key=left)
-    agreed = sum(end[0].cost <= (1 + _SAME) * solution.cost for end in ends)
+    open_end = _OPEN * solution.cost / objective.n_rows if estimated else 0.0
+    agreed = sum(_alike(end[0], solution, open_end) for end in ends)
     est = _estimate(
         spec, Minimum(objective, polish(objective, solution.x, limit=_LAST)), first.hold, unit
     )
     return dataclasses.replace(est, n_starts=len(ends), n_agreed=agreed)
+
+
+def _alike(end: Solution, best: Solution, open_end: float) -> bool:
+    """Whether two ends are one minimum.
+
+    A delay of whole samples has one on either side of it, with one output more or less left open,
+    which takes no more than ``open_end`` of the cost.
+    """
+    more = open_end if open_end and abs(end.x[-1] - best.x[-1]) <= _NEXT else 0.0
+    return bool(end.cost <= (1 + _SAME) * best.cost + more)
 
 
 def _by_chance(count: int, omega: FloatArray, rng: np.random.Generator) -> ComplexArray:
@@ -139,8 +153,12 @@ def _delays(
     # a response tells delays of up to a turn between two of its lines
     gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
     step = np.pi / 4 / omega[-1]
-    count = min(int(np.pi / gap / step), _TURNS) if responses else _LONGEST
-    for q in range(count):
+    if responses:
+        lags = [*range(min(int(np.pi / gap / step), _TURNS))]
+    else:
+        far = far_lags(readings[0], spec.poles, _LONGEST)
+        lags = sorted({*range(_LONGEST), *(q for q in around(far) if q >= 0)})
+    for q in lags:
         try:
             if responses:
                 delay = q * step
@@ -149,6 +167,7 @@ def _delays(
                 delay = max(q - 0.5, 0.0) * unit
                 point = _in_step_cost(spec.poles, readings, (q,) * shape[1])
         except (InputError, np.linalg.LinAlgError):
+            # longer ones leave even less
             break
         tried.append((point, delay))
     # a single one is that of no delay, which every record can be put in step with

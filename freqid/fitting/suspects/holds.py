@@ -11,6 +11,7 @@ from freqid.checks import InputError
 from freqid.data import input_dt
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.reading import Reading
 from freqid.fitting.sight import out_of_sight
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.refits import held, late
@@ -86,3 +87,9 @@ def unmirrored(inquiry: Asking, scene: Scene, most: float) -> Asked | None:
     p = float(scipy.stats.f.sf(f, 1, freedom))
     test = Score(f, 1, p, again.size, 1.0, np.inf, gain)
     return Asked("hold rejected", test, "s", p, again.sentence, odd=again.odd)
+
+
+def remembered(reading: Reading) -> bool:
+    """Whether data are read under the hold that they remember."""
+    told = getattr(reading.data, "hold", None)
+    return told is None or told == reading.hold

@@ -21,7 +21,7 @@ from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.coarse import coarse
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
-from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, unmirrored
+from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LIKELY, evidence, ordered
@@ -54,8 +54,8 @@ _SURE = 1e-6
 _SMALL, _HARMLESS = 0.3, 1e-3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
-# part of what is left that is most of it
-_MOST = 0.5
+# part of what is left that is most of it, and that is hardly any
+_MOST, _HARDLY = 0.5, 0.1
 # the files whose suspects are known
 _KNOWN = (changing, measurement, nonlinear, plant)
 # level at which all suspects together speak of good data
@@ -129,17 +129,26 @@ class Inquiry:
 
     @cached_property
     def named(self) -> list[Asked]:
+        """Those that speak, first inputs of the past where these explain hardly anything."""
+        scene, limit = self.scene, LEVEL / max(len(self.asked), 1)
+        if scene is None:
+            return []
+        told = self._told
+        if max((a.test.gain for a in told), default=0.0) >= _HARDLY * scene.cost:
+            return told
+        return [*unexplained(self, scene, limit, self._std), *told]
+
+    @cached_property
+    def _told(self) -> list[Asked]:
         """Those that speak, delay and hold fitted again, the one that explains most first.
 
         A delay, a hold and one more mode imitate one another: an early input is no delay where
         another hold speaks, and one more mode is believed where nothing simple explains as much.
         """
         scene = self.scene
-        if scene is None:
+        if scene is None or not self.speaking:
             return []
         limit = LEVEL / max(len(self.asked), 1)
-        if not self.speaking:
-            return unexplained(self, scene, limit, self._std)
         most = max(a.test.gain for a in self.speaking)
         if other := unmirrored(self, scene, most):
             return [other]
@@ -165,7 +174,7 @@ class Inquiry:
         if hold := merged.get("hold rejected"):
             # what a wrong hold leaves goes with inputs still to come, as in a loop
             alone = [a for a in ranked if a.name != "feedback"]
-            if not all(_remembered(r) for r in self.readings):
+            if not all(remembered(r) for r in self.readings):
                 return [hold, *(a for a in alone if a is not hold)]
             looks = [evidence(scene, a) for a in ranked if a.name == "feedback"]
             looks = looks or [_WORTH * max(evidence(scene, a) for a in ranked)]
@@ -288,9 +297,3 @@ def _equally_weighted(reading: Reading) -> bool:
     """Whether errors of a response were taken to be of one size at all of its lines."""
     plain = reading.noise.plain and not reading.logarithmic
     return isinstance(reading.data, FrequencyResponse) and plain
-
-
-def _remembered(reading: Reading) -> bool:
-    """Whether data are read under the hold that they remember."""
-    told = getattr(reading.data, "hold", None)
-    return told is None or told == reading.hold

@@ -50,4 +50,6 @@ def unexplained(inquiry: Asking, scene: Scene, limit: float, std: FloatArray) ->
     span = -lags[-1] * input_dt(scene.seen[0].reading.data)
     # what it lacks has no size that could be compared with a standard error
     test = dataclasses.replace(test, largest_shift=np.inf, largest_change=np.nan)
-    return [Asked("unexplained", test, "s", p, f"inputs of the last {span:.3g} s")]
+    chance = test.degrees * scene.cost / scene.freedom
+    harm = max(test.gain - chance, 0.0) / scene.moving
+    return [Asked("unexplained", test, "s", p, f"inputs of the last {span:.3g} s", harm=harm)]
