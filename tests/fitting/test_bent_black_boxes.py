@@ -94,15 +94,16 @@ def test_a_joint_that_bends_is_a_doubt(spec, kind, fault):
 
 @pytest.mark.parametrize("spec", SPECS, ids=["continuous", "sampled"])
 def test_friction_of_a_load_that_no_sensor_sees_is_named_with_its_place(spec):
-    """Trusted with a damping 49 % off; what was said was of another place."""
-    for record in measured("white", load=0.05):
-        est = fq.fit(spec, record)
-        assert off(est)[1] > 0.25
-        assert est.verdict.grade == "doubt"
-        said = est.warnings[0]
-        assert said.kind == "friction"
-        assert "at the far end" in said
-        assert float(re.search(r"a friction of ([\d.]+)", said)[1]) == pytest.approx(1, rel=0.4)
+    """Trusted with a damping twice as large; what was said was of another place."""
+    for load in (0.02, 0.1):
+        for record in measured("white", load=load):
+            est = fq.fit(spec, record)
+            said = est.warnings[0]
+            assert said.kind == "friction"
+            assert "at the far end" in said
+            size = float(re.search(r"a friction of ([\d.]+)", said)[1])
+            assert size == pytest.approx(20 * load, rel=0.4)
+            assert est.verdict.trusted == (off(est)[1] < 0.25)
 
 
 @pytest.mark.parametrize("spec", SPECS, ids=["continuous", "sampled"])

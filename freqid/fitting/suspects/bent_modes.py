@@ -16,22 +16,21 @@ from freqid.fitting.suspects.scores import Asked
 
 # poles with more damping are no modes
 DAMPED = 0.5
-# relative change of a mode's decay and of its frequency that harms
-_DECAY, _FREQUENCY = 0.1, 0.01
+# relative change of a mode's decay and of its frequency that harms, and that in half-widths, of
+# which a well damped one has many in its frequency
+_DECAY, _FREQUENCY, _WIDTHS = 0.2, 0.01, 0.25
 _LIMIT = 40
 
 
 @dataclass(frozen=True)
 class Pull:
-    """The largest relative change of a mode's ``decay`` and ``frequency``, as a part of each."""
+    """The largest change of a mode's ``decay`` and ``frequency``, as a part of each, and whether
+    that ``harms``.
+    """
 
     decay: float
     frequency: float
-
-    @property
-    def harms(self) -> bool:
-        """Whether a mode is another."""
-        return self.decay >= _DECAY or self.frequency >= _FREQUENCY
+    harms: bool
 
     def __str__(self) -> str:
         if np.isinf(self.decay):
@@ -49,7 +48,7 @@ def pulled(inquiry: Asking, scene: Scene, a: Asked) -> Pull:
     several = [drawn] if isinstance(drawn, Columns) else list(drawn or ())
     meant = [c for c in several if c.detail == a.detail]
     if not meant:
-        return Pull(np.inf, np.inf)
+        return Pull(np.inf, np.inf, True)
     columns, beside = meant[0].columns, meant[0].beside
     try:
         shapes = [s.experiment.with_rows(c) for s, c in zip(scene.seen, columns, strict=True)]
@@ -57,13 +56,13 @@ def pulled(inquiry: Asking, scene: Scene, a: Asked) -> Pull:
             shapes = [e.with_rows(c) for e, c in zip(shapes, beside, strict=True)]
         freed = polish(Objective(structure, shapes), x, limit=_LIMIT)
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
-        return Pull(np.inf, np.inf)
+        return Pull(np.inf, np.inf, True)
     own, others = structure.poles(x)[0], structure.poles(freed.x)[0]
     modes = own[(own.imag > 0) & (-own.real < DAMPED * np.abs(own))]
     if not len(modes):
-        return Pull(0.0, 0.0)
+        return Pull(0.0, 0.0, False)
     nearest = others[np.abs(modes[:, None] - others).argmin(axis=1)]
-    return Pull(
-        float(np.max(np.abs(nearest.real / modes.real - 1))),
-        float(np.max(np.abs(np.abs(nearest / modes) - 1))),
-    )
+    decay, frequency = np.abs(nearest.real / modes.real - 1), np.abs(np.abs(nearest / modes) - 1)
+    damping = -modes.real / np.abs(modes)
+    other = (decay >= _DECAY) | ((frequency >= _FREQUENCY) & (frequency >= _WIDTHS * damping))
+    return Pull(float(decay.max()), float(frequency.max()), bool(other.any()))
