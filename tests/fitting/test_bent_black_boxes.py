@@ -77,7 +77,11 @@ def off(est):
 
 @pytest.mark.parametrize("spec", SPECS, ids=["continuous", "sampled"])
 @pytest.mark.parametrize(
-    ("kind", "fault"), [("white", {"hardening": 0.1}), ("multisine", {"gap": 0.3})]
+    ("kind", "fault"),
+    [
+        ("white", {"hardening": 0.1}),
+        pytest.param("multisine", {"gap": 0.3}, marks=pytest.mark.study),
+    ],
 )
 def test_a_joint_that_bends_is_a_doubt(spec, kind, fault):
     """Trusted, the frequency up to 11 % and the damping 72 % off, and nothing was said."""
@@ -92,6 +96,7 @@ def test_a_joint_that_bends_is_a_doubt(spec, kind, fault):
         assert 4 < change < 25
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("spec", SPECS, ids=["continuous", "sampled"])
 def test_friction_of_a_load_that_no_sensor_sees_is_named_with_its_place(spec):
     """Trusted with a damping twice as large; what was said was of another place."""
@@ -106,6 +111,7 @@ def test_friction_of_a_load_that_no_sensor_sees_is_named_with_its_place(spec):
             assert est.verdict.trusted == (off(est)[1] < 0.25)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("spec", SPECS, ids=["continuous", "sampled"])
 def test_a_straight_joint_is_trusted(spec):
     for kind in ("white", "binary", "multisine"):

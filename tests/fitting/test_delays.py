@@ -326,6 +326,7 @@ def test_one_more_mode_behind_a_delay_is_named(masses, delay):
     assert not est.verdict.trusted
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("steps", [0, 0.18, 1, 3.4, 7])
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_a_late_plant_begins_at_rest(steps, noise):

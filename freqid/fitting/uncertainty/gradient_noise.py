@@ -18,6 +18,10 @@ from freqid.lti import Realisation, eliminate, tuned
 
 # means for each unknown from which they tell their own noise
 _MEANS = 5
+# complex values of a line and its neighbours that tell by how much its noise is off
+_VALUES = 10
+# part of the largest direction of a Jacobian below which one is rounding
+_TOLD = 1e-14
 # leverage that is believed at the most
 MOST_LEVERAGE = 0.9
 
@@ -115,10 +119,12 @@ def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -
 
 
 def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
-    """The same of means over periods, each line's noise its own, that of its outputs together.
+    """The same of means over periods.
 
     Their covariances are estimates, and take in that of neighbours: what they leave of the errors
-    says how far off they are. None where lines are too few to tell.
+    says how far off they are. That of each line follows a peak of the noise, and scatters where few
+    lines tell a parameter; that of some lines together does neither. What is larger counts, along
+    each combination of parameters. None where lines are too few to tell.
     """
     periodic = [e for e in objective.experiments if isinstance(e, PeriodicExperiment)]
     if sum(e.n_means for e in periodic) < _MEANS * len(x):
@@ -130,17 +136,44 @@ def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
     parts = [e.at(realisation) for e in periodic]
     J = np.concatenate([part.jacobian(None) for part in parts], axis=1)
     taken = leverage(J, np.zeros((0, J.shape[1])))[::2]
-    total, at = np.zeros((len(x), len(x))), 0
+    one, some, at = np.zeros((len(x), len(x))), np.zeros((len(x), len(x))), 0
     for e, part in zip(periodic, parts, strict=True):
         p, n = len(e.data.response), part.residual.size // 2
         # how the errors of a line are turned into independent ones depends on the outputs' order
         rest = 1 - taken[at : at + n].reshape(-1, p).mean(axis=1)
-        error = part.residual.view(complex) / np.repeat(rest, p)
-        seen = J[:, 2 * at : 2 * (at + n)].copy().view(complex).conj() * error
-        score = seen.reshape(len(x), -1, p).sum(axis=-1)
-        total += (score @ score.conj().T).real / 2
+        error = part.residual.view(complex).reshape(-1, p) / rest[:, None]
+        seen = J[:, 2 * at : 2 * (at + n)].copy().view(complex).reshape(len(x), -1, p)
+        score = (seen.conj() * error).sum(axis=-1)
+        one += (score @ score.conj().T).real / 2
+        left = (np.abs(error) ** 2).mean(axis=1)
+        level = _around(left.reshape(e.data.outputs.shape[1], -1), p)
+        weighed = seen * np.tile(level, len(left) // len(level))[:, None]
+        some += e.inflation * np.einsum("ikp,jkp->ij", weighed, seen.conj()).real / 2
         at += n
-    return total if np.isfinite(total).all() else None
+    if not (np.isfinite(one).all() and np.isfinite(some).all()):
+        return None
+    return _larger(one, some, J @ J.T)
+
+
+def _larger(one: FloatArray, other: FloatArray, H: FloatArray) -> FloatArray:
+    """The least matrix that is no less than either of two (P, P), in coordinates where H is one."""
+    unit = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    sizes, ways = np.linalg.eigh(H / unit / unit[:, None])
+    kept = sizes > _TOLD * sizes.max()
+    root, back = (ways[:, kept] * sizes[kept] ** s for s in (0.5, -0.5))
+    more, apart = np.linalg.eigh(back.T @ ((one - other) / unit / unit[:, None]) @ back)
+    turned = unit[:, None] * (root @ apart)
+    return np.asarray(other + (turned * np.maximum(more, 0)) @ turned.T)
+
+
+def _around(left: FloatArray, p: int) -> FloatArray:
+    """Mean over the neighbours of each line and over experiments, (K,), of the errors' squares
+    (experiments, K), each of ``p`` outputs.
+    """
+    count, K = left.shape
+    width = min(-(-_VALUES // (count * p)) | 1, K)
+    mean: FloatArray = scipy.ndimage.uniform_filter1d(left.mean(axis=0), width, mode="reflect")
+    return mean
 
 
 def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
