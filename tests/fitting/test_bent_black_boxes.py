@@ -6,10 +6,13 @@ Solved step by step by Runge and Kutta, all seeds at once.
 import functools
 import re
 
+import control
 import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.fitting.suspects.modal_elements import modal_elements
+from freqid.models import as_model
 
 DT, N, STEPS = 0.01, 1500, 8
 MOTOR, LOAD, K, C, D = 1.0, 0.5, 400.0, 0.6, 2.0
@@ -120,3 +123,14 @@ def test_a_straight_joint_is_trusted(spec):
             assert max(off(est)) < 0.01
             assert est.verdict.trusted
             assert not {"friction", "nonlinear"} & {w.kind for w in est.warnings}
+
+
+def test_poles_that_share_a_direction_are_no_modes_of_their_own():
+    """A chain of two equal modes, and a double integrator beside one."""
+    chain, both = np.zeros((4, 4)), np.zeros((4, 4))
+    for A in (chain, both):
+        A[0, 1], A[2:, 2:] = 1, [[0, 1], [-100, -0.5]]
+    chain[1] = -100, -0.5, 1, 0
+    for A, count in ((chain, 0), (both, 2)):
+        system = control.ss(A, np.ones((4, 1)), np.ones((1, 4)), 0)
+        assert len(modal_elements(as_model(system))) == count

@@ -20,6 +20,8 @@ from freqid.models import DiscreteModel, GreyBox, Model, invert_hold
 
 # modes that are asked at the most, the largest answers to the input first
 _MOST = 4
+# cosine between left and right eigenvectors below which a pole has no direction of its own
+_OWN = 1e-6
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,15 @@ def blocks(model: Model) -> list[StateSpace]:
     """A black box pole by pole in continuous time, its direct term left out: what sums to it.
 
     A pair's state is the real and the imaginary part of one number. Poles on the negative real axis
-    of the z plane, which no plant has, are left out as well.
+    of the z plane, which no plant has, are left out as well, and those that share one direction.
     """
     A, B, C, D = model.state_space()
     poles, left, right = scipy.linalg.eig(A, left=True, right=True)
     found = []
     for pole, w, v in zip(poles, left.T, right.T, strict=True):
         if pole.imag < 0 or (model.dt and pole.imag == 0 and pole.real <= 0):
+            continue
+        if abs(w.conj() @ v) < _OWN:
             continue
         drive, shape = w.conj() @ B / (w.conj() @ v), C @ v
         if pole.imag > 0:
