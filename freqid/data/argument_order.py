@@ -51,8 +51,9 @@ def read_in_either_order(read: _Read) -> _Read:
     @wraps(read)
     def told(*given: object, **named: object) -> object:
         first, rest = given[:3], given[3:]
-        by_time = len(rest) > len(_READ) or isinstance(rest[0] if rest else None, str)
-        by_time |= len(rest) > 1 and isinstance(rest[1], int | float)
+        dated = bool(rest) and isinstance(rest[0], str)
+        numbered = len(rest) > 1 and rest[0] is None and isinstance(rest[1], int | float)
+        by_time = dated or numbered or len(rest) > len(_READ)
         order = _READ_BY_TIME if by_time else _READ
         if len(rest) > len(order) or set(order[: len(rest)]) & set(named):
             return read(*given, **named)

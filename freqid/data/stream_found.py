@@ -72,7 +72,13 @@ class Found:
     hollow: Mapping[str, str] = field(default_factory=dict)
 
 
-def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: str) -> Found:
+def of_array(
+    array: Source,
+    columns: Sequence[str] | None,
+    block: int,
+    origin: str,
+    both: Sequence[str] | None = None,
+) -> Found:
     if array.ndim != 2 or array.shape[1] < 2:
         raise InputError(f"{origin} has shape {array.shape}; expected (N, channels), two or more")
     if not np.isfinite(array.shape[0]):
@@ -80,7 +86,7 @@ def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: s
             f"{origin} has an unknown number of samples; compute_chunk_sizes() tells dask"
         )
     count, width = (int(size) for size in array.shape)
-    names = _array_names(columns, width)
+    names = array_names(columns, width, both)
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         for at in range(first, count, block):
@@ -90,10 +96,18 @@ def of_array(array: Source, columns: Sequence[str] | None, block: int, origin: s
     return Found(blocks, names, count, None, origin)
 
 
-def _array_names(columns: Sequence[str] | None, count: int) -> list[str]:
-    if columns is None and count == 2:
-        return ["u", "y"]
-    return list(channel_names("columns", columns, count, "channel"))
+def array_names(
+    columns: Sequence[str] | None, count: int, both: Sequence[str] | None = None
+) -> list[str]:
+    """Names of so many channels: those that were given, or else the inputs and outputs, ``both``,
+    in turn, or made-up ones where these are meant.
+    """
+    made_up = ["u", "y"] if count == 2 else channel_names("columns", None, count, "channel")
+    if columns is not None:
+        return list(channel_names("columns", columns, count, "channel"))
+    # names that are said twice are an error of their own
+    own = both is not None and len(both) == len({*both}) == count and not {*both} <= {*made_up}
+    return list(both if own and both else made_up)
 
 
 def places(count: int) -> list[int]:

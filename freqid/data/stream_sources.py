@@ -15,7 +15,7 @@ from freqid.data.rows import as_rows
 from freqid.data.selection import as_holds
 from freqid.data.stream_chain import chained, files_of
 from freqid.data.stream_files import of_file
-from freqid.data.stream_found import Asked, Found, Source, of_array
+from freqid.data.stream_found import Asked, Found, Source, array_names, of_array
 from freqid.data.stream_views import from_the_first
 from freqid.data.streams import BLOCK, Stream
 from freqid.lti import Hold, ZeroOrderHold
@@ -62,20 +62,19 @@ def open(
     """
     size = whole("block", block)
     both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
-    named = both if columns is None and both and len({*both}) == len(both) else columns
     if files := files_of(source):
         asked = Asked(size, dt, columns, group, both)
         found = chained([_of_file(file, asked) for file in files], both, hold is not None)
     elif group is not None:
         raise InputError(f"group={group!r} is one of an HDF5 or zarr file; leave it out")
     elif hasattr(source, "shape") and hasattr(source, "dtype"):
-        found = of_array(source, named, size, type(source).__name__)
+        found = of_array(source, columns, size, type(source).__name__, both)
     elif hasattr(source, "columns"):
         raise InputError(
             f"source is a {type(source).__name__}, a table in memory; take Record.from_frame of it"
         )
     elif callable(source) or isinstance(source, Iterable):
-        found = _of_blocks(source, named)
+        found = _of_blocks(source, columns, both)
     else:
         raise InputError(
             f"source={type(source).__name__} cannot be opened; expected a path, an array or blocks"
@@ -132,8 +131,9 @@ def _of_file(path: Path, asked: Asked) -> Found:
     return found
 
 
-def _of_blocks(source: Source, columns: Sequence[str] | None) -> Found:
-    names = ["u", "y"] if columns is None else list(columns)
+def _of_blocks(source: Source, columns: Sequence[str] | None, both: Sequence[str] | None) -> Found:
+    count = 2 if both is None or len({*both}) < len(both) else len(both)
+    names = list(columns) if columns is not None else array_names(None, count, both)
     again = callable(source) or iter(source) is not source
     used = False
 

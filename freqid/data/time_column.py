@@ -115,7 +115,7 @@ def _found(
 ) -> str | None:
     if time is not None:
         # as the file's header has it, its unit in brackets, or without that
-        plain = time if time in frame.columns else named(time)[0]
+        plain = time if time in frame.columns else named(str(time))[0]
         if plain not in frame.columns:
             raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
         return plain

@@ -32,8 +32,11 @@ def test_read_by_position(tmp_path, record):
     assert seen.dt == pytest.approx(DT)
     with pytest.raises(TypeError, match="dt"):
         fq.read(path, "motor", "angle", DT, dt=DT)
-    with pytest.raises(ValueError, match="time='clok'"):
-        fq.read(path, "motor", "angle", "clok")
+    for time in ("clok", 5):
+        with pytest.raises(ValueError, match=f"time={time!r}"):
+            fq.read(path, "motor", "angle", time=time)
+    with pytest.raises(ValueError, match="hold=5"):
+        fq.read(path, "motor", "angle", DT, 5)
 
 
 def test_the_time_by_its_header(tmp_path, record):
@@ -62,6 +65,20 @@ def test_streams_of_blocks_have_the_names_of_their_channels(record):
         stream = fq.open(source, inputs=["motor"], outputs="angle", dt=DT)
         assert (stream.input_names, stream.output_names) == (("motor",), ("angle",))
         np.testing.assert_allclose(fq.h1(stream, 500).response, wanted, rtol=1e-10)
+
+
+def test_made_up_names_of_channels_are_places():
+    """Of inputs="y", outputs="u" the second column is the input, as ever."""
+    rows = np.column_stack([np.arange(8.0), -np.arange(8.0)])
+    for source in (rows, lambda: iter([rows])):
+        turned = fq.open(source, inputs="y", outputs="u", dt=DT)
+        u, y = next(turned.stretches(8))
+        np.testing.assert_array_equal(u[:, 0], rows[:, 1])
+        np.testing.assert_array_equal(y[:, 0], rows[:, 0])
+        half = fq.open(source, inputs="u", outputs="angle", dt=DT)
+        assert half.output_names == ("angle",)
+    three = fq.open(np.column_stack([rows, rows[:, 0]]), "channel2", ["channel1"], dt=DT)
+    np.testing.assert_array_equal(next(three.stretches(8))[0][:, 0], rows[:, 1])
 
 
 def test_the_strongest_suspect_is_what_is_said():
