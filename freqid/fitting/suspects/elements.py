@@ -28,8 +28,8 @@ _MOST = 16
 
 @dataclass(frozen=True)
 class Element:
-    """A parameter's force per motion: ``name``, ``force`` b (n,) and ``motion`` c (n,), of which
-    the ``whole`` acts.
+    """A parameter's force per motion: ``name``, ``force`` b (n,) and ``motion`` c (n,); ``whole``,
+    the parameter's value, is how much of it acts.
 
     The largest part of the motion counts once. ``damps`` says that the force answers to a velocity;
     ``along`` is the input (n,) that acts at the same place, where one does.

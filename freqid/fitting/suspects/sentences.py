@@ -52,7 +52,7 @@ def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
 def words(name: str, size: float, unit: str, detail: str) -> str:
     """What a suspect says of the data, in words."""
     number = f"{size:.3g}{unit}"
-    level = f", by about {size:+.2g} % from small motions to these" if unit else ""
+    level = f", by about {float(f'{size:.2g}'):+g} % from small motions to these" if unit else ""
     halves = f" by {100 * abs(size):.3g} % of a parameter" if unit else ""
     return {
         "delay": f"the input acts {size:.3g} s later than the model says",
