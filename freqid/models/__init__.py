@@ -16,6 +16,7 @@ from freqid.models.simulation import (
     forcing,
     late_sampled,
     late_samples,
+    later,
     propagate,
     simulate,
 )

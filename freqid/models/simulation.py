@@ -137,7 +137,7 @@ def late_samples(plant: Model, period: float) -> list[int]:
     return [int(np.ceil(delay / period - 1e-9)) for delay in plant.delays]
 
 
-def _shifted(u: FloatArray, steps: int) -> FloatArray:
+def later(u: FloatArray, steps: int) -> FloatArray:
     """u(k − steps) for every k of u (N,), zero before its start, held after its end."""
     at = np.arange(len(u)) - steps
     return np.where(at < 0, 0.0, u[np.clip(at, 0, len(u) - 1)])
@@ -233,9 +233,9 @@ def _outputs(
     system = plant.state_space()
     if plant.late and isinstance(hold, PeriodicHold):
         late, shifts = late_sampled(plant, hold), late_samples(plant, dt)
-        seen = np.array([_shifted(c, q) for c, q in zip(inputs.T, shifts, strict=True)])
+        seen = np.array([later(c, q) for c, q in zip(inputs.T, shifts, strict=True)])
         # an input of the next sample has come already when it is late by less than one
-        following = np.array([_shifted(c, q - 1) for c, q in zip(inputs.T, shifts, strict=True)])
+        following = np.array([later(c, q - 1) for c, q in zip(inputs.T, shifts, strict=True)])
         x = propagate(late.phi, late.gamma @ seen + late.gamma_next @ following, x0)
         return (system.C @ x + system.D @ seen).T
     if plant.dt or isinstance(hold, PeriodicHold):

@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.lti import PeriodicHold, Realisation, Sampled, ZeroOrderHold
+from freqid.models import later
 
 
 def late_input(
@@ -27,9 +28,7 @@ def late_input(
     shifted = np.zeros_like(u)
     for i, timing in enumerate(realisation.delays):
         q = int(np.ceil(timing.value / h - 1e-9))
-        # a negative delay takes the input's end for its future, held
-        at = np.arange(u.shape[1]) - q
-        shifted[i] = np.where(at < 0, 0.0, u[i, np.clip(at, 0, u.shape[1] - 1)])
+        shifted[i] = later(u[i], q)
         step = min(max(timing.value - (q - 1) * h, 0.0), h)
         b, db = B[:, [i]], dB[..., [i]]
         # an interval of no length has no matrices: what it would add is nothing
