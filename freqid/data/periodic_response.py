@@ -26,6 +26,9 @@ class PeriodicResponse(FrequencyResponse):
         pooled: neighbouring lines whose scatter was taken together for that.
         settled: how often chance makes the first of the periods differ so much from the others,
             which a transient does, too; None where that is not known.
+        change: what the first period differs by from the mean of the others, outputs before inputs,
+            (outputs + inputs, E, K); None where that is not known.
+        period: in s; None where that is not known.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it is the sample maximum
     likelihood (Pintelon and Schoukens, System Identification, 2012, section 9.11). Made by
@@ -38,6 +41,8 @@ class PeriodicResponse(FrequencyResponse):
     freedom: int
     pooled: int
     settled: float | None
+    change: ComplexArray | None
+    period: float | None
 
     def __init__(
         self,
@@ -59,6 +64,8 @@ class PeriodicResponse(FrequencyResponse):
         freedom: int = 0,
         settled: float | None = None,
         pooled: int = 1,
+        change: ComplexArray | None = None,
+        period: float | None = None,
     ) -> None:
         super().__init__(
             frequency, response, variance, dt, hold, coherence, input_spectrum, input_names,
@@ -68,8 +75,10 @@ class PeriodicResponse(FrequencyResponse):
         U, Y = numbers("inputs", inputs, complex), numbers("outputs", outputs, complex)
         C = numbers("noise", noise, complex)
         E = U.shape[1] if U.ndim == 3 else 0
+        D = np.zeros((p + m, E, K)) if change is None else numbers("change", change, complex)
         for name, given, shape in (
             ("inputs", U, (m, E, K)), ("outputs", Y, (p, E, K)), ("noise", C, (E, K, p + m, p + m)),
+            ("change", D, (p + m, E, K)),
         ):  # fmt: skip
             if given.shape != shape:
                 raise InputError(f"{name} has shape {given.shape}; expected {shape}")
@@ -79,11 +88,14 @@ class PeriodicResponse(FrequencyResponse):
             inputs=frozen(U), outputs=frozen(Y), noise=frozen(C),
             freedom=whole("freedom", freedom), pooled=whole("pooled", pooled),
             settled=None if settled is None else finite("settled", settled),
+            change=None if change is None else frozen(D),
+            period=None if period is None else finite("period", period),
         )  # fmt: skip
 
     def __setstate__(self, state: State) -> None:
         """Restore; what was written before lacks what was not known then."""
-        super().__setstate__({"settled": None, "pooled": 1} | state)
+        unknown = {"settled": None, "pooled": 1, "change": None, "period": None}
+        super().__setstate__(unknown | state)
 
     @that_follows
     def with_conditions(self, **conditions: float) -> PeriodicResponse:
@@ -97,12 +109,13 @@ class PeriodicResponse(FrequencyResponse):
         at = np.isin(self.frequency, kept.frequency)
         more: dict[str, Any] = {
             "inputs": self.inputs[..., at], "outputs": self.outputs[..., at],
-            "noise": self.noise[:, at], "freedom": self.freedom, "settled": self.settled,
-            "pooled": self.pooled,
+            "noise": self.noise[:, at],
+            "change": None if self.change is None else self.change[..., at],
+            **{name: getattr(self, name) for name in ("freedom", "pooled", "settled", "period")},
         }  # fmt: skip
         return PeriodicResponse(**kept.__dict__, **more)
 
     def plain(self) -> FrequencyResponse:
         """The response alone, its means and their noise left out."""
-        own = ("inputs", "outputs", "noise", "freedom", "settled", "pooled")
-        return FrequencyResponse(**{k: v for k, v in self.__dict__.items() if k not in own})
+        names = [f.name for f in dataclasses.fields(FrequencyResponse)]
+        return FrequencyResponse(**{name: getattr(self, name) for name in names})

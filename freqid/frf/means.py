@@ -128,11 +128,12 @@ def periodic(
         excited &= ~folded
     if not excited.any():
         raise InputError(f"input has no energy in band={limits}; widen it")
-    mean, noise, pooled = means([each.at(excited) for each in found], first.n_outputs)
-    spectra = [_amplitudes(r.outputs, n, skip, P) for r in sets if isinstance(r, Record)]
-    told = [c for Y in spectra if (c := settled(Y[..., excited])) is not None]
+    at_lines = [each.at(excited) for each in found]
+    mean, noise, pooled = means(at_lines, first.n_outputs)
+    told = [c for each in at_lines if (c := settled(each, first.n_outputs)) is not None]
     chance = min(min(told) * len(told), 1.0) if told else None
-    return _packed(first, f[excited], mean, noise, P, pooled, chance)
+    change = np.stack([each.change for each in at_lines], axis=1)
+    return _packed(first, f[excited], mean, noise, P, pooled, chance, change, n * first.dt)
 
 
 def _experiments(
@@ -202,6 +203,8 @@ def _packed(
     periods: int,
     pooled: int,
     chance: float | None,
+    change: ComplexArray,
+    period: float,
 ) -> PeriodicResponse:
     p = first.n_outputs
     Y, U = np.moveaxis(mean[:, :p], 0, 1), np.moveaxis(mean[:, p:], 0, 1)  # (channels, E, K)
@@ -226,4 +229,5 @@ def _packed(
         input_names=first.input_names, output_names=first.output_names,
         inputs=U, outputs=Y, noise=C, freedom=(periods - 1) * pooled, pooled=pooled,
         conditions=first.conditions, units=units_of(first), settled=chance,
+        change=change, period=period,
     )  # fmt: skip

@@ -17,23 +17,24 @@ FREEDOM = 14
 
 @dataclass(frozen=True)
 class PeriodMeans:
-    """Of the spectra of P periods: their mean (channels, K), and the sum of the products of what
-    each differs from it by, (K, channels, channels).
+    """Of the spectra of P periods: their mean (channels, K), the sum of the products of what each
+    differs from it by, (K, channels, channels), and the first of them, (channels, K).
     """
 
     count: int
     mean: ComplexArray
     scatter: ComplexArray
+    first: ComplexArray
 
     @classmethod
     def of(cls, Z: ComplexArray) -> PeriodMeans:
         """Of spectra (P, channels, K)."""
         mean = Z.mean(axis=0)
         left = np.moveaxis(Z - mean, -1, 0)
-        return cls(len(Z), mean, left.swapaxes(-1, -2) @ left.conj())
+        return cls(len(Z), mean, left.swapaxes(-1, -2) @ left.conj(), Z[0].copy())
 
     def beside(self, other: PeriodMeans) -> PeriodMeans:
-        """Those of all periods of both.
+        """Those of all periods of both, of which the other's came later.
 
         Source: Chan, Golub and LeVeque, The American Statistician 37, 1983.
         """
@@ -41,11 +42,29 @@ class PeriodMeans:
         step = other.mean - self.mean
         apart = np.einsum("ak,bk->kab", step, step.conj()) * (self.count * other.count / count)
         mean = self.mean + step * (other.count / count)
-        return PeriodMeans(count, mean, self.scatter + other.scatter + apart)
+        return PeriodMeans(count, mean, self.scatter + other.scatter + apart, self.first)
 
     def at(self, lines: BoolArray) -> PeriodMeans:
         """Those at some of the lines."""
-        return PeriodMeans(self.count, self.mean[:, lines], self.scatter[lines])
+        return PeriodMeans(
+            self.count, self.mean[:, lines], self.scatter[lines], self.first[:, lines]
+        )
+
+    @property
+    def change(self) -> ComplexArray:
+        """What the first period differs by from the mean of the others, (channels, K)."""
+        return (self.first - self.mean) * (self.count / (self.count - 1))
+
+    @property
+    def later(self) -> FloatArray:
+        """Variance between the other periods, (channels, K), of two or more.
+
+        Source: Chan, Golub and LeVeque, The American Statistician 37, 1983, from the other side.
+        """
+        P = self.count
+        apart = np.abs(self.change) ** 2 * ((P - 1) / P)
+        every = np.einsum("kaa->ak", self.scatter).real
+        return np.maximum(every - apart, 0.0) / (P - 2)
 
     @property
     def covariance(self) -> ComplexArray:

@@ -19,6 +19,7 @@ from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.coarse import coarse
+from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
@@ -79,8 +80,7 @@ class Inquiry:
     def apart(self, parting: Parting) -> list[Estimate | None]:
         """Fits to each part of the data alone, made once."""
         if parting.between not in self._apart:
-            found = fitted_apart(self.model, self.minimum, parting.parts)
-            self._apart[parting.between] = found
+            self._apart[parting.between] = fitted_apart(self.model, self.minimum, parting.parts)
         return self._apart[parting.between]
 
     @cached_property
@@ -194,7 +194,8 @@ class Inquiry:
         found = self._on_suspects()
         if any(f.severity == "serious" for f in found):
             return found
-        return [*beyond_noise(self.minimum), *coarse(self.scene, self._std), *found]
+        other = [*beyond_noise(self.minimum), *coarse(self.scene, self._std)]
+        return [*other, *(f for f in found if f.kind not in [o.kind for o in other])]
 
     def _on_suspects(self) -> list[Finding]:
         scene, named = self.scene, self.named
@@ -203,9 +204,9 @@ class Inquiry:
             return nothing or turned(self, None) or late_stamps(self.minimum, self.readings)
         if found := silent(scene):
             return turned(self, scene, quiet=True) or found
-        if found := leaking(scene, self.model, self._std):
-            return found
-        if found := begun_in_motion(self.minimum, scene, self.readings):
+        asked = scene, self.model, self._std
+        found = leaking(*asked) or still_moving(*asked, self.readings)
+        if found := found or begun_in_motion(self.minimum, scene, self.readings):
             return found
         if turn := turned(self, scene):
             return turn

@@ -57,7 +57,7 @@ class Scene:
         chart = structure if isinstance(structure, Chart) else None
         # what a prior makes the data leave is no fault of theirs: they are asked alone
         x, seen = minimum.x if minimum.alone is None else minimum.alone, []
-        if chart is not None and any(r.own_cost for r in readings):
+        if chart is not None and any(r.own_cost and not r.both_ends for r in readings):
             raise InputError("a black box fitted to samples leaves no lines")
         at_lines = [r.at_lines().with_(delayed=chart is None) for r in readings]
         experiments = lines_beside(structure, at_lines)
