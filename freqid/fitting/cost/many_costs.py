@@ -26,7 +26,7 @@ _PLAIN = 1e6
 @dataclass(frozen=True)
 class ManyPoints:
     """Trial points (S, P): residuals (S, rows), the Jacobian (S, P, rows) and the transients
-    (S, q, rows), none of which is taken off the Jacobian yet, and the transients' inverse Gram
+    (S, q, rows), which need not be taken off the Jacobian yet, and the transients' inverse Gram
     matrix (S, q, q).
     """
 
@@ -46,9 +46,11 @@ class ManyPoints:
         return ManyPoints(*(each[which] for each in parts))
 
     def moved(self, step: FloatArray) -> ManyPoints:
-        """The same after steps (S, P) over which residuals are straight lines."""
-        more = (step[:, None] @ self.without_transients())[:, 0]
-        return replace(self, residual=self.residual + more)
+        """The same after steps (S, P) over which residuals are straight lines, and the Jacobian of
+        what the initial states do not explain.
+        """
+        clear = self.without_transients()
+        return replace(self, residual=self.residual + (step[:, None] @ clear)[:, 0], jacobian=clear)
 
     def normal(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Cost (S,), gradient JᵀR (S, P) and JᵀJ (S, P, P), the transients taken off."""

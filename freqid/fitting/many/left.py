@@ -23,7 +23,9 @@ _SAME = 1e-9
 
 
 class Left:
-    """What is left at minima ``x`` (S, P) of S records; ``inverse`` is that of JᵀJ (S, P, P)."""
+    """What is left at minima ``x`` (S, P) of S records; ``inverse`` is that of JᵀJ (S, P, P), the
+    transients being taken off the Jacobian.
+    """
 
     @np.errstate(all="ignore")
     def __init__(
@@ -34,7 +36,6 @@ class Left:
         inverse: FloatArray,
     ) -> None:
         self.costs, self.x, self.at, self.inverse, self.e = costs, x, at, inverse, costs.first
-        self.jacobian = at.without_transients()
         # real values that neither parameters nor initial states have taken
         self.rows = 2 * self.e.n_lines * costs.Y.shape[1]
         self.freedom = max(self.rows - at.transient.shape[1] - x.shape[1], 1)
@@ -43,7 +44,7 @@ class Left:
     @np.errstate(all="ignore")
     def std(self) -> FloatArray:
         """Standard errors (S, P), whatever the noise's colour: as those of a single fit."""
-        J, T, S = self.jacobian, self.at.transient, len(self.x)
+        J, T, S = self.at.jacobian, self.at.transient, len(self.x)
         taken = _leverage(J, self.inverse) + _leverage(T, self.at.inverse)
         taken = np.minimum(taken.reshape(S, -1, 2).mean(axis=-1), MOST_LEVERAGE)
         power = smoothed_power(self._lines() / np.sqrt(1 - taken).reshape(S, -1, self.e.n_lines))
@@ -94,12 +95,15 @@ class Left:
         assert isinstance(hold, PeriodicHold)
         phi = np.exp(self._poles * hold.period)[..., None]
         z = self.e.points.z
-        one, other = 1 / (z - phi), 1 / (z - phi.conj())
-        # a pair of poles has real coefficients of a sum and of a difference
-        shapes = [
-            np.where(phi.imag > 0, a + b, np.where(phi.imag < 0, 1j * (a - b), a))
-            for a, b in ((one, other), (one**2, other**2))
-        ]
+        one = 1 / (z - phi)
+        shapes = [one, one**2]
+        if phi.imag.any():
+            other = 1 / (z - phi.conj())
+            # a pair of poles has real coefficients of a sum and of a difference
+            shapes = [
+                np.where(phi.imag > 0, a + b, np.where(phi.imag < 0, 1j * (a - b), a))
+                for a, b in ((one, other), (one**2, other**2))
+            ]
         if hold.reaches_next or s.model.state_space().D.any():
             shapes.append(np.ones((len(phi), 1, len(z)), complex))
         gain, count = self._explained(np.concatenate(shapes, axis=1))
@@ -112,21 +116,37 @@ class Left:
         """What responses (S, C, K) from each input to each output explain of what is left (S,), and
         how many directions of it they have.
         """
-        U, T, r = self.costs.U[:, :, 0], self.at.transient, self.at.residual
+        U, r = self.costs.U[:, :, 0], self.at.residual
         S, p, K = len(self.x), self.costs.Y.shape[1], self.e.n_lines
-        driven = (ways[:, :, None] * U[:, None]).reshape(S, -1, 1, K)
-        columns = np.concatenate(
-            [driven * (np.arange(p) == o)[:, None] for o in range(p)], axis=1
-        ).reshape(S, -1, p * K)
-        rows = np.ascontiguousarray(columns).view(float)
-        size = np.sqrt(np.einsum("sck,sck->sc", rows, rows))
-        rows = rows / np.where(size > 0, size, 1.0)[..., None]
-        clear = rows - rows @ T.swapaxes(-1, -2) @ self.at.inverse @ T
-        values, V = np.linalg.eigh(clear @ clear.swapaxes(-1, -2))
-        kept = values > _SAME * values[:, -1:]
-        along = (V.swapaxes(-1, -2) @ (clear @ r[..., None]))[..., 0]
-        gains = np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0)
-        return gains.sum(axis=1), kept.sum(axis=1).astype(float)
+        rows = (ways[:, :, None] * U[:, None]).reshape(S, -1, K).view(float)
+        across = rows.swapaxes(-1, -2)
+        # each output has its own, which are the same beside another part of what is left
+        T = self.at.transient.reshape(S, -1, p, 2 * K)
+        own = rows @ across
+        told = [rows @ each[..., None] for each in r.reshape(S, p, -1).swapaxes(0, 1)]
+        taken = [rows @ T[:, :, o].swapaxes(-1, -2) for o in range(p)]
+        return _gains(own, np.stack(taken, axis=1), np.stack(told, axis=1), self.at.inverse)
+
+
+def _gains(
+    own: FloatArray, taken: FloatArray, told: FloatArray, inverse: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What rows explain (S,) on how many directions (S,) by their products with one another
+    (S, C, C), with the transients (S, p, C, q) and with what is left (S, p, C, 1) at each output.
+    """
+    S, p, C, _ = told.shape
+    size = np.sqrt(np.einsum("scc->sc", own))
+    size = np.tile(np.where(size > 0, size, 1.0), p)
+    gram = np.zeros((S, p, C, p, C))
+    for o in range(p):
+        gram[:, o, :, o] = own
+    seen = taken.reshape(S, p * C, -1)
+    clear = gram.reshape(S, p * C, p * C) - seen @ inverse @ seen.swapaxes(-1, -2)
+    values, V = np.linalg.eigh(clear / size[:, :, None] / size[:, None])
+    kept = values > _SAME * values[:, -1:]
+    along = (V.swapaxes(-1, -2) @ (told.reshape(S, p * C, 1) / size[..., None]))[..., 0]
+    gains = np.where(kept, along**2 / np.where(kept, values, 1.0), 0.0)
+    return gains.sum(axis=1), kept.sum(axis=1).astype(float)
 
 
 def _leverage(rows: FloatArray, inverse: FloatArray) -> FloatArray:
