@@ -241,3 +241,30 @@ def test_variances_of_two_experiments_are_no_weights():
         est = fq.fit(RESONANCE.with_values(z=0.1), fq.etfe(runs, band=(0.02, 0.3)))
         lacking += est.witness.verdict == "lacking"
     assert lacking <= 2
+
+
+def behind_a_delay(K, w, z, Td):
+    return fq.GreyBox(
+        lambda K, w, z: ([[0, 1], [-w * w, -2 * z * w]], [[0], [K * w * w]], [[1, 0]], None),
+        [
+            *(fq.Parameter(name, value) for name, value in zip("Kwz", (K, w, z), strict=True)),
+            fq.Parameter("Td", Td, unit="s", lower=0),
+        ],
+        input_delay="Td",
+    )
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("seed", range(6))
+def test_no_plant_earlier_than_its_bound_bears_witness(seed):
+    """A mode above Nyquist, at the bound of its delay, was "complete" by what it costs beyond that:
+    4 % more than the plant itself.
+    """
+    true = behind_a_delay(2.0, 149.2, 0.03, 0.0)
+    u = fq.multisine((0.5, 45), 15.0, 0.01, crest="random", seed=seed)
+    record = fq.simulate(true, u, 0.01)
+    record = record.with_noise(0.2 * record.y.std(), seed=seed)
+    est = fq.fit(behind_a_delay(0.7, 447.0, 0.01, 0.0), record)
+    least = fq.fit(true, record, n_starts=1)
+    assert least.witness.verdict == "complete"
+    assert est.cost < 1.001 * least.cost or est.witness.verdict != "complete"

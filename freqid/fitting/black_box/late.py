@@ -111,8 +111,10 @@ def with_less_delay(model: GreyBox, period: float, shifts: Sequence[int]) -> Gre
         if isinstance(source, str):
             p = model.parameter(source)
             less = p.value - q * period
+            # no earlier than what is asked for may be
+            lower = max(min(less, 0.0) - period, min(p.lower - q * period, less))
             parameters[source] = dataclasses.replace(
-                p, value=less, lower=min(less, 0.0) - period, upper=np.inf, prior=None
+                p, value=less, lower=lower, upper=np.inf, prior=None
             )
             sources.append(source)
         else:
