@@ -117,6 +117,19 @@ def test_the_right_order_is_chosen(seed):
     assert table["cross_validation"].idxmin() == 2
 
 
+@pytest.mark.parametrize("periods", [1, 4, 8])
+def test_lines_between_those_of_a_periodic_input_hold_nothing_out(periods):
+    """Of four periods each fourth line is driven, and was held out together with all others."""
+    u = fq.multisine((1, 80), 2.0, 2e-3, periods=periods)
+    record = fq.simulate(fq.two_mass(), u, 2e-3)
+    record = record.with_noise(0.05)
+    table = fq.select_order(record, range(2, 5), criterion="cross_validation")
+    least = table["cross_validation"].to_numpy()
+    assert table.attrs["best"] >= 3
+    # the noise's own variance, a little more of it for what was learnt
+    np.testing.assert_allclose(least[1:], 0.05**2, rtol=0.2)
+
+
 @pytest.mark.study
 def test_feedthrough_and_dead_time_are_chosen_in_any_unit():
     u = np.random.default_rng(3).standard_normal(800)

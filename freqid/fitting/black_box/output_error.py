@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
+from freqid.fitting.black_box.channel_units import Descent, begun_alike
 from freqid.fitting.black_box.refinement import (
     LINES,
     first_model,
@@ -76,7 +77,10 @@ def fit_output_error(
     asked, seed = (options.n_starts, options.seed) if options else (None, 0)
     more = None if asked is None else asked - 1
     told_apart(lines)
-    chart, solution, objective = _nested(spec, lines, plane, dt, (more, seed, count))
+    begin = more, seed, count
+    chart, solution, objective = begun_alike(
+        lines, lambda own: _nested(spec, own, plane, dt, begin), _descend
+    )
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
@@ -101,9 +105,6 @@ def fit_output_error(
     if edge is not None:
         est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution)])
     return dataclasses.replace(est, n_starts=asked or 1)
-
-
-Descent = tuple[Chart, Solution, Objective]
 
 
 def _nested(
