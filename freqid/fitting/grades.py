@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
+from freqid.fitting.uncertainty.profiles import wider_than_linear
+from freqid.fitting.uncertainty.rivals import rival_of
+from freqid.fitting.witness import RARE
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
@@ -77,6 +80,7 @@ def verdict(est: Estimate) -> Verdict:
         reasons.append(est.witness.sentence)
     reasons += _lonely(est) + _barely(est)
     reasons += _open(est, std) or _untold(est, std) or _once(est, std)
+    reasons = reasons or _besides(est, std) or _wider(est, std) or _rival(est, std)
     if reasons:
         return Verdict("doubt", reasons)
     return Verdict("trust", [_supported(est, std)])
@@ -114,6 +118,54 @@ def _lonely(est: Estimate) -> list[str]:
     ]
 
 
+def _besides(est: Estimate, std: np.ndarray) -> list[str]:
+    """Values that are hardly told, and a gap to a black box in which better ones may lie."""
+    witness = est.witness
+    if witness.verdict != "absent" or not witness.p_value < RARE or est.minimum.exact:
+        return []
+    vague = _vague(est, std)
+    if not vague:
+        return []
+    return [
+        f"not settled: the data leave {', '.join(vague)} uncertain by more than half of their "
+        f"values, and other values may explain them better ({witness.sentence}); begin from better "
+        "values, start=, give what is known of them (with_prior, with_bounds), or excite more"
+    ]
+
+
+def _wider(est: Estimate, std: np.ndarray) -> list[str]:
+    """Error bars that are not what the data allow, where a value is hardly told."""
+    vague = _vague(est, std)
+    if est.problem is None or est.minimum.exact or not vague:
+        return []
+    wide = [est.names[i] for i in wider_than_linear(est.minimum, est.scatter.change, std)]
+    # of what is not told from zero anyway nothing more need be said
+    wide = [n for n in wide if n not in vague]
+    if not wide:
+        return []
+    return [
+        f"not told: the data leave {', '.join(vague)} open, and allow {', '.join(wide)} farther "
+        "out than the error bars say, which hold where the plant is all but straight in its "
+        "parameters; see est.intervals('profile'), give what is known of them (with_prior, "
+        "with_bounds), or excite more"
+    ]
+
+
+def _rival(est: Estimate, std: np.ndarray) -> list[str]:
+    """Another minimum that explains the data as well, where a value is hardly told."""
+    vague = _vague(est, std)
+    if est.problem is None or est.minimum.exact or not vague:
+        return []
+    other = rival_of(est.minimum, std)
+    if other is None:
+        return []
+    values = ", ".join(f"{n}={v:.4g}" for n, v in zip(est.names, other, strict=True))
+    return [
+        f"not told: the data leave {', '.join(vague)} open, and explain {values}, next to the "
+        "start, about as well; give what is known of them (with_prior, with_bounds), or excite more"
+    ]
+
+
 def _open(est: Estimate, std: np.ndarray) -> list[str]:
     """What the data leave unknown, where no warning says it."""
     if np.isfinite(std).all():
@@ -128,8 +180,7 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
     """Values of which the data tell so little that the minimum may be one of several."""
     if not isinstance(est.model, GreyBox):
         return []
-    relative = _relative(est, std)
-    vague = [n for n, r in zip(est.names, relative, strict=True) if r > _VAGUE]
+    relative, vague = _relative(est, std), _vague(est, std)
     outside = [w for w in est.warnings if getattr(w, "kind", "") == "not physical"]
     # of values that are off by so much error bars are no more than their order of magnitude
     most = bool(np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2))
@@ -148,13 +199,20 @@ def _once(est: Estimate, std: np.ndarray) -> list[str]:
     chance = est.witness.p_value if est.witness.verdict == "complete" else 0.0
     if not isinstance(est.model, GreyBox) or est.n_starts > 1 or chance > _BESIDE:
         return []
-    vague = [n for n, r in zip(est.names, _relative(est, std), strict=True) if r > _VAGUE]
+    vague = _vague(est, std)
     if not vague or est.minimum.exact:
         return []
     return [
         f"not settled: one start was made, and the data leave {', '.join(vague)} uncertain by more "
         "than half of their values: another may end better; leave n_starts at 'auto'"
     ]
+
+
+def _vague(est: Estimate, std: np.ndarray) -> list[str]:
+    """Parameters of a grey box that are known to no more than half of their values."""
+    if not isinstance(est.model, GreyBox):
+        return []
+    return [n for n, r in zip(est.names, _relative(est, std), strict=True) if r > _VAGUE]
 
 
 def _relative(est: Estimate, std: np.ndarray) -> np.ndarray:
@@ -167,7 +225,10 @@ def _supported(est: Estimate, std: np.ndarray) -> str:
     text = f"{est.fit_percent:.2f} % of what was fitted is explained and the search converged"
     if isinstance(est.model, GreyBox):
         relative = _relative(est, std)
-        if np.isfinite(relative).any():
+        if np.isinf(relative).any():
+            nothing = [n for n, r in zip(est.names, relative, strict=True) if np.isinf(r)]
+            text += f"; the data do not tell {', '.join(nothing)} from zero"
+        elif np.isfinite(relative).any():
             worst = int(np.nanargmax(np.where(np.isfinite(relative), relative, np.nan)))
             name, size = est.names[worst], f"{100 * relative[worst]:.2g} %"
             size += " of a sample" if std[worst] > relative[worst] * abs(est.values[worst]) else ""

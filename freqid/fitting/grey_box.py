@@ -210,6 +210,7 @@ def _estimate(
         minimum.objective.n_rows,
         len(values),
         out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
+        fastest=float(np.abs(poles).max(initial=0.0)) * output_dt(reading.data),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],

@@ -28,6 +28,8 @@ _CONTRADICTED, _LEAST_TAKEN = 3.5, 0.05
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
 _NONE = 0.02
+# nepers in a sample of what no sample can show
+_GONE = 1e6
 # a response that rounding moves by so much is worth a word beside noise
 _ROUNDED = 1e-6
 
@@ -40,7 +42,7 @@ class Evidence:
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
     ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
     a black box whose motions grow, the surest by ``growth`` standard errors; ``out_of_sight`` modes
-    (Hz) above the Nyquist frequency;
+    (Hz) above the Nyquist frequency; the ``fastest`` motion decays by so many nepers in a sample;
     ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
     rounding of the matrices moves the response, with the sentence on it. ``tied`` are parameters of
     which an expression decides, with that and their values.
@@ -58,6 +60,7 @@ class Evidence:
     growing: Sequence[complex] = ()
     growth: float = np.inf
     out_of_sight: Sequence[float] = ()
+    fastest: float = 0.0
     aliased: float = 0.0
     rounding: tuple[float, str] = (0.0, "")
     tied: Sequence[tuple[Parameter, str, float]] = ()
@@ -124,7 +127,12 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
                 continue
             sentence = f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
             severity: Severity = "serious"
-            if beyond <= _CERTAIN * known:
+            if e.fastest > _GONE and value != p.value:
+                sentence += (
+                    ": a motion is so fast there that it is gone, and error bars tell nothing of "
+                    "what has left with it; give what is known of it (with_prior, with_bounds)"
+                )
+            elif beyond <= _CERTAIN * known:
                 sentence += " by less than two standard errors, so that they allow the bound itself"
                 severity = "minor"
             yield Finding("edge of a bound", sentence, severity, float(value))

@@ -44,7 +44,7 @@ _LEVEL = 0.01
 _TOUCHES = 1e-3
 # relative standard error of a parameter that the data leave open; starts that have to agree then,
 # and the level of the gap below which not even that tells that there is no minimum in it
-_OPEN, _WANTED, _RARE = 0.5, 4, 0.2
+_OPEN, _WANTED, RARE = 0.5, 4, 0.2
 # part of the data's energy from which on noise outweighs what is explained, and makes many minima
 _DROWNED = 0.5
 # part of the lines that are left out on either side, the factor between the others' variances from
@@ -178,7 +178,7 @@ class Testimony:
             return "lacking", (
                 f"a black box of order {order} explains the data better ({numbers}): {_LACKS}"
             )
-        told = self.n_agreed >= _WANTED and p >= _RARE
+        told = self.n_agreed >= _WANTED and p >= RARE
         drowned = self.minimum.cost > _DROWNED * self.minimum.objective.energy
         if gap > _TOUCHES and (drowned or (self._open() and not told)):
             return "absent", (

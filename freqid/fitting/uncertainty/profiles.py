@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 # steps within which an end is looked for, each half the distance to the linear interval's end, and
 # evaluations of each fit on the way
 _REACH, _LIMIT = 10.0, 60
+# part of the linear interval beyond which it is no interval
+_WIDER = 1.5
 # and the nearest that one can be
 _NEAREST = 1e-3
 # relative standard error that is down to rounding
@@ -49,17 +51,11 @@ def profile_intervals(
     """
     import pandas as pd
 
-    noise, own = minimum.noise_variance, std / scale
-    white = noise * np.diag(minimum.determined.inverse)
-    half = quantile(values_that_tell(minimum), level)
+    own, half, rise = _linear(minimum, std / scale, level)
     ends = minimum.x[:, None] + half * own[:, None] * np.array([-1, 1])
     ends[~np.isfinite(own)] = -np.inf, np.inf
-    # an error that is down to rounding has no profile
-    told = np.flatnonzero(np.isfinite(own) & (own > _ROUNDED * np.abs(minimum.x)))
-    rise = {i: noise * max(own[i] ** 2 / white[i], 1e-12) * half**2 for i in told}
-    each = [
-        (int(i), side * half * float(own[i]) / 2, float(rise[i])) for i in told for side in (-1, 1)
-    ]
+    told = list(rise)
+    each = [(i, side * half * float(own[i]) / 2, rise[i]) for i in told for side in (-1, 1)]
     with Bar(progress, len(each), 0, "ends of profiles") as advance:
         found = in_turn(partial(_end_of, minimum), each, n_jobs, lambda _: advance(1))
     ends[told] = np.reshape(found, (-1, 2))
@@ -86,6 +82,54 @@ class _Held:
         return self.inner.describe(self.whole(x))
 
 
+def _excess(minimum: Minimum, index: int, value: float, rise: float) -> float:
+    """How far the cost with one unknown held at a value lies above the least, in parts of a
+    ``rise``, less one.
+    """
+    others, least = np.delete(minimum.x, index), minimum.point.cost
+    if not len(others):
+        alone = minimum.objective.point(np.array([value]))
+        return np.inf if alone is None else (alone.cost - least) / rise - 1
+    held = _Held(minimum.objective.structure, index, value)
+    prior = minimum.prior and minimum.prior.held(index, value)
+    try:
+        found = minimise(minimum.objective.of(held, prior), others, limit=_LIMIT)
+    except InputError:
+        return np.inf
+    return (found.cost - least) / rise - 1
+
+
+def wider_than_linear(minimum: Minimum, scale: FloatArray, std: FloatArray) -> list[int]:
+    """Numbers of the unknowns that the data allow beyond one and a half times the interval that
+    their standard errors give: a profile of each, looked at in two places.
+    """
+    own, half, rise = _linear(minimum, std / scale, 0.95)
+    structure, wide = minimum.objective.structure, []
+    for i in rise:
+        ends = minimum.x[i] + _WIDER * half * own[i] * np.array([-1, 1])
+        inside = ends[(structure.lower[i] < ends) & (ends < structure.upper[i])]
+        if any(_excess(minimum, i, float(value), rise[i]) < 0 for value in inside):
+            wide.append(i)
+    return wide
+
+
+def _linear(
+    minimum: Minimum, own: FloatArray, level: float
+) -> tuple[FloatArray, float, dict[int, float]]:
+    """Standard errors (P,) of the unknowns, the quantile of a level, and of each unknown by how
+    much the cost rises to its interval's end; an error that is down to rounding has no profile.
+    """
+    noise = minimum.noise_variance
+    white = noise * np.diag(minimum.determined.inverse)
+    half = quantile(values_that_tell(minimum), level)
+    told = np.flatnonzero(np.isfinite(own) & (own > _ROUNDED * np.abs(minimum.x)))
+    return (
+        own,
+        half,
+        {int(i): float(noise * max(own[i] ** 2 / white[i], 1e-12) * half**2) for i in told},
+    )
+
+
 def _end_of(minimum: Minimum, asked: tuple[int, float, float]) -> float:
     return _end(minimum, *asked)
 
@@ -94,21 +138,10 @@ def _end(minimum: Minimum, index: int, step: float, rise: float) -> float:
     """Where the profile has risen by ``rise``, in multiples of a signed step from the estimate, or
     the bound that comes before.
     """
-    at, others = minimum.x[index], np.delete(minimum.x, index)
-    least = minimum.point.cost
+    at = minimum.x[index]
 
     def excess(steps: float) -> float:
-        value = at + steps * step
-        if not len(others):
-            alone = minimum.objective.point(np.array([value]))
-            return np.inf if alone is None else (alone.cost - least) / rise - 1
-        held = _Held(minimum.objective.structure, index, value)
-        prior = minimum.prior and minimum.prior.held(index, value)
-        try:
-            found = minimise(minimum.objective.of(held, prior), others, limit=_LIMIT)
-        except InputError:
-            return np.inf
-        return (found.cost - least) / rise - 1
+        return _excess(minimum, index, at + steps * step, rise)
 
     structure = minimum.objective.structure
     bound = float((structure.upper if step > 0 else structure.lower)[index])
