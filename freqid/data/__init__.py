@@ -37,3 +37,4 @@ from freqid.data.stamped_record import StampedRecord
 from freqid.data.stream_chain import files_of
 from freqid.data.stream_sources import open
 from freqid.data.streams import Stream
+from freqid.data.units import coherent

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+import numpy as np
+
 from freqid.checks import FloatArray, numbers
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# columns of a table: the memory from its first sample to its last, and how many it has
+MEMORY, SEGMENT = "memory", "segment samples"
 
 
 class AveragedResponse(FrequencyResponse):
@@ -40,3 +50,20 @@ class AveragedResponse(FrequencyResponse):
     def select(self, limits: tuple[float, float]) -> AveragedResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
         return AveragedResponse(**{**super().select(limits).__dict__, "memory": self.memory})
+
+    def to_frame(self) -> pd.DataFrame:
+        """As of any response, with columns of the memory from its first sample to its last."""
+        frame = super().to_frame()
+        if self.memory is not None:
+            count, times = len(self.memory), self.response.shape[0] * self.response.shape[1]
+            at = np.linspace(0, count - 1, len(self.frequency))
+            frame[MEMORY] = np.tile(np.interp(at, np.arange(count), self.memory), times)
+            frame[SEGMENT] = count
+        return frame
+
+
+def remembered_memory(column: FloatArray, count: int) -> FloatArray:
+    """The memory of so many samples from its column."""
+    at = np.linspace(0, count - 1, len(column))
+    memory: FloatArray = np.interp(np.arange(count), at, column)
+    return memory

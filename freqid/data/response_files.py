@@ -22,6 +22,7 @@ from freqid.data.analyser_columns import (
     polar,
 )
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
+from freqid.data.averaged_response import MEMORY, SEGMENT, AveragedResponse, remembered_memory
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.table import named
@@ -162,7 +163,12 @@ def _long(frame: pd.DataFrame) -> FrequencyResponse:
     }  # fmt: skip
     names = {"input_names": inputs, "output_names": outputs, "units": units}
     kept = kept_of_response(frame, [str(n) for n in inputs])
-    return FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
+    found = FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
+    if len(f) < 2 or not {MEMORY, SEGMENT} <= set(frame.columns):
+        return found
+    count = round(float(numbers_of(first, SEGMENT)[0]))
+    memory = remembered_memory(numbers_of(first, MEMORY), count)
+    return AveragedResponse(**found.__dict__, memory=memory)
 
 
 def _picked(

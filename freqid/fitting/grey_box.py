@@ -213,6 +213,7 @@ def _estimate(
         fastest=float(np.abs(poles).max(initial=0.0)) * output_dt(reading.data),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
+        units={n: u for r in readings for n, u in getattr(r.data, "units", {}).items()},
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
         # what rounding leaves wants nothing
         wanted=values[:count] if minimum.exact else (minimum.unbounded * structure.scale)[:count],

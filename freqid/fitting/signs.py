@@ -6,12 +6,14 @@ findings.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from freqid.checks import FloatArray
+from freqid.data import coherent
 from freqid.fitting.findings import FOLDED, Finding, Severity
 from freqid.models import Parameter
 
@@ -45,7 +47,7 @@ class Evidence:
     (Hz) above the Nyquist frequency; the ``fastest`` motion decays by so many nepers in a sample;
     ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
     rounding of the matrices moves the response, with the sentence on it. ``tied`` are parameters of
-    which an expression decides, with that and their values.
+    which an expression decides, with that and their values; ``units`` are those of the channels.
     """
 
     parameters: Sequence[Parameter]
@@ -65,6 +67,7 @@ class Evidence:
     rounding: tuple[float, str] = (0.0, "")
     tied: Sequence[tuple[Parameter, str, float]] = ()
     wanted: FloatArray | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -136,6 +139,34 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
                 sentence += " by less than two standard errors, so that they allow the bound itself"
                 severity = "minor"
             yield Finding("edge of a bound", sentence, severity, float(value))
+
+
+# how the unit of a parameter has that of a channel in it
+_MENTIONS = {
+    "rad": r"/\s*\(?rad", "rad/s": r"/\s*\(?rad", "N m": r"N\s*m", "N": r"N(?!\s*m)",
+    "m": r"/\s*\(?m\b", "m/s": r"/\s*\(?m\b", "A": r"A\b", "V": r"V\b",
+}  # fmt: skip
+
+
+@sign
+def other_units(e: Evidence) -> Iterator[Finding]:
+    """A channel in multiples of the unit that parameters are printed in."""
+    for channel, unit in e.units.items():
+        told = coherent(unit)
+        if told is None:
+            continue
+        base, factor = told
+        # who has the channel's own unit in his parameters means it
+        units = {p.unit.replace("·", " ") for p in e.parameters}
+        met = sorted(u for u in units if unit not in u and re.search(_MENTIONS[base], u))
+        if met:
+            yield Finding(
+                "units",
+                f"{channel} is in {unit}, and parameters in {', '.join(met)} are those of a "
+                f"channel in {base}: their numbers are of another unit than is printed beside "
+                f"them; multiply it by {factor:.6g}",
+                number=factor,
+            )
 
 
 @sign

@@ -103,3 +103,18 @@ def test_experiments_that_cut_a_plant_off_say_so_in_their_ratio():
     swept = fq.chirp(2, 12, 10.0, DT)
     same = fq.etfe([record(seed, u=swept) for seed in range(6)], band=(3, 11))
     assert same.memory is None
+
+
+def test_a_file_of_a_response_remembers_its_segments(tmp_path):
+    """A fit to the file was trusted, the same fit to the response itself a doubt."""
+    rng = np.random.default_rng(2)
+    u = rng.standard_normal(20_000)
+    record = fq.simulate(fq.two_mass(), u, 2e-3)
+    frf = fq.h1(record.with_noise(0.01 * record.y.std(), seed=1), 500)
+    frf.to_frame().to_csv(tmp_path / "h1.csv", index=False)
+    back = fq.read_response(tmp_path / "h1.csv")
+    np.testing.assert_allclose(back.memory, frf.memory, atol=1e-4)
+    for each in (frf, back):
+        est = fq.fit(fq.two_mass(), each)
+        assert est.warnings[0].kind == "short segments"
+    assert fq.read_response(tmp_path / "h1.csv").select((1, 50)).memory is not None
