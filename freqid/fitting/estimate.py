@@ -253,7 +253,7 @@ class Estimate(Questioned, Shown):
         if known is not None:
             return known
         low, high = self.band or (0.0, 0.5 / self.dt if self.dt else np.inf)
-        found = modes(*self._unknowns)
+        found = modes(*self._unknowns, once=not isinstance(self.model, GreyBox))
         from freqid.fitting.table import Table
 
         return Table(found.assign(in_band=found["frequency"].between(low, high)))

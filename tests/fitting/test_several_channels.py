@@ -108,3 +108,12 @@ def test_a_black_box_is_found_in_any_units_of_its_outputs(seed, weights):
     assert np.sort(est.modes()["frequency"]) == pytest.approx(
         np.sort(np.abs(poles[poles.imag > 0])) / (2 * np.pi), rel=0.005
     )
+
+
+def test_a_mode_that_two_outputs_share_is_told_once():
+    """With the denominator that they have in common each mode stood there twice."""
+    poles, u, y = axis_with_encoders(0)
+    modes = fq.fit(fq.TransferFunction(3, 4), fq.Record(u, y, 4e-3)).modes()
+    assert modes["frequency"].to_numpy() == pytest.approx(
+        np.sort(np.abs(poles[poles.imag > 0])) / (2 * np.pi), rel=0.005
+    )

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 _STEP = 1e-6
 # a pole of this part of the fastest one's size is at zero, up to rounding
 _INTEGRATES = 1e-10
+# parts of a pole and of its derivatives in which two are one, but for rounding
+_ONE, _MOVED = 1e-9, 1e-4
 # what is told of a mode
 _MODE = (
     "frequency", "frequency_std", "damping", "damping_std", "time_constant", "time_constant_std"
@@ -51,22 +53,28 @@ def derived(
     return at, np.sqrt(np.maximum(parts.sum(axis=(-2, -1)), 0))
 
 
-def modes(structure: Answering, x: FloatArray, spread: Spread) -> pd.DataFrame:
+def modes(structure: Answering, x: FloatArray, spread: Spread, once: bool = False) -> pd.DataFrame:
     """Natural frequency (Hz) and damping ratio of each mode, with standard errors.
 
-    Real poles have a damping ratio of 1 (−1 where they are unstable), which is no estimate and has
-    no error, and a ``time_constant`` (s); one at zero has neither frequency nor damping.
+    One that each of several channels has, as a common denominator gives it to them, may be told
+    ``once``. Real poles have a damping ratio of 1 (−1 where they are unstable), which is no
+    estimate and has no error, and a ``time_constant`` (s); one at zero has neither frequency nor
+    damping.
     """
     import pandas as pd
 
     poles, change = structure.poles(x)
     covariance = spread.known(np.nan)
-    rows = []
+    rows: list[dict[str, float]] = []
+    told: list[tuple[complex, ComplexArray]] = []
     fastest = float(np.abs(poles).max(initial=0))
     for k in np.argsort(np.abs(poles)):
         pole, d = poles[k], change[k]
         if pole.imag < 0:
             continue
+        if once and any(_same(pole, d, other, own) for other, own in told):
+            continue
+        told.append((pole, d))
         size = abs(pole)
         damping = -pole.real / size if size > 0 else 1.0
         # d|λ| = Re(λ* dλ)/|λ|, dζ = −Re(dλ)/|λ| + Re(λ) d|λ|/|λ|²
@@ -87,6 +95,12 @@ def modes(structure: Answering, x: FloatArray, spread: Spread) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows, columns=_MODE)
+
+
+def _same(pole: complex, d: ComplexArray, other: complex, own: ComplexArray) -> bool:
+    """Whether two poles are one, which unknowns move alike."""
+    alike = abs(pole - other) <= _ONE * abs(pole)
+    return bool(alike and np.abs(d - own).max(initial=0) <= _MOVED * np.abs(d).max(initial=0))
 
 
 def pole_scatter(
