@@ -197,7 +197,9 @@ def plot_bias(
         band = (float(shown.frequency[0]), float(shown.frequency[-1]))
         if shown.frequency.size > 1:
             inside = [r.select(band) for r in inside]
-        nyquist(*inside, ax=plane, unit="Hz", styles=styles)
+        nyquist(*inside, labels=list(responses), ax=plane, unit="Hz", styles=styles)
+        # whose lines these are the amplitude says
+        plane.get_legend().remove()
         plane.set_title("in the band of the input")
         _shade(amplitude, shown)
         amplitude.legend(fontsize=8)

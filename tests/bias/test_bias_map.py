@@ -168,6 +168,9 @@ def test_pictures_say_what_the_table_says(table, plant):
     assert np.allclose(x, np.linspace(40, 90, 6))
     assert np.allclose(y * 10, part["estimate"])
     amplitude, _, plane = fq.plot_bias(plant, fq.ChirpSpectrum(10, 80), 5e-3, "zoh", TRUE)
+    # its lines had names of their own, "measured 1" and "response"
+    assert plane.get_legend() is None
+    assert [x.get_label() for x in plane.lines] == [x.get_label() for x in amplitude.lines]
     assert "d = -231.4" in amplitude.figure.get_suptitle()
     assert len(plane.lines) == 3
 

@@ -45,7 +45,7 @@ def write_report(
     drawn, away = figures(est, validation), bias(est)
     found = verdict(est, validation)
     page = environment.get_template("report.html.j2").render(
-        title=title or f"Estimate of {getattr(est.model, 'name', type(est.model).__name__)}",
+        title=title or f"Estimate of {_named(est)}",
         verdict=found,
         warnings=list(est.warnings),
         witness=None if est.testimony is None else est.witness,
@@ -81,3 +81,10 @@ def _is_report(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return _MARK in file.read(_HEAD)
+
+
+def _named(est: Estimate) -> str:
+    """A plant by its name, a black box by what it is."""
+    name = getattr(est.model, "name", "")
+    kind = "a sampled" if est.model.dt else "a continuous"
+    return name or f"{kind} black box of order {len(est.model.poles)}"

@@ -83,15 +83,18 @@ def tests(est: Estimate) -> list[dict[str, object]]:
 
 def modes(est: Estimate) -> Table:
     """Frequency and damping of each mode, or the time constant of a real pole."""
-    columns = ["mode", "frequency in Hz", "±", "damping ratio", "±", "time constant in s", "±",
+    columns = ["mode", "frequency in Hz", "±", "damping ratio, or time constant", "±",
                "pole in rad/s"]  # fmt: skip
     found = est.modes()
     rows = []
     for i, (_, mode) in enumerate(found.head(_ROWS).iterrows()):
         row = [f"{i + 1}{_outside(mode)}"]
-        for n in ("frequency", "damping", "time_constant"):
+        real = bool(np.isfinite(mode["time_constant"]))
+        for n in ("frequency", "time_constant" if real else "damping"):
             value, std = float(mode[n]), float(mode[f"{n}_std"])
-            row += [_rounded(value, std) if std > 0 else _number(value, 6), _error(std)]
+            unit = " s" if n == "time_constant" else ""
+            told = _rounded(value, std) if std > 0 else _number(value, 6)
+            row += [f"{told}{unit}", _error(std)]
         rows.append([*row, _pole(float(mode["frequency"]), float(mode["damping"]))])
     return Table(columns, rows, max(len(found) - _ROWS, 0))
 
