@@ -101,8 +101,10 @@ def elements(model: Model) -> list[Element]:
             continue
         most = Vt[0][np.argmax(np.abs(Vt[0]))]
         force, motion = U[:, 0] * sizes[0] * scale[:, 0] * most, Vt[0] / most
-        along = [B for B in at.B.T if _parallel(force, B)]
-        damps = float(force @ motion) < 0
+        along = [B for B in at.B.T if parallel(force, B)]
+        # a spring's force and its motion are at states of their own, but for rounding
+        size = float(np.linalg.norm(force) * np.linalg.norm(motion))
+        damps = float(force @ motion) < -_ALONG * size
         found.append(
             Element(name, force, motion, damps, along[0] if along else None, model.values[name])
         )
@@ -119,6 +121,7 @@ def _straight(model: GreyBox, name: str, A: FloatArray, dA: FloatArray) -> bool:
     return bool((np.abs(moved - A - step * dA) <= _BENT * np.abs(step * dA).max()).all())
 
 
-def _parallel(a: FloatArray, b: FloatArray) -> bool:
+def parallel(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two vectors are along one line."""
     size = np.linalg.norm(a) * np.linalg.norm(b)
     return bool(size > 0 and abs(abs(a @ b) - size) <= _ALONG * size)

@@ -17,6 +17,7 @@ from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.findings import FOLDED
 from freqid.fitting.suspects.elements import Element, elements
 from freqid.fitting.suspects.far_end import FarEnd, far_ends
+from freqid.fitting.suspects.masses import masses
 from freqid.fitting.suspects.modal_elements import modal_elements
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.register import Columns, suspect
@@ -69,11 +70,13 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     """What acts against the direction of motion, however fast that is: Coulomb's.
 
     On an input, an output being the velocity, or the position; of as many inputs as outputs each
-    has its own. Beside each damper, with what that one answers to; at the far end of a black box.
+    has its own. Beside each damper, with what that one answers to; on masses that springs alone
+    hold; at the far end of a black box.
     """
     if not _asked(scene, model):
         return []
     dampers = [each for each in _elements(scene, model) if each[0].damps]
+    dampers += _same([masses(s.own(model)) for s in scene.seen])
     ends = _same([[*far_ends(s.own(model))] for s in scene.seen])
     count = 2 + len(dampers) + len(ends)
     ways: dict[str, Callable[[FloatArray], FloatArray]] = {
