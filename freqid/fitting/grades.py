@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from freqid.fitting.search.verdict import RARE
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
 from freqid.fitting.uncertainty.profiles import wider_than_linear
 from freqid.fitting.uncertainty.rivals import rival_of
-from freqid.fitting.witness import RARE
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
-from freqid.fitting.search.verdict import Verdict, Witness
+from freqid.fitting.search.verdict import RARE, Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
@@ -42,9 +42,8 @@ from freqid.models import Model, observed_order
 _LEVEL = 0.01
 # gap between the costs, relative, in which no better minimum can hide
 _TOUCHES = 1e-3
-# relative standard error of a parameter that the data leave open; starts that have to agree then,
-# and the level of the gap below which not even that tells that there is no minimum in it
-_OPEN, _WANTED, RARE = 0.5, 4, 0.2
+# relative standard error of a parameter that the data leave open, and starts that have to agree then
+_OPEN, _WANTED = 0.5, 4
 # part of the data's energy from which on noise outweighs what is explained, and makes many minima
 _DROWNED = 0.5
 # part of the lines that are left out on either side, the factor between the others' variances from

@@ -7,6 +7,9 @@ from typing import Literal
 
 Verdict = Literal["complete", "lacking", "absent"]
 
+# level of a gap to a black box below which not even starts that agree tell that nothing is in it
+RARE = 0.2
+
 
 @dataclass(frozen=True)
 class Witness:

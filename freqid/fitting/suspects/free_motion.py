@@ -31,8 +31,8 @@ from freqid.models import Model
 _LEVEL, _SMALL, _MUCH, _HARMLESS = 5e-4, 0.3, 1.5, 1e-3
 # the part of its noise that a line keeps at least, and how often that is told anew
 _LEAST, _ROUNDS = 0.1, 3
-# states below this part of the largest are none
-_SAME = 1e-7
+# states below this part of the largest are none, and changes that are none beside the largest
+_SAME, _STAYS = 1e-7, 1e-9
 # real values that tell the noise at least
 _FEW = 10
 
@@ -40,8 +40,8 @@ _FEW = 10
 @dataclass(frozen=True)
 class _Motion:
     """What a free motion explains of the changes of one experiment, in units of their noise, on so
-    many degrees of freedom, of so many values; what is ``left``; and what it leaves in the means,
-    the first of some lines (1 + n, outputs, K), of which the others are its standard errors'.
+    many degrees of freedom, of so many values; what is ``left`` of them; and what it leaves in the
+    means (1 + n, outputs, K): first that, then its standard errors, in parts that are independent.
     """
 
     explained: float
@@ -116,12 +116,15 @@ def _motions(s: Seen, data: PeriodicResponse, model: Model) -> list[_Motion]:
     samples = round(data.period / data.dt)
     z, one = on_circle(data.omega * data.dt), np.eye(len(A))
     try:
-        # from the start of a period to that of the next, and so on
-        turn = np.linalg.matrix_power(phi, samples)
-        turns = [np.linalg.matrix_power(turn, i) for i in range(P)]
-        later = one - sum(turns[1:]) / (P - 1)
-        in_mean = np.linalg.pinv(later) @ sum(turns) / P
-        free = z[:, None, None] * (C @ np.linalg.inv(z[:, None, None] * one - phi))
+        # motions that grow may leave the numbers
+        with np.errstate(all="ignore"):
+            # from the start of a period to that of the next, and so on
+            turn = np.linalg.matrix_power(phi, samples)
+            turns = [np.linalg.matrix_power(turn, i) for i in range(P)]
+            later = one - sum(turns[1:]) / (P - 1)
+            # what stays as it is changes nothing from period to period
+            in_mean = np.linalg.pinv(later, _STAYS) @ sum(turns) / P
+            free = z[:, None, None] * (C @ np.linalg.inv(z[:, None, None] * one - phi))
     except np.linalg.LinAlgError:
         return []
     columns = np.moveaxis(free, 0, -1).swapaxes(0, 1)  # (n, outputs, K)
