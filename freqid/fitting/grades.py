@@ -121,7 +121,9 @@ def _lonely(est: Estimate) -> list[str]:
 def _besides(est: Estimate, std: np.ndarray) -> list[str]:
     """Values that are hardly told, and a gap to a black box in which better ones may lie."""
     witness = est.witness
-    if witness.verdict != "absent" or not witness.p_value < RARE or est.minimum.exact:
+    if witness.verdict != "absent" or not witness.p_value < RARE:
+        return []
+    if est.problem is not None and est.minimum.exact:
         return []
     vague = _vague(est, std)
     if not vague:

@@ -42,7 +42,8 @@ from freqid.models import Model, observed_order
 _LEVEL = 0.01
 # gap between the costs, relative, in which no better minimum can hide
 _TOUCHES = 1e-3
-# relative standard error of a parameter that the data leave open, and starts that have to agree then
+# relative standard error of a parameter that the data leave open, and how many starts have to
+# agree then
 _OPEN, _WANTED = 0.5, 4
 # part of the data's energy from which on noise outweighs what is explained, and makes many minima
 _DROWNED = 0.5

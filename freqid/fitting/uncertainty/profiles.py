@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 # steps within which an end is looked for, each half the distance to the linear interval's end, and
 # evaluations of each fit on the way
 _REACH, _LIMIT = 10.0, 60
-# part of the linear interval beyond which it is no interval
-_WIDER = 1.5
 # and the nearest that one can be
 _NEAREST = 1e-3
+# part of the linear interval beyond which it is no interval
+_WIDER = 1.5
 # relative standard error that is down to rounding
 _ROUNDED = 1e-12
 
