@@ -39,6 +39,20 @@ def test_springs_are_no_dampers_by_rounding():
         assert load.force[3] == pytest.approx(-1 / plant["J2"])
 
 
+def test_an_acceleration_shows_friction_at_once():
+    """An output whose row of C is that of A has the force in it before it has moved anything."""
+
+    def seen(J1, J2, k, c, d):
+        A, B, C, _ = matrices(J1, J2, k, c, d)
+        return A, B, [C[0], A[3], [2 * a for a in A[2]]], None
+
+    plant = fq.GreyBox(seen, axis().parameters)
+    (load,) = masses(plant)
+    A, _, C, _ = plant.state_space()
+    # Newton's law: of a newton metre against the motion
+    np.testing.assert_allclose(load._at_once(A, C, load.force), [0, -1 / LOAD, 0], atol=1e-12)
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("kind", ["white", "binary", "multisine"])
 def test_friction_of_a_load_is_named_with_its_place(kind):

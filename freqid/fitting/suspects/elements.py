@@ -72,11 +72,15 @@ class Element:
         return self._driven(s, model, np.sign(self.force @ self.along) * self.along, shape)
 
     def _driven(self, s: Seen, model: Model, at: FloatArray, shape: ComplexArray) -> FloatArray:
-        A, _, C, D = self.matrices(model)
+        A, _, C, _ = self.matrices(model)
         # what acts inside is held as the first input is
         hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
-        G = self._response(s, StateSpace(A, at[:, None], C, 0 * D[:, :1]), hold)
-        return s.driven(G, shape[None, None])
+        plant = StateSpace(A, at[:, None], C, self._at_once(A, C, at)[:, None])
+        return s.driven(self._response(s, plant, hold), shape[None, None])
+
+    def _at_once(self, A: FloatArray, C: FloatArray, at: FloatArray) -> FloatArray:
+        """What of a force outputs show at once, (outputs,)."""
+        return np.zeros(len(C))
 
     @staticmethod
     def _response(s: Seen, plant: StateSpace, hold: Hold) -> ComplexArray:
@@ -84,8 +88,10 @@ class Element:
         return responses(SystemModel(plant, *names), hold, s.omega_input)
 
 
-def elements(model: Model) -> list[Element]:
-    """Those of a grey box in continuous time, its springs and dampers."""
+def elements(model: Model, heard: bool = False) -> list[Element]:
+    """Those of a grey box in continuous time, its springs and dampers; those too of which outputs
+    show the force, as an acceleration does, where they may be ``heard``.
+    """
     if not isinstance(model, GreyBox) or model.dt or model.late:
         return []
     # a user's function need not know how to move what is fixed
@@ -93,7 +99,8 @@ def elements(model: Model) -> list[Element]:
     at, by = model.linearise(model.values, names)
     found = []
     for name, dA, others in zip(names, by.A, zip(by.B, by.C, by.D, strict=True), strict=True):
-        if not dA.any() or any(M.any() for M in others):
+        dB, dC, dD = others
+        if not dA.any() or dB.any() or dD.any() or (dC.any() and not heard):
             continue
         scale = np.maximum(np.abs(dA).max(axis=1, keepdims=True), 1e-300)
         U, sizes, Vt = np.linalg.svd(dA / scale)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from freqid.checks import FloatArray
 from freqid.fitting.suspects.elements import Element, elements, parallel
 from freqid.models import GreyBox, Model
 
@@ -30,12 +31,19 @@ class Mass(Element):
         place = "at the far end of" if len(self.springs) == 1 else "between"
         return f"{place} {' and '.join(self.springs)} turns round with the speed there"
 
+    def _at_once(self, A: FloatArray, C: FloatArray, at: FloatArray) -> FloatArray:
+        """What outputs that are the acceleration of this mass show of its force."""
+        i = int(np.argmax(np.abs(at)))
+        size = float(A[i] @ A[i])
+        shown = [row @ A[i] / size if size and parallel(row, A[i]) else 0.0 for row in C]
+        return np.array(shown) * at[i]
+
 
 def masses(model: Model) -> list[Mass]:
     """Those of a grey box."""
     if not isinstance(model, GreyBox):
         return []
-    every = elements(model)
+    every = elements(model, heard=True)
     springs = [e for e in every if not e.damps]
     taken = [*(e.force for e in every if e.damps), *model.state_space().B.T]
     found = []
