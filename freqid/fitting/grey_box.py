@@ -22,7 +22,7 @@ from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
-from freqid.fitting.sight import hold_that_changes, out_of_sight
+from freqid.fitting.sight import gone_with, hold_that_changes, out_of_sight
 from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.twins import nearest_to_start
@@ -210,10 +210,12 @@ def _estimate(
         minimum.objective.n_rows,
         len(values),
         out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
-        fastest=float(np.abs(poles).max(initial=0.0)) * output_dt(reading.data),
+        gone=gone_with(model, structure.parameters, output_dt(reading.data)),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
-        units={n: u for r in readings for n, u in getattr(r.data, "units", {}).items()},
+        units=dict.fromkeys(
+            each for r in readings for each in getattr(r.data, "units", {}).items()
+        ),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
         # what rounding leaves wants nothing
         wanted=values[:count] if minimum.exact else (minimum.unbounded * structure.scale)[:count],

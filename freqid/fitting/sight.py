@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from freqid.checks import ComplexArray
+from freqid.checks import ComplexArray, InputError
 from freqid.data import DataSet, Record
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
+from freqid.models import GreyBox, Parameter
 
+# nepers in a sample of a motion that no sample can show
+_GONE = 1e6
 # output samples of an input that are looked at first
 _FEW = 100
 
@@ -18,6 +23,21 @@ def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:
         return []
     turning = poles.imag[poles.imag > np.pi / hold.period * (1 + 1e-6)]
     return sorted(float(w) / (2 * np.pi) for w in turning)
+
+
+def gone_with(model: GreyBox, free: Sequence[Parameter], dt: float) -> list[str]:
+    """Free parameters that have sent a motion out of sight: back at its start alone, one of them
+    brings it to within reach of samples at ``dt`` (s).
+    """
+
+    def out(**values: float) -> bool:
+        try:
+            poles = np.linalg.eigvals(model.state_space(**values).A)
+        except (InputError, np.linalg.LinAlgError):
+            return True
+        return float(np.abs(poles).max(initial=0.0)) * dt > _GONE
+
+    return [p.name for p in free if not out(**{p.name: p.value})] if out() else []
 
 
 def hold_that_changes(hold: Hold, data: DataSet) -> Hold:

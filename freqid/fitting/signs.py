@@ -7,8 +7,8 @@ findings.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,8 +30,6 @@ _CONTRADICTED, _LEAST_TAKEN = 3.5, 0.05
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
 _NONE = 0.02
-# nepers in a sample of what no sample can show
-_GONE = 1e6
 # a response that rounding moves by so much is worth a word beside noise
 _ROUNDED = 1e-6
 
@@ -44,10 +42,11 @@ class Evidence:
     open; ``hold_period`` and its standard error (s) where the hold was estimated, and ``dt`` (s);
     ``n_rows`` real values of the data were there for ``n_unknowns``; ``growing`` are the poles of
     a black box whose motions grow, the surest by ``growth`` standard errors; ``out_of_sight`` modes
-    (Hz) above the Nyquist frequency; the ``fastest`` motion decays by so many nepers in a sample;
+    (Hz) above the Nyquist frequency; ``gone`` parameters have sent a motion out of sight;
     ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
     rounding of the matrices moves the response, with the sentence on it. ``tied`` are parameters of
-    which an expression decides, with that and their values; ``units`` are those of the channels.
+    which an expression decides, with that and their values; ``units`` are those of the channels,
+    each with its name.
     """
 
     parameters: Sequence[Parameter]
@@ -62,12 +61,12 @@ class Evidence:
     growing: Sequence[complex] = ()
     growth: float = np.inf
     out_of_sight: Sequence[float] = ()
-    fastest: float = 0.0
+    gone: Collection[str] = ()
     aliased: float = 0.0
     rounding: tuple[float, str] = (0.0, "")
     tied: Sequence[tuple[Parameter, str, float]] = ()
     wanted: FloatArray | None = None
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: Collection[tuple[str, str]] = ()
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -130,7 +129,7 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
                 continue
             sentence = f"{p.name}={value:.6g} is at its bound {bound:g}; the data want it beyond"
             severity: Severity = "serious"
-            if e.fastest > _GONE and value != p.value:
+            if p.name in e.gone:
                 sentence += (
                     ": a motion is so fast there that it is gone, and error bars tell nothing of "
                     "what has left with it; give what is known of it (with_prior, with_bounds)"
@@ -151,7 +150,7 @@ _MENTIONS = {
 @sign
 def other_units(e: Evidence) -> Iterator[Finding]:
     """A channel in multiples of the unit that parameters are printed in."""
-    for channel, unit in e.units.items():
+    for channel, unit in e.units:
         told = coherent(unit)
         if told is None:
             continue

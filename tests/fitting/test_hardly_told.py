@@ -5,6 +5,7 @@ import pytest
 import scipy
 
 import freqid as fq
+from freqid.fitting.sight import gone_with
 from freqid.fitting.signs import Evidence, findings
 
 DT, N = 4e-3, 1200
@@ -67,12 +68,21 @@ def test_why_what_is_open_is_a_doubt_is_said(seed, words):
     assert words in verdict.reasons[0]
 
 
-@pytest.mark.parametrize(("fastest", "severity"), [(1e10, "serious"), (3.0, "minor")])
-def test_a_motion_that_is_gone_leaves_no_error_bars(fastest, severity):
+@pytest.mark.parametrize(("gone", "severity"), [(["J1"], "serious"), ((), "minor")])
+def test_a_motion_that_is_gone_leaves_no_error_bars(gone, severity):
     """An inertia of 2e-12 ± 5e-13 at its bound of zero was trusted."""
     inertia, value = fq.Parameter("J1", 0.02, lower=0), np.array([2e-12])
-    evidence = Evidence([inertia], value, np.array([5e-13]), fastest=fastest, wanted=value)
+    evidence = Evidence([inertia], value, np.array([5e-13]), gone=gone, wanted=value)
     (edge,) = findings(evidence)
     assert edge.kind == "edge of a bound"
     assert edge.severity == severity
     assert ("it is gone" in edge) == (severity == "serious")
+
+
+def test_a_motion_is_gone_with_what_brings_it_back():
+    """Not with a damper that is at zero as well, nor where the plant was as fast from the start."""
+    start = plant(TRUE)
+    model = start.with_values(J1=2e-12, d=0.0)
+    assert gone_with(model, start.parameters, DT) == ["J1"]
+    assert gone_with(start.with_values(d=0.0), start.parameters, DT) == []
+    assert gone_with(model, model.parameters, DT) == []

@@ -110,6 +110,17 @@ def test_a_black_box_is_found_in_any_units_of_its_outputs(seed, weights):
     )
 
 
+@pytest.mark.parametrize("ratio", [12.0, 1e5])
+def test_an_order_too_low_for_all_outputs_explains_the_larger(ratio):
+    """Begun where both count alike alone it ended at nine times the least cost."""
+    _, u, y = axis_with_encoders(0)
+    y = y / y.std(axis=0) * [ratio, 1.0]
+    est = fq.fit(fq.OutputError(2), fq.Record(u, y, 4e-3))
+    alone = fq.fit(fq.OutputError(2), fq.Record(u, y[:, 0], 4e-3))
+    # a model without the other output leaves all of it
+    assert est.cost <= alone.cost + (y[:, 1] ** 2).sum()
+
+
 def test_a_mode_that_two_outputs_share_is_told_once():
     """With the denominator that they have in common each mode stood there twice."""
     poles, u, y = axis_with_encoders(0)

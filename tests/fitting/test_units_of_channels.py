@@ -57,3 +57,9 @@ def test_who_means_the_unit_of_his_file_says_so_in_his_parameters():
     )
     est = fq.fit(plant, measured({"torque": "N m", "angle": "°"}))
     assert not [w for w in est.warnings if w.kind == "units"]
+
+
+def test_one_record_of_several_in_another_unit_is_told():
+    """The units of the last record had been those of all."""
+    both = [measured({"angle": "°"}), measured({"angle": "rad"})]
+    assert [w.kind for w in fq.fit(spring(), both).warnings] == ["units"]

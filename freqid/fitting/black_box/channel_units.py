@@ -49,16 +49,17 @@ Lines = Sequence[SpectralExperiment]
 def begun_alike(
     lines: Lines, solve: Callable[[Lines], Descent], descend: Callable[[Chart, Lines], Descent]
 ) -> Descent:
-    """What ``solve`` finds on lines, next to what it finds where all outputs count alike, if that
-    is another task.
+    """The better of what ``solve`` finds on lines and of the minimum next to what it finds where
+    all outputs count alike, if that is another task.
+
+    Of an order that is too low for all outputs the two may be far apart.
     """
-    units = alike(lines)
-    if units is not None:
-        chart, near, _ = solve(units.lines)
-        found = descend(chart.around(units.back(chart.matrices(near.x))), lines)
-        if found[1].converged:
-            return found
-    return solve(lines)
+    found, units = solve(lines), alike(lines)
+    if units is None:
+        return found
+    chart, near, _ = solve(units.lines)
+    other = descend(chart.around(units.back(chart.matrices(near.x))), lines)
+    return min(found, other, key=lambda each: each[1].cost)
 
 
 def alike(lines: Lines) -> AlikeChannels | None:

@@ -45,9 +45,10 @@ def masses(model: Model) -> list[Mass]:
         return []
     every = elements(model, heard=True)
     springs = [e for e in every if not e.damps]
-    taken = [*(e.force for e in every if e.damps), *model.state_space().B.T]
+    A, B, *_ = model.state_space()
+    taken = [*(e.force for e in every if e.damps), *B.T]
     found = []
-    for i, unit in enumerate(np.eye(len(model.state_space().A))):
+    for i, unit in enumerate(np.eye(len(A))):
         # of a unit force on it each of them makes the same acceleration
         pulls = [e for e in springs if abs(e.force[i]) > _NOTHING * np.abs(e.force).max()]
         if not pulls or any(parallel(unit, force) for force in taken):

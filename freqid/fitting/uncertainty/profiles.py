@@ -51,7 +51,8 @@ def profile_intervals(
     """
     import pandas as pd
 
-    own, half, rise = _linear(minimum, std / scale, level)
+    own = std / scale
+    half, rise = _linear(minimum, own, level)
     ends = minimum.x[:, None] + half * own[:, None] * np.array([-1, 1])
     ends[~np.isfinite(own)] = -np.inf, np.inf
     told = list(rise)
@@ -103,7 +104,8 @@ def wider_than_linear(minimum: Minimum, scale: FloatArray, std: FloatArray) -> l
     """Numbers of the unknowns that the data allow beyond one and a half times the interval that
     their standard errors give: a profile of each, looked at in two places.
     """
-    own, half, rise = _linear(minimum, std / scale, 0.95)
+    own = std / scale
+    half, rise = _linear(minimum, own, 0.95)
     structure, wide = minimum.objective.structure, []
     for i in rise:
         ends = minimum.x[i] + _WIDER * half * own[i] * np.array([-1, 1])
@@ -113,21 +115,15 @@ def wider_than_linear(minimum: Minimum, scale: FloatArray, std: FloatArray) -> l
     return wide
 
 
-def _linear(
-    minimum: Minimum, own: FloatArray, level: float
-) -> tuple[FloatArray, float, dict[int, float]]:
-    """Standard errors (P,) of the unknowns, the quantile of a level, and of each unknown by how
+def _linear(minimum: Minimum, own: FloatArray, level: float) -> tuple[float, dict[int, float]]:
+    """The quantile of a level, and of each unknown, with its standard error ``own`` (P,), by how
     much the cost rises to its interval's end; an error that is down to rounding has no profile.
     """
     noise = minimum.noise_variance
     white = noise * np.diag(minimum.determined.inverse)
     half = quantile(values_that_tell(minimum), level)
     told = np.flatnonzero(np.isfinite(own) & (own > _ROUNDED * np.abs(minimum.x)))
-    return (
-        own,
-        half,
-        {int(i): float(noise * max(own[i] ** 2 / white[i], 1e-12) * half**2) for i in told},
-    )
+    return half, {int(i): float(noise * max(own[i] ** 2 / white[i], 1e-12) * half**2) for i in told}
 
 
 def _end_of(minimum: Minimum, asked: tuple[int, float, float]) -> float:
