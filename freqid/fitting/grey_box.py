@@ -210,7 +210,7 @@ def _estimate(
         minimum.objective.n_rows,
         len(values),
         out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
-        gone=gone_with(model, structure.parameters, output_dt(reading.data)),
+        gone=gone_with(model, poles, structure.parameters, output_dt(reading.data)),
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         units=dict.fromkeys(

@@ -25,19 +25,25 @@ def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:
     return sorted(float(w) / (2 * np.pi) for w in turning)
 
 
-def gone_with(model: GreyBox, free: Sequence[Parameter], dt: float) -> list[str]:
+def gone_with(
+    model: GreyBox, poles: ComplexArray, free: Sequence[Parameter], dt: float
+) -> list[str]:
     """Free parameters that have sent a motion out of sight: back at its start alone, one of them
-    brings it to within reach of samples at ``dt`` (s).
+    brings it to within reach of samples at ``dt`` (s). ``poles`` (rad/s) are those of the model.
     """
 
-    def out(**values: float) -> bool:
-        try:
-            poles = np.linalg.eigvals(model.state_space(**values).A)
-        except (InputError, np.linalg.LinAlgError):
-            return True
+    def out(poles: ComplexArray) -> bool:
         return float(np.abs(poles).max(initial=0.0)) * dt > _GONE
 
-    return [p.name for p in free if not out(**{p.name: p.value})] if out() else []
+    def back(p: Parameter) -> bool:
+        try:
+            A = model.state_space(**{p.name: p.value}).A
+        except InputError:
+            return False
+        return not out(np.linalg.eigvals(A).astype(complex))
+
+    # a user's function is not called once more for nothing
+    return [p.name for p in free if back(p)] if out(poles) else []
 
 
 def hold_that_changes(hold: Hold, data: DataSet) -> Hold:
