@@ -16,7 +16,7 @@ from freqid.fitting.clock_offset import clock_notes, with_clock_offset
 from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.data_notes import notes_of
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fed_back import FED_BACK, fed_back
+from freqid.fitting.fed_back import FED_BACK, could_go, fed_back, pulled_by_noise
 from freqid.fitting.fit_options import check_words
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
 from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
@@ -177,8 +177,27 @@ def fit(
     if offset is not None:
         readings = [with_offset(r) for r in readings]
     options = SearchOptions(count, seed, start, estimated, own, near, meant)
+    given: dict[str, Any] = {
+        "hold": asked_hold, "band": band, "weights": weights, "initial_state": initial_state,
+        "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
+        "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
+        "error": error,
+    }  # fmt: skip
+
+    def back() -> Estimate:
+        asked = given | {"reference": True, "separate": own, "progress": progress}
+        through = fit(asked_model, given_sets, **asked)
+        return dataclasses.replace(through, notes=[FED_BACK, *through.notes])
+
+    explained = bool(way.loops)
+    free = reference == "auto" and not near and could_go(readings, way)
     with _shown(progress):
-        est, readings = _fitted(model, readings, options, loss)
+        if free and count is None and isinstance(model, GreyBox):
+            # a search among noise that comes back through a loop is long, and for nothing
+            one = dataclasses.replace(options, n_starts=1)
+            if pulled_by_noise(*_fitted(model, readings, one, loss, explained), way):
+                return back()
+        est, readings = _fitted(model, readings, options, loss, explained)
     what, said = type(model).__name__, est.message.rstrip(".")
     _LOG.info("%s: cost %.6g, starts: %d; %s", what, est.cost, est.n_starts, said)
     if offset is not None:
@@ -186,12 +205,6 @@ def fit(
     share = None
     if way.loops:
         est, share = with_loop_noise(est, readings, way.loops)
-    given: dict[str, Any] = {
-        "hold": asked_hold, "band": band, "weights": weights, "initial_state": initial_state,
-        "start": start, "n_starts": n_starts, "seed": seed, "domain": domain,
-        "reference": reference, "offset": offset, "loss": loss, "separate": own or None,
-        "error": error,
-    }  # fmt: skip
     call = call_of(model, len(sets), given)
     inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings, share)
     notes += [*est.notes, *notes_of(given_sets)]
@@ -199,11 +212,7 @@ def fit(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes],
     )  # fmt: skip
-    if reference != "auto" or near or not fed_back(est, readings, way):
-        return est
-    given |= {"reference": True, "separate": own, "progress": progress}
-    through = fit(asked_model, given_sets, **given)
-    return dataclasses.replace(through, notes=[FED_BACK, *through.notes])
+    return back() if free and fed_back(est, readings, way) else est
 
 
 def _in_one_pass(
@@ -231,14 +240,20 @@ def _in_one_pass(
 
 
 def _fitted(
-    model: object, readings: Sequence[Reading], options: SearchOptions, loss: str
+    model: object,
+    readings: Sequence[Reading],
+    options: SearchOptions,
+    loss: str,
+    explained: bool,
 ) -> tuple[Estimate, Sequence[Reading]]:
-    """The estimate, and the readings with the noise, or the cut errors, that it was found with."""
+    """The estimate, and the readings with the noise, or the cut errors, that it was found with;
+    some of the inputs may be as references ``explained`` them.
+    """
 
     def work(some: Sequence[Reading], near: Estimate | None) -> tuple[Estimate, Sequence[Reading]]:
         own = options if near is None else again(near, options)
         if any(r.noise.to_be_learnt for r in some):
-            return noise_weighted(model, some, own)
+            return noise_weighted(model, some, own, explained)
         est = fitter_of(model)(model, some, own)
         if any(r.logarithmic and not r.noise.plain for r in some):
             some = [relative_to_model(est, r) for r in some]

@@ -29,26 +29,39 @@ _ALIKE = frozenset({"feedback", "delay", "feedthrough", "hold rejected"})
 _HARMLESS = 0.7
 
 
+def could_go(readings: Sequence[Reading], way: Through) -> bool:
+    """Whether all could be fitted through their references, and some were not."""
+    through = sum(len(loop.places) for loop in way.loops)
+    timed = any(r.in_time for r in readings)
+    return bool(way.unexplained) and through + len(way.unexplained) == len(readings) and not timed
+
+
 def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
     """Whether what inputs that were fitted as they are leave shows the feedback, to the harm of a
-    parameter, and all could be fitted through their references.
+    parameter.
     """
-    direct = sum(len(loop.places) for loop in way.loops) < len(est.data)
-    could = (isinstance(d, Record) and d.reference is not None and d.factor == 1 for d in est.data)
-    timed = any(r.in_time for r in readings)
-    if not direct or not all(could) or timed or not way.unexplained:
-        return False
-    heard = False
-    for place, unexplained in way.unexplained.items():
-        record = readings[place].data
-        assert isinstance(record, Record)
-        left = errors_of(met_by(est, readings[place]), readings[place]).in_time()
-        heard = heard or heard_back(left, unexplained, float(np.mean(record.inputs**2)))
+    heard = _heard(est, readings, way)
     if heard and _pulled(est, readings, way.unexplained) > _HARMLESS:
         return True
     # beside a reference each of these is asked of an input without noise
     asked = _ALIKE if heard else {"feedback"}
     return any(w.kind in asked and w.severity == "serious" for w in est.warnings)
+
+
+def pulled_by_noise(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
+    """The same of an estimate that one start has led to: whether no search is needed to see it."""
+    return _heard(est, readings, way) and _pulled(est, readings, way.unexplained) > _HARMLESS
+
+
+def _heard(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
+    """Whether what is left comes back in what references leave of the inputs."""
+    for place, unexplained in way.unexplained.items():
+        record = readings[place].data
+        assert isinstance(record, Record)
+        left = errors_of(met_by(est, readings[place]), readings[place]).in_time()
+        if heard_back(left, unexplained, float(np.mean(record.inputs**2))):
+            return True
+    return False
 
 
 def _pulled(

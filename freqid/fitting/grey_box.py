@@ -33,6 +33,8 @@ from freqid.models import GreyBox
 
 # rates less far apart cost no fit as many digits as are worth a word
 _APART = 1e4
+# a value that a start gives for a tied parameter is that of its expression up to rounding
+_SAME = 1e-9
 
 
 @fits(GreyBox)
@@ -42,18 +44,7 @@ def fit_grey_box(
     options: SearchOptions,
 ) -> Estimate:
     """The work of ``fit`` for a GreyBox."""
-    places, notes = places_of(model, [r.data for r in readings], options.separate)
-    structure: GreyStructure | None = _placed(model, readings, options, places)
-    if structure is None:
-        # alike everywhere: the model as it is there
-        model = model.with_conditions(**places[0].conditions, **places[0].known)
-        model = model.fix(*(n for n in places[0].known if not model.parameter(n).fixed))
-        hold = [HoldPeriod.of(_common_dt(readings))] if options.estimated_hold else []
-        structure = GreyStructure(model, checked_start(model, options.start), hold)
-    if not structure.physical_names:
-        raise InputError("model has no free parameter; free one with model.free(name)")
-    structure.meant |= options.meant or {}
-    _possible_delays(structure, readings)
+    structure, notes = structure_of(model, readings, options)
     experiments = read_for((model.n_outputs, model.n_inputs), readings)
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
@@ -66,6 +57,25 @@ def fit_grey_box(
     est = _estimate(structure, minimum, found, readings)
     testimony = Testimony(minimum, tuple(readings), found.n_agreed)
     return dataclasses.replace(est, testimony=testimony, notes=notes)
+
+
+def structure_of(
+    model: GreyBox, readings: Sequence[Reading], options: SearchOptions
+) -> tuple[GreyStructure, list[str]]:
+    """The unknowns of a fit, and notes; InputError where there are none, or none to begin from."""
+    places, notes = places_of(model, [r.data for r in readings], options.separate)
+    structure: GreyStructure | None = _placed(model, readings, options, places)
+    if structure is None:
+        # alike everywhere: the model as it is there
+        model = model.with_conditions(**places[0].conditions, **places[0].known)
+        model = model.fix(*(n for n in places[0].known if not model.parameter(n).fixed))
+        hold = [HoldPeriod.of(_common_dt(readings))] if options.estimated_hold else []
+        structure = GreyStructure(model, checked_start(model, options.start), hold)
+    if not structure.physical_names:
+        raise InputError("model has no free parameter; free one with model.free(name)")
+    structure.meant |= options.meant or {}
+    _possible_delays(structure, readings)
+    return structure, notes
 
 
 def _placed(
@@ -157,7 +167,8 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
     """The start as a dict; ValueError for a name or a value that the model cannot take."""
     if start is None:
         return None
-    values = dict(start)
+    # those of an estimate's own table hold the tied ones, too
+    values = {n: v for n, v in start.items() if n not in model.ties}
     held = {p.name: p.value for p in model.parameters if p.fixed}
     for name in values:
         if name not in model.values:
@@ -167,7 +178,13 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
                 f"start: {name}={values[name]!r:.80} is fixed at {held[name]:g}, from which no "
                 f"search moves it; give the model with_values({name}=…), or free it"
             )
-    model.with_values(**values)
+    begun = model.with_values(**values)
+    for name in start.keys() - values.keys():
+        if not np.isclose(start[name], begun[name], rtol=_SAME):
+            raise InputError(
+                f"start: {name}={start[name]!r:.80} is tied to {model.ties[name]!r}, "
+                f"{begun[name]:g} there; start from the parameters that it is of"
+            )
     return values
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.data import Record
@@ -25,11 +26,12 @@ from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution
 from freqid.fitting.uncertainty.gradient_noise import leverage, projected
+from freqid.fitting.uncertainty.shared_noise import Chance
 from freqid.lti import Plane, Realisation
 from freqid.models import DiscreteModel, Model
 
-# directions of the unknowns below this part of the strongest are not told
-_LOOSE = 1e-14
+# directions of the unknowns below this part of the strongest, in JᵀJ and in J, are not told
+_LOOSE, _SAME = 1e-14, 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +125,7 @@ def loop_scores(
     ]
     found = _scores(dict(enumerate(fitted)), loops)
     share = LoopShare(loops, [f.response for f in fitted if f is not None])
-    return None if found is None else found[0], share
+    return None if found is None else found[0] @ found[0].T, share
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,9 +143,9 @@ class LoopShare:
         experiments: Sequence[SpectralExperiment],
         ways: Sequence[FloatArray],
         left: Sequence[FloatArray],
-    ) -> float | None:
-        """Σ variances along ``ways`` (q, rows of an experiment) where these are ``left`` (rows,);
-        None where it is not known.
+    ) -> FloatArray | None:
+        """What noise tells along ``ways`` (q, rows of an experiment) at each line (q, lines) where
+        these are ``left`` (rows,); None where it is not known.
         """
         fitted: dict[int, _Fitted | None] = {}
         if len(self.responses) != len(experiments):
@@ -156,7 +158,7 @@ class LoopShare:
                 return None
             fitted[i] = _Fitted(_Stage.along(e, V, r, lasted[i]), G)
         found = _scores(fitted, self.loops)
-        return None if found is None else float(np.trace(found[0]))
+        return None if found is None else found[0]
 
     def __call__(
         self,
@@ -165,62 +167,86 @@ class LoopShare:
         boxes: Sequence[Reference],
         groups: Sequence[Sequence[int]],
         readings: Sequence[Reading],
-    ) -> float | None:
-        """Σ variances along all directions that the boxes have beside the plant, as a multiple of
-        what noise of the output alone makes; None where that is not known.
+    ) -> Chance | None:
+        """What chance explains along all directions that the boxes have beside the plant, noise of
+        the output alone being its measure; None where that is not known.
         """
         at = structure.realise(grey.x)
-        plants = {
-            i: _Fitted.of(r.lines(), at, structure.at(grey.x, r.place), r)
-            for i, r in enumerate(readings)
-        }
-        own = _chance(plants, self.loops)
-        top = bottom = left = more = 0.0
+        told, left, bottom = [], 0.0, 0.0
         for box, group in zip(boxes, groups, strict=True):
-            chart, x = box.chart, box.solution.x
-            model = DiscreteModel(chart.in_z(x), chart.dt, readings[group[0]].hold, (), ())
-            place = chart.realise(x)
+            place, hold = box.chart.realise(box.solution.x), readings[group[0]].hold
+            model = DiscreteModel(box.chart.in_z(box.solution.x), box.chart.dt, hold, (), ())
+            plant = {
+                i: _Fitted.of(r.lines(), at, structure.at(grey.x, r.place), r)
+                for i, r in ((i, readings[i]) for i in group)
+            }
             parts = {
                 i: _Fitted.of(e, place, model, readings[i])
                 for i, e in zip(group, box.objective.experiments, strict=True)
             }
-            found = _chance(parts, self.loops)
-            if found is None or own is None:
-                return None
-            more, top = more + found[0], top + found[1]
+            told.append(_along_box(plant, parts, self.loops))
             left += box.cost
             bottom += box.objective.n_rows - box.solution.point.n_initial - box.unknowns
-        if own is None or top <= own[1] or bottom < 1:
+        known = [t for t in told if t is not None]
+        if len(known) < len(told) or bottom < 1:
             return None
-        return (more - own[0]) / (top - own[1]) / (left / bottom)
+        scores, own = zip(*known, strict=True)
+        # what the plant itself follows is none of what the boxes explain beside it
+        _, s, V = np.linalg.svd(np.concatenate(own, axis=1))
+        beside = V[int((s > _SAME * s.max(initial=0.0)).sum()) :]
+        if not len(beside):
+            return None
+        return Chance.of(beside @ scipy.linalg.block_diag(*scores) / np.sqrt(left / bottom))
 
 
-def _chance(
-    fitted: Mapping[int, _Fitted | None], loops: Sequence[Loop]
-) -> tuple[float, int] | None:
-    """Mean of what the unknowns explain by chance, and how many of them the data tell."""
-    found = _scores(fitted, loops)
-    if found is None:
+def _along_box(
+    plant: Mapping[int, _Fitted | None],
+    box: Mapping[int, _Fitted | None],
+    loops: Sequence[Loop],
+) -> tuple[FloatArray, FloatArray] | None:
+    """What noise tells in the directions of a black box at each line (q, lines), and derivatives of
+    the plant (P, q) there; None where that is not known, or they stand at other lines.
+    """
+    found = _scores(box, loops)
+    pairs = [
+        (a.stage.jacobian, b.stage.jacobian)
+        for a, b in zip(plant.values(), box.values(), strict=True)
+        if a is not None and b is not None
+        and a.stage.jacobian.shape[1:] == b.stage.jacobian.shape[1:]
+    ]  # fmt: skip
+    if found is None or len(pairs) < len(box):
         return None
-    total, H = found
+    scores, H = found
+    ways = _ways(H)
+    own: FloatArray = np.sum([_inner(a, b) for a, b in pairs], axis=0) @ ways
+    size = np.sum([np.diag(_inner(a, a)) for a, _ in pairs], axis=0)
+    return ways.T @ scores, own / np.sqrt(np.maximum(size, 1e-300))[:, None]
+
+
+def _ways(H: FloatArray) -> FloatArray:
+    """Combinations of unknowns (P, q) that the data tell, each by one, from JᵀJ (P, P)."""
     size = np.sqrt(np.maximum(np.diag(H), 1e-300))
     s, V = np.linalg.eigh(H / np.outer(size, size))
     told = s > _LOOSE * s.max()
-    ways = V[:, told] / np.sqrt(s[told])
-    scaled = total / np.outer(size, size)
-    return float(np.einsum("ai,ab,bi->", ways, scaled, ways)), int(told.sum())
+    ways: FloatArray = V[:, told] / np.sqrt(s[told]) / size[:, None]
+    return ways
+
+
+def _inner(a: ComplexArray, b: ComplexArray) -> FloatArray:
+    """Products (P, Q) of rows of Jacobians, (P, channels, K) and (Q, channels, K)."""
+    return np.einsum("ack,bck->ab", a, b.conj()).real
 
 
 def _scores(
     fitted: Mapping[int, _Fitted | None], loops: Sequence[Loop]
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Covariance of the score (P, P), and JᵀJ; None unless all records went through a loop."""
+    """Scores at each line (P, lines), and JᵀJ; None unless all records went through a loop."""
     loops = [one for one in loops if all(place in fitted for place in one.places)]
     if sorted(p for one in loops for p in one.places) != sorted(fitted):
         return None
-    total = square = None
+    every, square = [], []
     for loop in loops:
-        boxes, own, effect = [], [], 0.0
+        boxes, own, effects = [], [], []
         for i, place in enumerate(loop.places):
             part = fitted[place]
             if part is None:
@@ -232,17 +258,15 @@ def _scores(
             m = part.response.shape[1]
             moved = box.jacobian[:, :m, at] / box.scale[:m, at] * loop.size[:m, None]
             seen = np.einsum("pmk,amk->apk", part.response, moved) * stage.scale
-            effect = effect + np.einsum("ack,bck->ab", stage.jacobian, seen.conj()).real
+            effects.append(_inner(stage.jacobian, seen))
             boxes.append(box)
             own.append((stage, at))
-        H = sum(np.einsum("ack,bck->ab", b.jacobian, b.jacobian.conj()).real for b in boxes)
-        back = effect @ np.linalg.pinv(H, hermitian=True)
+        H = np.sum([_inner(b.jacobian, b.jacobian) for b in boxes], axis=0)
+        back = np.sum(effects, axis=0) @ np.linalg.pinv(H, hermitian=True)
         for box, (stage, at) in zip(boxes, own, strict=True):
             both = -back @ box.scores
             both[:, at] += stage.scores
-            gram = np.einsum("ack,bck->ab", stage.jacobian, stage.jacobian.conj()).real
-            total = both @ both.T + (0 if total is None else total)
-            square = gram + (0 if square is None else square)
-    if total is None or square is None or not np.isfinite(total).all():
-        return None
-    return total, square
+            every.append(both)
+            square.append(_inner(stage.jacobian, stage.jacobian))
+    scores = np.concatenate(every, axis=1) if every else np.array([np.nan])
+    return (scores, np.sum(square, axis=0)) if np.isfinite(scores).all() else None

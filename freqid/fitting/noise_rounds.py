@@ -4,51 +4,51 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import FrequencyResponse
+from freqid.data import FrequencyResponse, Record
+from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import INTERRUPTED
-from freqid.fitting.witness import Testimony
+from freqid.fitting.uncertainty.evenness import evenly_spread
+from freqid.fitting.witness import Testimony, groups_of
 from freqid.models import GreyBox
 
 # fits with the noise of the one before, and the part of a standard error that ends them
 _NOISE_ROUNDS = 4
 _STANDS = 0.01
+# the same of black boxes, and the lines that these are found on
+_BOX_ROUNDS, _LINES = 3, 3000
 
 
 def noise_weighted(
-    model: object, readings: Sequence[Reading], options: SearchOptions
+    model: object, readings: Sequence[Reading], options: SearchOptions, explained: bool
 ) -> tuple[Estimate, Sequence[Reading]]:
     """Fits in turn with the noise that the one before left; to the maximum of the likelihood.
 
-    The noise is learnt by the data alone: what a prior makes them leave is none.
+    The noise is learnt by the data alone: what a prior makes them leave is none. Beside inputs that
+    a reference ``explained`` a black box that leaves less is no sign of a minimum that was missed.
     """
     if any(r.in_time for r in readings):
         raise InputError("weights='noise' needs domain='frequency' and no initial state at rest")
     known = isinstance(model, GreyBox) and any(p.prior for p in model.parameters)
     alone = model.with_prior(**dict.fromkeys(model.values)) if known else model  # type: ignore[attr-defined]
-    work = partial(fitter_of(alone), alone)
-    first = est = work(readings, options)
-    for _ in range(_NOISE_ROUNDS):
-        if est.message == INTERRUPTED:
-            break
-        readings = [_learnt(est, r, options.estimated_hold) for r in readings]
-        before, near = est, again(est, options)
-        est = work(readings, near)
-        std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
-        if (np.abs(est.values - before.values) <= _STANDS * std).all():
-            break
+    told = None if options.refit else _left_by_boxes(alone, readings, options)
+    first, est, seen = _in_turn(alone, readings if told is None else told, options)
+    if told is not None and not explained and (lack := _lack(est)) > 0:
+        other = _in_turn(alone, readings, options)
+        if _lack(other[1]) < lack:
+            first, est, seen = other
     if known and est.message != INTERRUPTED:
-        est = fitter_of(model)(model, readings, again(est, options))
+        est = fitter_of(model)(model, seen, again(est, options))
     testimony = est.testimony
     if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
         testimony = testimony.after(first.testimony)
@@ -59,13 +59,79 @@ def noise_weighted(
         n_agreed=first.n_agreed,
         testimony=testimony,
     )
-    return found, readings
+    return found, seen
+
+
+def _in_turn(
+    model: object, readings: Sequence[Reading], options: SearchOptions
+) -> tuple[Estimate, Estimate, Sequence[Reading]]:
+    """The first estimate, the one that stands, and the readings by whose noise it was found."""
+    first = est = fitter_of(model)(model, readings, options)
+    for _ in range(_NOISE_ROUNDS):
+        if est.message == INTERRUPTED:
+            break
+        readings = [_learnt(est, r, options.estimated_hold) for r in readings]
+        before = est
+        est = fitter_of(model)(model, readings, again(est, options))
+        std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
+        if (np.abs(est.values - before.values) <= _STANDS * std).all():
+            break
+    return first, est, readings
+
+
+def _lack(est: Estimate) -> float:
+    """How much better than chance a black box explains the data where an estimate lacks something
+    (F), infinite where it is in no minimum; else 0.
+    """
+    if est.message == INTERRUPTED or not isinstance(est.testimony, Testimony):
+        return 0.0
+    if not est.converged:
+        return np.inf
+    heard = est.testimony()
+    return heard.f if heard.verdict == "lacking" else 0.0
+
+
+def _left_by_boxes(
+    model: object, readings: Sequence[Reading], options: SearchOptions
+) -> list[Reading] | None:
+    """Readings with the noise that black boxes of the plant's order leave, learnt by turns; None
+    where that is even, and where there are none.
+
+    A first fit that counts all lines alike may end anywhere where noise is large at some, and what
+    it lacks is then taken for noise, which makes its own place the best.
+    """
+    if not isinstance(model, GreyBox) or options.estimated_hold:
+        return None
+    structure, _ = structure_of(model, readings, options)
+    if structure.model.delay_sources or not all(isinstance(r.data, Record) for r in readings):
+        return None
+    seen = list(readings)
+    try:
+        for _ in range(_BOX_ROUNDS):
+            weighted, even = list(seen), True
+            for group in groups_of(structure, seen):
+                one = seen[group[0]]
+                plant = structure.at(structure.start, one.place)
+                box = Reference.of(plant, [seen[i].beside() for i in group], _LINES)
+                for i in group:
+                    left = errors_of(box.model(plant, one.hold), seen[i])
+                    even = even and evenly_spread(left.error)
+                    if seen[i].noise.to_be_learnt:
+                        noise = seen[i].noise.learnt(left.error, left.n_samples)
+                        weighted[i] = seen[i].with_(noise=noise)
+            if even:
+                break
+            seen = weighted
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    return None if all(r.noise.plain for r in seen) else seen
 
 
 def again(est: Estimate, options: SearchOptions) -> SearchOptions:
     """A fit that begins from an estimate; a black box begins by itself."""
     # values of all experiments, and those that each has for itself
-    near = {n: est[n] for n in getattr(est.model, "values", {})}
+    tied = getattr(est.model, "ties", {})
+    near = {n: est[n] for n in getattr(est.model, "values", {}) if n not in tied}
     near |= {n: est[n] for n in est.names if "[" in n} if near else {}
     structure = None if est.problem is None else est.problem.structure
     meant = structure.meant if isinstance(structure, GreyStructure) else None

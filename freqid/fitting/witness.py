@@ -34,7 +34,7 @@ from freqid.fitting.search.verdict import RARE, Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
-from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom, shared
+from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, noise_freedom, shared
 from freqid.lti import tuned
 from freqid.models import Model, observed_order
 
@@ -70,8 +70,8 @@ class Share(InputNoise, Protocol):
         boxes: Sequence[Reference],
         groups: Sequence[Sequence[int]],
         readings: Sequence[Reading],
-    ) -> float | None:
-        """A multiple; None where it is not known."""
+    ) -> Chance | None:
+        """What chance explains; None where it is not known."""
         ...
 
 
@@ -123,10 +123,10 @@ class Testimony:
         if placed and structure.black_boxes > MOST_UNKNOWNS:  # type: ignore[attr-defined]
             return Witness(
                 "absent",
-                f"black boxes of order {order} at {len(_groups(structure, readings))} places would "
-                "take minutes; hear it on a few of the experiments",
+                f"black boxes of order {order} at {len(groups_of(structure, readings))} places "
+                "would take minutes; hear it on a few of the experiments",
             )
-        boxes = [_beside(structure, readings, grey, g) for g in _groups(structure, readings)]
+        boxes = [_beside(structure, readings, grey, g) for g in groups_of(structure, readings)]
         cost = sum(b.cost for b in boxes)
         if cost <= 1e-18 * self.minimum.objective.energy:
             sentence = f"a black box of order {order} leaves nothing but the rounding of the data"
@@ -138,16 +138,17 @@ class Testimony:
             return Witness("absent", "the data are too few for a black box beside it", cost)
         if top < 1:
             return self._alike(order, cost, grey.cost / cost - 1)
-        wider = None
+        chance = None
         if self.share is not None and structure is self.minimum.structure:
-            wider = self.share(structure, grey, boxes, _groups(structure, readings), readings)
-        if wider is None:
-            wider = shared([(b.objective, b.solution.x) for b in boxes])
-        wider = max(wider, 1.0)
-        f = excess(structure, readings, boxes, grey) * bottom / top / wider
-        told = int(min(bottom / wider, noise_freedom([r.data for r in readings])))
-        p = float(scipy.stats.f.sf(f, top, max(told, 1)))
-        numbers = f"F = {f:.3g} on {top} and {bottom} degrees of freedom, p = {p:.2g}"
+            chance = self.share(structure, grey, boxes, groups_of(structure, readings), readings)
+        if chance is None:
+            chance = Chance(shared([(b.objective, b.solution.x) for b in boxes]), top)
+        f = excess(structure, readings, boxes, grey) * bottom / top / chance.times
+        told = min(bottom / chance.times, noise_freedom([r.data for r in readings]), chance.lines)
+        told = max(int(told), 1)
+        p = float(scipy.stats.f.sf(f, chance.degrees, told))
+        own = f"{chance.degrees:.3g} and {told}"
+        numbers = f"F = {f:.3g} on {own} degrees of freedom, p = {p:.2g}"
         gap = grey.cost / cost - 1
         verdict, sentence = self._verdict(order, numbers, p, gap)
         return Witness(verdict, sentence, cost, float(f), p, (top, bottom))
@@ -202,7 +203,7 @@ class Testimony:
         return polish(Objective(structure, [r.experiment() for r in readings]), begin)
 
 
-def _groups(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:
+def groups_of(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:
     """Numbers of the experiments that meet the same plant."""
     if isinstance(structure, PlacedStructure):
         return structure.groups
@@ -265,7 +266,7 @@ def excess(
 
     There is one of these for each group of experiments that meet the same plant.
     """
-    groups = _groups(structure, readings)
+    groups = groups_of(structure, readings)
     models = [
         box.model(structure.model, readings[group[0]].hold)
         for box, group in zip(boxes, groups, strict=True)

@@ -85,3 +85,23 @@ def test_a_tie_that_leaves_its_bounds_is_named():
     assert "[10, 12]" in said[0]
     wide = fq.fit(fq.two_mass().with_bounds(Ja=(1, 40)).tie(Ja="2e4 * Jm"), record)
     assert not [w for w in wide.warnings if w.kind == "edge of a bound"]
+
+
+@pytest.mark.parametrize("option", [{"weights": "noise"}, {"loss": "huber"}])
+def test_fits_in_turn_take_ties(option):
+    """The values that a fit begins the next from held the tied ones, which was refused."""
+    lag = fq.first_order().tie(b="2 * a")
+    true = lag.with_values(a=100.0)
+    record = fq.simulate(true, fq.chirp(2, 40, 2, 1e-3), 1e-3).with_noise(0.05, seed=3)
+    est = fq.fit(lag.with_values(a=80.0), record, **option)
+    assert est["a"] == pytest.approx(100, abs=5 * est.parameters["std"]["a"])
+    assert est["b"] == pytest.approx(2 * est["a"], rel=1e-12)
+
+
+def test_an_estimate_of_tied_values_is_a_start(record):
+    model = fq.two_mass().tie(Ja="1e4 * Jm")
+    est = fq.fit(model, record)
+    again = fq.fit(model, record, start=est.parameters["value"].to_dict())
+    np.testing.assert_allclose(again.values, est.values, rtol=1e-5)
+    with pytest.raises(ValueError, match=r"start: Ja=1.0 is tied to '1e4 \* Jm'"):
+        fq.fit(model, record, start={"Ja": 1.0})

@@ -103,9 +103,10 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     with np.errstate(all="ignore"):
         shift = np.abs(np.array(steps)) / np.sqrt(variance)
     largest = float(np.nanmax(np.where(np.isfinite(shift), shift, np.nan), initial=0.0))
-    wider = scene.together(scene.left) * scene.tied(scene.left, ways)
-    f = chi / degrees / wider
-    p = float(scipy.stats.f.sf(f, degrees, min(freedom, scene.noise_freedom)))
+    chance = scene.tied(scene.left, ways)
+    f = chi / degrees / (scene.together(scene.left) * chance.times)
+    below = min(freedom, scene.noise_freedom, chance.lines)
+    p = float(scipy.stats.f.sf(f, min(chance.degrees, degrees), below))
     x = scene.x[free]
     # that which moves most of its own error bars
     told = int(np.argmax(np.where(np.isfinite(shift), shift, -1).max(axis=0)))

@@ -29,7 +29,7 @@ from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.suspects.weighing import LOOSE
 from freqid.fitting.uncertainty.gradient_noise import projected
-from freqid.fitting.uncertainty.shared_noise import shared
+from freqid.fitting.uncertainty.shared_noise import Chance, shared
 from freqid.fitting.witness import weighted_by
 from freqid.lti import directions
 from freqid.models import DiscreteModel, GreyBox, observed_order
@@ -130,14 +130,16 @@ class _Comparison:
             # where the black box tells the noise its shape is as uncertain as the mode's place
             more_again = self._least(again) / box.on(again).cost - 1
             told = [(costs[0] / box.cost - 1, places), (more_again, places**2)]
-        wider = shared([(box.objective, box.solution.x)])
+        chance = None
         if inquiry.share is not None and isinstance(structure, GreyStructure):
-            wider = max(inquiry.share(structure, grey, [box], [group], readings) or wider, 1.0)
-        below = int(min(freedom / wider, scene.noise_freedom))
+            chance = inquiry.share(structure, grey, [box], [group], weighted)
+        if chance is None:
+            chance = Chance(shared([(box.objective, box.solution.x)]), degrees)
+        below = int(min(freedom / chance.times, scene.noise_freedom, chance.lines))
         told_by = [
-            (min(float(scipy.stats.f.sf(f, degrees, below)) * trials, 1.0), f, more)
+            (min(float(scipy.stats.f.sf(f, chance.degrees, below)) * trials, 1.0), f, more)
             for more, trials in told
-            if (f := more * freedom / degrees / wider) > 0
+            if (f := more * freedom / degrees / chance.times) > 0
         ]
         if not told_by:
             return None

@@ -30,7 +30,7 @@ from freqid.fitting.uncertainty.evenness import (
 from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import shaped_power
-from freqid.fitting.uncertainty.shared_noise import InputNoise, noise_freedom
+from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, noise_freedom
 from freqid.lti import Plane, directions
 
 
@@ -186,24 +186,26 @@ class Scene:
         parts = zip(self.parted(rows), (s.experiment for s in self.seen), strict=True)
         return together(list(parts))
 
-    def tied(self, rows: FloatArray, ways: Sequence[FloatArray]) -> float:
-        """How much entries of responses that share their lines' noise, or errors of the inputs,
-        widen what ``ways`` (q, rows of an experiment) tell where rows (R,) are left; at least 1.
+    def tied(self, rows: FloatArray, ways: Sequence[FloatArray]) -> Chance:
+        """What chance tells along ``ways`` (q, rows of an experiment) where rows (R,) are left and
+        entries of responses share their lines' noise, or inputs have errors.
         """
-        experiments = [s.experiment for s in self.seen]
+        experiments, q = [s.experiment for s in self.seen], len(ways[0])
         if self.share is None and not any(may_be_tied(e) for e in experiments):
-            return 1.0
+            return Chance(1.0, q)
         known, left = self.parted(self.variance_of(rows)), self.parted(rows)
-        alone = [float(np.sum(V**2 * v)) for V, v in zip(ways, known, strict=True)]
-        if self.share is None:
-            share = len(rows) / max(self.freedom, 1)
-            shared = sum(
-                tied(r, V, e) * share if may_be_tied(e) else plain
-                for r, V, e, plain in zip(left, ways, experiments, alone, strict=True)
-            )
-        else:
-            shared = self.share.along(experiments, ways, left) or 0.0
-        return max(shared / max(sum(alone), 1e-300), 1.0)
+        alone = sum(np.sum(V**2 * v, axis=1) for V, v in zip(ways, known, strict=True))
+        if self.share is not None:
+            found = self.share.along(experiments, ways, left)
+            size = np.sqrt(np.maximum(alone, 1e-300))[:, None]
+            return Chance(1.0, q) if found is None else Chance.of(found / size)
+        share, every = len(rows) / max(self.freedom, 1), float(np.sum(alone))
+        plain = [float(np.sum(V**2 * v)) for V, v in zip(ways, known, strict=True)]
+        shared = sum(
+            tied(r, V, e) * share if may_be_tied(e) else one
+            for r, V, e, one in zip(left, ways, experiments, plain, strict=True)
+        )
+        return Chance(max(shared / max(every, 1e-300), 1.0), q)
 
     def variance_of(self, rows: FloatArray) -> FloatArray:
         """Variance of each row's noise (R,) where these are what it leaves."""

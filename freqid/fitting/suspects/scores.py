@@ -122,14 +122,16 @@ def score(
         if seen is None or scipy.special.fdtrc(q, freedom, seen / q) < _GLANCE:
             seen = _weighed(scene, columns, scene.variance_of(rest), freedom)
         chi = seen
-    wider = scene.together(rest) * scene.tied(rest, scene.parted(Vt))
-    chi, freedom = chi / wider, max(int(min(freedom / wider, scene.noise_freedom)), 1)
+    chance = scene.tied(rest, scene.parted(Vt))
+    wider = scene.together(rest) * chance.times
+    told = min(freedom / wider, scene.noise_freedom, chance.lines)
+    chi, freedom = chi / wider, max(int(told), 1)
     delta = -(U / s) @ along
     moved = np.abs(scene.moved(delta @ (raw / size[:, None])))
     shift = moved / np.where(std > 0, std, np.inf)
     largest = float(np.nanmax(shift[np.isfinite(shift)], initial=0.0))
     sizes = delta / size
-    p = float(scipy.special.fdtrc(q, freedom, chi / q))
+    p = float(scipy.special.fdtrc(chance.degrees, freedom, chi / q))
     biggest = float(sizes[np.argmax(np.abs(delta))])
     change = scene.relative(moved)
     return Score(chi / q, q, p, biggest, power, largest, gain, change)

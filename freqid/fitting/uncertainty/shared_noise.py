@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +23,31 @@ _LOOSE = 1e-7
 _TAKEN = 0.2
 
 
+@dataclass(frozen=True)
+class Chance:
+    """What chance explains: so many ``times`` what it would if each real value had noise of its
+    own, and as on so many ``degrees`` of freedom, the noise being told by ``lines`` values.
+
+    Variances that differ from direction to direction scatter as fewer of them do that are alike
+    (Satterthwaite, Biometrics Bulletin 2, 1946), and so do those that few lines tell.
+    """
+
+    times: float
+    degrees: float
+    lines: float = np.inf
+
+    @classmethod
+    def of(cls, scores: FloatArray) -> Chance:
+        """Of what each line tells along directions (q, lines), in units of its own noise."""
+        variances = np.linalg.svd(scores, compute_uv=False) ** 2
+        total, each = float(variances.sum()), (scores**2).sum(axis=0)
+        if total == 0:
+            return cls(1.0, float(len(scores)))
+        # of Gaussian values the fourth powers are three times the squares of the variances
+        told = 3 * total**2 / float(each @ each)
+        return cls(max(total / len(scores), 1.0), total**2 / float(variances @ variances), told)
+
+
 class InputNoise(Protocol):
     """What errors of inputs that a reference explained add to those of the outputs."""
 
@@ -30,9 +56,9 @@ class InputNoise(Protocol):
         experiments: Sequence[SpectralExperiment],
         ways: Sequence[FloatArray],
         left: Sequence[FloatArray],
-    ) -> float | None:
-        """Σ variances along ``ways`` (q, rows of an experiment) where these are ``left`` (rows,);
-        None where it is not known.
+    ) -> FloatArray | None:
+        """What noise tells along ``ways`` (q, rows of an experiment) at each line (q, lines) where
+        these are ``left`` (rows,); None where it is not known.
         """
         ...
 
