@@ -19,7 +19,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fed_back import FED_BACK, could_go, fed_back, pulled_by_noise
 from freqid.fitting.fit_options import check_words
 from freqid.fitting.fitters import Near, SearchOptions, fitter_of
-from freqid.fitting.noise_models import NoiseModel, Weights, as_noise_model
+from freqid.fitting.noise_models import Weights, as_noise_model, in_one_unit, noise_models_of
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.printed import call_of
@@ -157,13 +157,15 @@ def fit(
         "band": band, "weights": weights, "initial_state": initial_state, "offset": offset,
         "loss": loss, "error": error, "reference": reference,
     })  # fmt: skip
-    models = _noise_models(weights, data, sets)
+    models = noise_models_of(weights, sets, isinstance(data, DataSet))
     own = (separate,) if isinstance(separate, str) else tuple(listed("separate", separate))
     # samples in time have no weights
     timed = domain == "time" or initial_state == "zero"
     plain = weights is None and not timed
     way = through_references(sets, models, model, reference, plain, bool(own))
     notes = way.notes
+    if plain and error == "linear":
+        notes += in_one_unit(way.noise, sets)
     readings: Sequence[Reading] = [
         Reading.of(
             d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late, i
@@ -288,12 +290,3 @@ def _shown(progress: bool) -> Iterator[None]:
     with Progress(*columns, transient=True) as bar:
         bar.add_task("fitting", total=None)
         yield
-
-
-def _noise_models(weights: object, data: object, sets: Sequence[DataSet]) -> list[NoiseModel]:
-    """One for each data set; ValueError for a list of another length."""
-    each = isinstance(weights, (list, tuple)) and not isinstance(data, DataSet)
-    given: list[object] = [*weights] if each else [weights] * len(sets)  # type: ignore[misc]
-    if len(given) != len(sets):
-        raise InputError(f"weights has {len(given)} entries for {len(sets)} experiments")
-    return [as_noise_model(w, d) for w, d in zip(given, sets, strict=True)]

@@ -6,6 +6,7 @@ A noise model that has a ``name`` is known by it wherever an argument ``weights`
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, numbers
-from freqid.data import DataSet, FrequencyResponse, Record
+from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record, StampedRecord
 from freqid.fitting.uncertainty.noise_spectrum import noise_weights
 
 
@@ -167,3 +168,37 @@ def as_noise_model(weights: object, data: DataSet) -> NoiseModel:
         choice("weights", weights, tuple(NoiseModel.named))
         return NoiseModel.named[weights].of(data)
     return GivenWeights(numbers("weights", weights))  # type: ignore[arg-type]
+
+
+def noise_models_of(weights: object, sets: Sequence[DataSet], single: bool) -> list[NoiseModel]:
+    """One for each data set; InputError for a list of another length. Of a ``single`` set a list is
+    an array.
+    """
+    each = isinstance(weights, (list, tuple)) and not single
+    given: list[object] = [*weights] if each else [weights] * len(sets)  # type: ignore[misc]
+    if len(given) != len(sets):
+        raise InputError(f"weights has {len(given)} entries for {len(sets)} experiments")
+    return [as_noise_model(w, d) for w, d in zip(given, sets, strict=True)]
+
+
+def in_one_unit(models: list[NoiseModel], sets: Sequence[DataSet]) -> list[str]:
+    """Weigh plain ones by their noise where others are means over periods, whose cost has no unit;
+    what is said of it. InputError where that noise is not known.
+    """
+    if len({isinstance(d, PeriodicResponse) for d in sets}) == 1:
+        return []
+    for i, (noise, data) in enumerate(zip(models, sets, strict=True)):
+        if not noise.plain or noise.to_be_learnt or isinstance(data, PeriodicResponse):
+            continue
+        if not isinstance(data, Record) and data.variance is None:
+            raise InputError(
+                f"data[{i}] is a response without variance beside means over periods, which count "
+                "by their noise; give it its variance, or weights="
+            )
+        if isinstance(data, StampedRecord):
+            raise InputError(
+                f"data[{i}] has samples at times of their own, which no weights count beside means "
+                "over periods; use its regular()"
+            )
+        models[i] = MeasuredNoise.of(data)
+    return ["means over periods count by their noise, and so does what was fitted with them"]
