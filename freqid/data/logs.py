@@ -247,7 +247,9 @@ def _resampled(
 ) -> Record:
     """Both on a grid of the output's own period: a held input is repeated, never drawn through."""
     u_at, y_at = u_clock.times, y_clock.times
-    start = max(u_at[0], y_at[0])
+    # from the first output that an input came before: between it and one before may lie a gap
+    after = y_at[y_at >= u_at[0]]
+    start = after[0] if len(after) else u_at[0]
     end = min(u_at[-1] + u_clock.period, y_at[-1])
     every = max(round(y_clock.period / u_clock.period), 1)
     step = y_clock.period / every
