@@ -19,7 +19,7 @@ from freqid.fitting.met import data_digest, met, offset_is_free, remembered
 from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order
 from freqid.fitting.reading import Reading
-from freqid.fitting.residuals import errors_at_stamps, line_errors
+from freqid.fitting.residuals import errors_at_stamps, errors_in_time, line_errors
 from freqid.fitting.search.batched import Answers, descend
 from freqid.fitting.search.descent import settled, uninterrupted
 from freqid.fitting.signs import Evidence, findings

@@ -11,7 +11,7 @@ from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, StampedRecord, channel_counts
 from freqid.fitting.reading import Reading, read_for
 from freqid.frf import lines_of
-from freqid.lti import Hold, Plane, eliminate
+from freqid.lti import Hold, PeriodicHold, Plane, eliminate
 from freqid.models import Model
 
 
@@ -71,7 +71,27 @@ def errors_at_stamps(model: Model, record: StampedRecord, hold: Hold | str | Non
             "samples at times of their own need a model in continuous time without delays; take "
             "record.regular(), which is resampled"
         )
-    reading = Reading.of(record, hold)
+    return _at_samples(model, Reading.of(record, hold))
+
+
+def errors_in_time(
+    model: Model, record: Record, hold: Hold | str | None, initial_state: str, offset: bool
+) -> FloatArray:
+    """Errors ŷ − y (N, outputs) of a simulation, the initial state fitted.
+
+    Those of lines in time, but where the model integrates: without the line at zero a constant
+    force would be free.
+    """
+    reading = Reading.of(record, hold, domain="time")
+    held = reading.hold
+    every = isinstance(held, PeriodicHold) and np.isclose(held.period, record.input_dt, rtol=1e-9)
+    if every and initial_state == "estimate" and model.integrates and not (model.dt or model.late):
+        return _at_samples(model, reading)
+    return line_errors(model, record, hold, None, initial_state, offset).in_time()
+
+
+def _at_samples(model: Model, reading: Reading) -> FloatArray:
+    """Errors ŷ − y (N, outputs) in time, the initial state fitted."""
     (experiment,) = read_for((model.n_outputs, model.n_inputs), [reading])
     evaluation = experiment.at(model.still())
     rows = evaluation.residual

@@ -23,8 +23,8 @@ from freqid.data import (
 from freqid.fitting import (
     Estimate,
     errors_at_stamps,
+    errors_in_time,
     in_order_of,
-    line_errors,
     met,
     offset_is_free,
     remembered,
@@ -126,7 +126,9 @@ def compare(
             record remembers. A discrete black box simulates at the hold that it was fitted with.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
             input to be periodic. Offsets of the outputs are fitted with it where the Estimate was
-            (``offset="estimate"``).
+            (``offset="estimate"``). A plant that integrates is simulated with the constant part of
+            the input, which a fit leaves out with the line at zero: its ``fit_percent`` may be
+            higher than what is told here where a force or an offset of the input was not recorded.
         band: in Hz; only what lies inside it is compared, of both. None compares everything.
 
     Raises ValueError for channels that do not match, a band that the record does not have, or an
@@ -154,7 +156,7 @@ def compare(
     choice("initial_state", initial_state, ("estimate", "steady"))
     given, hold = fitted, own_hold(model, hold, record)
     free = offset_is_free(model)
-    residual = -line_errors(given, record, hold, None, initial_state, free).in_time()
+    residual = -errors_in_time(given, record, hold, initial_state, free)
     y = record.outputs[: len(residual)]
     if limits is not None:
         y, residual = part_inside(y, record.dt, limits), part_inside(residual, record.dt, limits)
