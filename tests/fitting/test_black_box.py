@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
-from freqid.fitting.black_box.output_error import within_circle
+from freqid.fitting.black_box.order_minimum import within_circle
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading

@@ -40,7 +40,7 @@ def test_error_bars_hold():
 
 
 def test_a_response_without_variance_has_no_weight_beside_means():
-    periodic, record = both(1)
+    periodic, _ = both(1)
     f = np.linspace(0.1, 6, 40)
     G = LAG.frequency_response(2 * np.pi * f, fq.ZeroOrderHold(DT)).response
     response = fq.FrequencyResponse(f, G, dt=DT, hold="zoh")

@@ -325,7 +325,7 @@ def test_a_program_that_stamps_late_loses_no_samples():
 
 
 def test_a_comparison_draws_what_it_tells_where_an_output_came_before_the_input_and_a_gap():
-    """The grid began at the input, the samples after the gap: the curve was shifted by all of it."""
+    """The grid began at the input, the samples after the gap: the curve was shifted by it."""
     u_time, u, y_time, y = logged(late=0.2, noise=0.3)
     y_time, y = np.concatenate([[-1e-3], y_time]), np.concatenate([[0.0], y])
     record = fq.Record.from_logs(u_time, u, y_time, y)

@@ -9,53 +9,30 @@ import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
-from freqid.fitting.black_box.channel_units import Descent, begun_alike
-from freqid.fitting.black_box.refinement import (
-    LINES,
-    first_model,
-    identified_models,
-    nested_model,
-    scattered_model,
-)
+from freqid.fitting.black_box.order_minimum import HIGH, Orders, descended
+from freqid.fitting.black_box.refinement import LINES, first_model, nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.black_box.stability_edge import at_the_edge, held_back, pressed
-from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
-from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading, read_for
-from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.search.descent import polish
 from freqid.fitting.sight import out_of_sight
 from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.sufficiency import enough_rows, moving, told_apart
 from freqid.fitting.uncertainty.error_bars import pole_scatter
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.lti import Hold, Plane, StateSpace
+from freqid.lti import Hold, Plane
 from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 
-# an order too many leaves a flat valley of cancelling poles and zeros: a relative gain in cost this
-# small moves no coefficient by a visible part of its standard error
-_TOLERANCE = 1e-9
-# orders beyond this are none that a few exact lines were meant for
-_HIGH = 12
-# where one more real pole is tried
-_PLACES = (0.9, 0.3, -0.5)
+# evaluations of a start on lines that are kept
 _STEPS = 80
-# unknowns of a chart, which are of order one, that have moved so far want a chart of their own
-_FAR = 0.3
 # a motion that grows e-fold this often within the data is no integrator's, whose pole noise moved
 _STILL = 3.0
-# a chart is left for one around its own optimum this often at most
-_CHARTS = 5
-# how far inside of the unit circle a pole of a stable start lies at the least
-_EDGE = 1e-9
-# and one of what is found, which rounding may have put on it
-_END = 1e-12
-# a minimum at the circle that costs so many times more is another one
-_LIKE = 1.001
 
 
 @fits(OutputError, black_box=True)
@@ -77,16 +54,13 @@ def fit_output_error(
     asked, seed = (options.n_starts, options.seed) if options else (None, 0)
     more = None if asked is None else asked - 1
     told_apart(lines)
-    begin = more, seed, count
-    chart, solution, objective = begun_alike(
-        lines, lambda own: _nested(spec, own, plane, dt, begin), _descend
-    )
+    chart, solution, objective = Orders(lines, plane, dt, more, seed, count).least(spec)
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
         at = chart.in_z(solution.x)
         centre = Chart(at, spec.feedthrough, Plane(), dt, stable=spec.stable)
-        chart, solution, objective = _descend(centre, samples)
+        chart, solution, objective = descended(centre, samples)
     edge = None
     if spec.stable and (not solution.converged or pressed(chart, solution.x)):
         edge = at_the_edge(chart, solution.x, objective.experiments)
@@ -107,76 +81,13 @@ def fit_output_error(
     return dataclasses.replace(est, n_starts=asked or 1)
 
 
-def _nested(
-    spec: OutputError,
-    lines: Sequence[SpectralExperiment],
-    plane: Plane,
-    dt: float,
-    begin: tuple[int | None, int, int],
-) -> Descent:
-    """The minimum of an order, not above that of the order below with one pole more.
-
-    ``begin`` are the starts beyond the first where they were counted, their seed, and on about how
-    many lines they begin.
-    """
-
-    def begun(start: StateSpace) -> Descent:
-        start = within_circle(start) if spec.stable else start
-        return _descend(Chart(start, spec.feedthrough, plane, dt, stable=spec.stable), lines)
-
-    options = spec.feedthrough, spec.stable
-    more, seed, count = begin
-    own = begun(nested_model(lines, spec.order, *options, more, seed, count))
-    if not spec.stable and _unstable(own):
-        # motions that grow explain noise, and lead away from what stable ones explain better
-        tame = nested_model(lines, spec.order, spec.feedthrough, True, more, seed, count)
-        own = min([own, begun(tame)], key=lambda t: t[1].cost)
-    chained = all(e.single and e.one_to_one for e in lines)
-    if not chained:
-        # which of them leads farther the costs of starts do not tell
-        second = identified_models(lines, spec.order, *options)[1:]
-        own = min([own, *map(begun, second)], key=lambda t: t[1].cost)
-    if not chained and more:
-        rng = np.random.default_rng(seed)
-        others = [
-            begun(scattered_model(lines, spec.order, spec.feedthrough, rng)) for _ in range(more)
-        ]
-        own = min([own, *others], key=lambda t: t[1].cost)
-    if chained or not 1 < spec.order <= _HIGH:
-        return own
-    below, less, _ = begun(nested_model(lines, spec.order - 1, *options, count=count))
-    if own[1].cost <= less.cost:
-        return own
-    A, _, C, _ = below.matrices(less.x)
-    tried = [own]
-    for place in _PLACES:
-        wider = np.block(
-            [[A, np.zeros((len(A), 1))], [np.zeros((1, len(A))), np.full((1, 1), place)]]
-        )
-        seen = np.column_stack([C, np.linalg.norm(C, axis=1)])
-        tried.append(begun(inputs_of(lines, wider, seen, spec.feedthrough)))
-    return min(tried, key=lambda t: t[1].cost)
-
-
-def _unstable(found: Descent) -> bool:
-    """Whether a pole lies outside of the unit circle."""
-    chart, solution, _ = found
-    return bool((np.abs(np.linalg.eigvals(chart.in_z(solution.x).A)) > 1).any())
-
-
-def within_circle(start: StateSpace, inside: float = _EDGE) -> StateSpace:
-    """The same where rounding has put a pole that may not leave the unit circle on it."""
-    radius = float(np.abs(np.linalg.eigvals(start.A)).max(initial=0.0))
-    return start if radius <= 1 - inside else start._replace(A=start.A * ((1 - inside) / radius))
-
-
 def _enough_lines(
     spec: OutputError, lines: Sequence[SpectralExperiment], n_parameters: int
 ) -> None:
     """ValueError for a high order that has half as many unknowns as there are data."""
     unknowns = n_parameters + spec.order * sum(e.transient is not None for e in lines)
     rows = sum(e.n_rows for e in lines)
-    if spec.order > _HIGH and 2 * unknowns > rows:
+    if spec.order > HIGH and 2 * unknowns > rows:
         highest = spec.order * rows // (2 * unknowns)
         raise InputError(
             f"order={spec.order} has {unknowns} unknowns, initial states counted, for {rows} real "
@@ -210,24 +121,6 @@ def held_out_cost(est: Estimate, reading: Reading, kept: BoolArray) -> float:
         delta = np.linalg.lstsq(T[:, fitted].T, -left[fitted])[0]
         left = left + delta @ T
     return float(left[~fitted] @ left[~fitted])
-
-
-def _descend(chart: Chart, experiments: Sequence[Experiment]) -> tuple[Chart, Solution, Objective]:
-    """Least squares, moving the chart to its own optimum until that gains nothing more."""
-    objective = Objective(chart, experiments)
-    near = polish(objective, np.zeros(chart.size), limit=_STEPS, tolerance=_TOLERANCE)
-    if near.converged and np.abs(near.x).max() < _FAR:
-        return chart, near, objective
-    chart = chart.moved(near.x)
-    while True:
-        objective = objective.of(chart, None)
-        solution = minimise(objective, np.zeros(chart.size), _TOLERANCE, limit=_STEPS)
-        start = objective.point(np.zeros(chart.size))
-        gained = np.inf if start is None else start.cost - solution.cost
-        # noise-free data leave a cost of rounding, which has no minimum to follow
-        if chart.moves >= _CHARTS or gained <= 1e-8 * solution.cost + objective.rounding:
-            return chart, solution, objective
-        chart = chart.moved(solution.x)
 
 
 def coefficient_estimate(
