@@ -5,6 +5,7 @@ It may import what stands below it: checks and lti.
 
 from freqid.data.averaged_response import AveragedResponse
 from freqid.data.band import Band, as_band, chosen
+from freqid.data.channel_order import displaced, with_channels
 from freqid.data.conditions import as_conditions
 from freqid.data.data_set import (
     DataSet,

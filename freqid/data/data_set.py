@@ -8,6 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from freqid.checks import InputError, listed
+from freqid.data.channel_order import in_one_order
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.record import Record
 from freqid.data.streams import Stream
@@ -40,7 +41,7 @@ def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
             raise InputError(
                 f"data holds a {type(each).__name__}; expected Record or FrequencyResponse"
             )
-    return sets
+    return tuple(in_one_order("data", sets))
 
 
 def channel_counts(data: DataSet) -> tuple[int, int]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, listed, numbers
+from freqid.data.channel_order import in_one_order
 from freqid.data.record import Record
 from freqid.data.stamped_record import StampedRecord
 
@@ -54,7 +55,7 @@ def as_records(records: Record | Sequence[Record], varying: bool = True) -> list
         ):
             if varying and len(sets) == 1 and np.ptp(x) == 0:
                 raise InputError(f"channel {name!r} is constant; leave it out or check the sensor")
-    return sets
+    return in_one_order("records", sets)
 
 
 def references_of(sets: Sequence[Record], reference: Reference | None) -> list[FloatArray] | None:
