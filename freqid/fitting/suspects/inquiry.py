@@ -33,7 +33,7 @@ from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, of_several, score
 from freqid.fitting.suspects.sentences import sentence, words
-from freqid.fitting.suspects.silence import silent, unheard
+from freqid.fitting.suspects.silence import constant, silent, unheard
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.ticks import late_stamps
 from freqid.fitting.suspects.turned import turned
@@ -203,7 +203,7 @@ class Inquiry:
             nothing = unheard(self.minimum, self.model, self.readings)
             return nothing or turned(self, None) or late_stamps(self.minimum, self.readings)
         if found := silent(scene):
-            return turned(self, scene, quiet=True) or found
+            return turned(self, scene, quiet=True) or constant(scene, self.model) or found
         asked = scene, self.model, self._std
         found = leaking(*asked) or still_moving(*asked, self.readings)
         if found := found or begun_in_motion(self.minimum, scene, self.readings):
