@@ -47,8 +47,8 @@ def constant(scene: Scene, model: Model) -> list[Finding]:
             name = s.record.output_names[int(np.argmax(shares))]
             text = (
                 f"{100 * shares.max():.3g} % of the power of {name} is a constant, beside which "
-                "the input explains no more than chance: fit with offset='estimate', or the record's "
-                "detrend()"
+                "the input explains no more than chance: fit with offset='estimate', or the "
+                "record's detrend()"
             )
             return [Finding("offset", text, number=float(shares.max()))]
     return []
