@@ -23,7 +23,7 @@ from freqid.fitting.witness import Testimony, groups_of
 from freqid.models import GreyBox
 
 # fits with the noise of the one before, and the part of a standard error that ends them
-_NOISE_ROUNDS = 4
+_NOISE_ROUNDS = 8
 _STANDS = 0.01
 # the same of black boxes, and the lines that these are found on
 _BOX_ROUNDS, _LINES = 3, 3000

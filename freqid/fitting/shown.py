@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ class Shown:
 
     model: Any
     hold: Hold
+    data: Sequence[DataSet]
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -35,7 +37,7 @@ class Shown:
 
         A row for each experiment, columns ``fm``, ``fm_std``, …; NaN where one is known.
         """
-        return separate_values(self.parameters)
+        return separate_values(self.parameters, len(self.data))
 
     def to_control(self, pade: int | None = None) -> control.StateSpace:
         """The estimated model as a ``control.StateSpace``."""

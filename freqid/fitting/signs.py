@@ -107,6 +107,8 @@ def not_physical(e: Evidence) -> Iterator[Finding]:
             continue
         beyond = low - value if value < low else value - high
         why, severity = "check the hold that was assumed and the band", "serious"
+        if p.physical == (0, np.inf):
+            why += f"; if it may be negative, {p.name} is Parameter(…, physical=(-inf, inf))"
         if beyond < _CERTAIN * error:
             why = "by less than two standard errors, so that the data allow a physical value"
             severity = "minor"

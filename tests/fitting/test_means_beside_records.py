@@ -46,3 +46,20 @@ def test_a_response_without_variance_has_no_weight_beside_means():
     response = fq.FrequencyResponse(f, G, dt=DT, hold="zoh")
     with pytest.raises(ValueError, match=r"data\[1\] is a response without variance beside means"):
         fq.fit(LAG, [periodic, response])
+
+
+@pytest.mark.parametrize("weights", [None, "noise"])
+def test_a_response_beside_a_record_has_no_level_and_no_unit(weights):
+    """The fits in turn ended after four, each elsewhere, and a response counted as measured at 1:
+    "the parameters change with the level of the input" of a record in other units.
+    """
+    _, record = both(1)
+    other = fq.simulate(LAG, fq.white_noise(600, seed=3), 0.07).with_noise(0.02, seed=4)
+    fits = []
+    for size in (1.0, 1000.0):
+        one, two = (fq.Record(size * r.u, size * r.y, r.dt) for r in (record, other))
+        fits.append(fq.fit(LAG, [fq.h1(two, segment=200), one], weights=weights))
+    np.testing.assert_allclose(fits[1].values, fits[0].values, rtol=1e-6)
+    kinds = [[w.kind for w in est.warnings] for est in fits]
+    assert kinds[0] == kinds[1]
+    assert "amplitude" not in kinds[1]

@@ -106,3 +106,14 @@ def test_closed_loops_at_two_loads_are_two_loops():
     for name, value in (("m", 1), ("d", 2), ("k", 400)):
         assert est[name] == pytest.approx(value, abs=4.5 * est.parameters["std"][name])
     assert sum("reference" in note for note in est.notes) >= 2
+
+
+def test_an_experiment_that_knows_a_value_keeps_its_row():
+    model = fq.first_order()
+    u = fq.chirp(2, 40, 2, 1e-3)
+    records = [fq.simulate(model.with_values(a=a), u, 1e-3) for a in (90.0, 120.0, 140.0)]
+    records[1] = records[1].with_conditions(a=120.0)
+    own = fq.fit(model, records, separate=["a"]).separate
+    assert list(own.index) == [0, 1, 2]
+    assert own["a"].isna().tolist() == [False, True, False]
+    assert own["a"][2] == pytest.approx(140, rel=1e-5)

@@ -113,7 +113,10 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     size = float(np.max(np.abs(np.array(steps)[:, told]) / max(abs(x[told]), 1e-300)))
     change = float(np.max(np.abs(steps[most]) / np.maximum(np.abs(x), 1e-300)))
     test = Score(f, degrees, p, size, 1.0, largest, gain, change)
-    stepped = Asked("unlike experiments", test, "relative", p)
+    names = np.array(getattr(scene.structure, "names", ()))
+    # unknowns of a black box are none that anybody knows
+    named = str(names[free][told]) if len(names) == len(free) else ""
+    stepped = Asked("unlike experiments", test, "relative", p, named)
     if len(scene.seen) > _APART:
         return [stepped]
     parted = _fitted_apart(inquiry, scene, each(inquiry.readings), "unlike experiments")
@@ -180,7 +183,8 @@ def _fitted_apart(
         moved = np.abs(np.array([f.values for f in fits]) - whole) / std
     gain = max(scene.cost - sum(f.cost for f in fits), 0.0)
     # that which is farthest apart of its own error bars
-    size = float(apart.percent[np.nanargmax(apart.shift)]) / 100
+    farthest = int(np.nanargmax(apart.shift))
+    size = float(apart.percent[farthest]) / 100
     shift = float(np.nanmax(np.where(np.isfinite(moved), moved, np.nan), initial=0.0))
     statistic, degrees, p = apart.statistic, apart.degrees, apart.p_value
     if scene.even and all(r.noise.plain and not r.own_cost for r in inquiry.readings):
@@ -190,7 +194,7 @@ def _fitted_apart(
         statistic = gain / degrees / max((scene.cost - gain) / freedom, 1e-300)
         p = float(scipy.stats.f.sf(statistic, degrees, freedom))
     test = Score(statistic, degrees, p, size, 1.0, shift, gain, size)
-    return Asked(name, test, "relative", p)
+    return Asked(name, test, "relative", p, structure.names[farthest])
 
 
 def _more_unknowns(scene: Scene, parting: Parting) -> int:

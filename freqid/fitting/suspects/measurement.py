@@ -213,20 +213,21 @@ def _clipped(signal: FloatArray) -> bool:
 @suspect("amplitude")
 def amplitude(scene: Scene, model: Model) -> Columns | None:
     """The parameters change with the level of the input, from one experiment to another."""
-    levels = [_level(s) for s in scene.seen]
+    # what a response was measured at is not known
+    records = [s for s in scene.seen if s.record is not None]
+    levels = [_level(s) for s in records]
     if len(levels) < 2 or np.ptp(levels) < _LEVELS * max(levels):
         return None
     middle = float(np.mean(levels))
     free = ~scene.held
     return Columns(
         [
-            s.jacobian[free] * (level / middle - 1)
-            for s, level in zip(scene.seen, levels, strict=True)
+            s.jacobian[free] * (0.0 if s.record is None else _level(s) / middle - 1)
+            for s in scene.seen
         ]
     )
 
 
 def _level(s: Seen) -> float:
-    if s.record is None:
-        return 1.0
+    assert s.record is not None
     return float(np.sqrt(np.mean(s.record.inputs**2)))

@@ -53,7 +53,8 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
     """What a suspect says of the data, in words."""
     number = f"{size:.3g}{unit}"
     level = f", by about {float(f'{size:.2g}'):+g} % from small motions to these" if unit else ""
-    halves = f" by {100 * abs(size):.3g} % of a parameter" if unit else ""
+    halves = f" by {100 * abs(size):.3g} % of {detail or 'a parameter'}" if unit else ""
+    parameter = f" of {detail}" if detail else ""
     return {
         "delay": f"the input acts {size:.3g} s later than the model says",
         "feedthrough": f"the input reaches an output at once, by {number}",
@@ -66,7 +67,9 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "friction": f"a friction of {abs(size):.3g}{unit} {detail}",
         "nonlinear": f"the plant is not linear: {detail}{level}",
         "feedback": "what the model leaves goes together with inputs still to come",
-        "unlike experiments": f"separate fits of the experiments differ by {100 * size:.3g} %",
+        "unlike experiments": (
+            f"separate fits of the experiments differ by {100 * size:.3g} %{parameter}"
+        ),
         "amplitude": "the parameters change with the level of the input",
         "unsteady": f"the second half of the record differs from the first{halves}",
         "unexplained": f"{detail} explain more of the output than the model makes of them",
