@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data import input_dt
+from freqid.fitting.suspects.clean_inputs import clean
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
@@ -150,12 +151,15 @@ def feedback(scene: Scene, model: Model) -> list[Columns]:
 
     Past inputs are free beside them: to a predictable input, a sweep or a multisine, what the plant
     lacks would else look like the future. What comes of the noise shows where that is strong as
-    well: in coloured noise it is asked both ways.
+    well: in coloured noise it is asked both ways. An input in which there is no noise answers to
+    none, whatever a plant that is not linear makes of it.
     """
     if any(s.record is None for s in scene.seen) or (isinstance(model, GreyBox) and model.late):
         return []
     if scene.share is not None:
         # what a reference explains of an input answers to nothing else
+        return []
+    if all(clean(s.record.inputs) for s in scene.seen if s.record is not None):
         return []
     ahead = [shifted(s, model, range(1, _AHEAD + 1)) for s in scene.seen]
     past = [shifted(s, model, range(-_BEFORE, 1)) for s in scene.seen]
