@@ -24,9 +24,12 @@ def plot_response(
 ) -> Panels:
     """Bode with its bands, and under it the coherence and the input's spectrum, where known.
 
-    Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them.
+    Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them,
+    of which those with several inputs or outputs are drawn entry by entry, each with its names.
     Returns the axes: amplitude, phase, then coherence and spectrum as far as there are any.
     """
+    if all(isinstance(r, FrequencyResponse) for r in responses):
+        responses, labels = _entries(responses, labels)  # type: ignore[arg-type]
     measured = [(i, r) for i, r in enumerate(responses) if isinstance(r, FrequencyResponse)]
     coherent = [(i, r, r.coherence[0, 0]) for i, r in measured if r.coherence is not None]
     driven = [(i, r, r.input_spectrum[0]) for i, r in measured if r.input_spectrum is not None]
@@ -45,6 +48,28 @@ def plot_response(
         axes[1].set_xlabel("")
         axes[-1].set_xlabel(frequency_label(unit))
     return axes
+
+
+def _entries(
+    responses: Sequence[FrequencyResponse], labels: Sequence[str] | None
+) -> tuple[tuple[FrequencyResponse, ...], Sequence[str] | None]:
+    """Each from one input to one output, with labels that tell them apart."""
+    if all(r.response[..., 0].size == 1 for r in responses):
+        return tuple(responses), labels
+    found, named = [], []
+    for n, r in enumerate(responses):
+        for o, i in np.ndindex(r.response.shape[:2]):
+            spectrum = None if r.input_spectrum is None else r.input_spectrum[i]
+            variance, coherence = (
+                None if X is None else X[o, i] for X in (r.variance, r.coherence)
+            )
+            found.append(FrequencyResponse(
+                r.frequency, r.response[o, i], variance=variance, dt=r.dt, coherence=coherence,
+                input_spectrum=spectrum,
+            ))  # fmt: skip
+            entry = f"{r.input_names[i]} to {r.output_names[o]}"
+            named.append(entry if labels is None else f"{labels[n]}: {entry}")
+    return tuple(found), named
 
 
 @offers_plotly

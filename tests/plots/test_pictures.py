@@ -123,3 +123,13 @@ def test_ellipses_of_poles_hold_the_scatter(plant, fast):
         away = np.array([(poles[k] - target).real, (poles[k] - target).imag])
         inside.append(away @ np.linalg.solve(scatter[k], away) < 5.991)
     assert np.mean(inside) > 0.88
+
+
+def test_entries_of_a_response_are_told_apart(slow):
+    """Both outputs were black lines under the name of the file, with the coherence of one."""
+    both = fq.Record(slow.u, np.column_stack([slow.y, 2 * slow.y]), slow.dt, hold=slow.hold)
+    axes = fq.plot_response(fq.h1(both, 500, band=(10, 80)), labels=["log"])
+    texts = [t.get_text() for t in axes[0].get_legend().get_texts()]
+    assert texts == [f"log: {both.input_names[0]} to {n}" for n in both.output_names]
+    assert len(axes[2].lines) == 2
+    assert len({line.get_color() for line in axes[0].lines}) == 2
