@@ -60,7 +60,7 @@ class Orders:
         above that of the order below with one pole more.
         """
         found = self._alike(spec) if spec.stable else self._tamed(spec)
-        if not _odd(found) or not 1 < spec.order <= HIGH:
+        if not self._odd(found) or not 1 < spec.order <= HIGH:
             return found
         less = dataclasses.replace(spec, order=spec.order - 1)
         below = self._held(less) if spec.stable else self._tamed(less)
@@ -72,7 +72,7 @@ class Orders:
     def _tamed(self, spec: OutputError) -> Descent:
         """Motions that grow explain noise, and lead away from what stable ones explain better."""
         found = self._alike(spec)
-        if not _odd(found):
+        if not self._odd(found):
             return found
         chart, tame, _ = self._held(dataclasses.replace(spec, stable=True))
         return self._better(spec, self.lines, found, [chart.matrices(tame.x)])
@@ -84,13 +84,17 @@ class Orders:
             return chart, tame, objective
         return at_the_edge(chart, tame.x, self.lines) or (chart, tame, objective)
 
+    def _odd(self, found: Descent) -> bool:
+        """Whether it is no minimum, or grows where no other starts have shown what it misses."""
+        return not found[1].converged or (_unstable(found) and not _chained(self.lines))
+
     def _alike(self, spec: OutputError) -> Descent:
         """Begun where outputs count alike, too."""
         return begun_alike(self.lines, lambda own: self._not_above_below(spec, own), descended)
 
     def _not_above_below(self, spec: OutputError, lines: Lines) -> Descent:
         """The best of the starts, and of those that hold the order below."""
-        chained = all(e.single and e.one_to_one for e in lines)
+        chained = _chained(lines)
         own = self._begun_well(spec, lines, chained, self.more)
         if not chained and self.more:
             rng = np.random.default_rng(self.seed)
@@ -143,9 +147,9 @@ def _with_a_pole(below: Descent, lines: Lines, feedthrough: bool) -> list[StateS
     return [inputs_of(lines, wider, seen, feedthrough) for wider in places]
 
 
-def _odd(found: Descent) -> bool:
-    """Whether it grows, or is no minimum."""
-    return not found[1].converged or _unstable(found)
+def _chained(lines: Lines) -> bool:
+    """Whether starts of an order are those of the one below: of one input and one output."""
+    return all(e.single and e.one_to_one for e in lines)
 
 
 def _unstable(found: Descent) -> bool:
