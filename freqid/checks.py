@@ -6,7 +6,8 @@ import difflib
 import functools
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -248,3 +249,14 @@ def had_elsewhere(**cures: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         return checked
 
     return told
+
+
+@contextmanager
+def of_data(number: int, count: int) -> Iterator[None]:
+    """Errors of one of several data sets say which."""
+    try:
+        yield
+    except InputError as error:
+        if count < 2 or str(error).startswith("data["):
+            raise
+        raise InputError(f"data[{number}]: {error}") from None

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from freqid.checks import InputError, had_elsewhere, listed, named_values, whole
+from freqid.checks import InputError, had_elsewhere, listed, named_values, of_data, whole
 from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
@@ -166,14 +166,14 @@ def fit(
     notes = way.notes
     if plain and error == "linear":
         notes += in_one_unit(way.noise, sets)
-    readings: Sequence[Reading] = [
-        Reading.of(
-            d, "zoh" if estimated else hold, band, noise, initial_state, domain, skip_zero, late, i
-        )
-        for i, (d, noise) in enumerate(zip(way.sets, way.noise, strict=True))
-    ]
-    for r in readings:
-        r.check_hold()
+    read: list[Reading] = []
+    assumed = "zoh" if estimated else hold
+    for i, (d, noise) in enumerate(zip(way.sets, way.noise, strict=True)):
+        with of_data(i, len(sets)):
+            r = Reading.of(d, assumed, band, noise, initial_state, domain, skip_zero, late, i)
+            r.check_hold()
+        read.append(r)
+    readings: Sequence[Reading] = read
     if error == "log":
         readings = [_logarithmic(r, model) for r in readings]
     if offset is not None:

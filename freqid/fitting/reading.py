@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import InputError, of_data
 from freqid.data import (
     Band,
     DataSet,
@@ -293,6 +293,7 @@ def read_for(
                 f"and {shape[1]}"
             )
     made: list[Experiment] = []
-    for r in readings:
-        made.append(r.experiment(plane, made[-1] if made else None))
+    for i, r in enumerate(readings):
+        with of_data(i, len(readings)):
+            made.append(r.experiment(plane, made[-1] if made else None))
     return made

@@ -235,3 +235,14 @@ def test_what_belongs_to_the_model_is_said(option, cure):
         fq.fit(fq.first_order(), record, **{option: {"a": (1, 2)}})
     with pytest.raises(TypeError, match="boundz"):
         fq.fit(fq.first_order(), record, boundz=1)
+
+
+def test_errors_of_one_of_several_records_say_which():
+    model = fq.first_order()
+    fast, slow = (fq.simulate(model, fq.chirp(2, 40, 2, dt), dt) for dt in (1e-3, 1e-2))
+    with pytest.raises(ValueError, match=r"^data\[1\]: band"):
+        fq.fit(model, [fast, slow], band=(2, 80))
+    with pytest.raises(ValueError, match=r"^data\[1\]: weights has shape \(7,\)"):
+        fq.fit(model, [fast, slow], weights=[None, np.ones(7)])
+    with pytest.raises(ValueError, match="^band"):
+        fq.fit(model, slow, band=(2, 80))
