@@ -244,5 +244,5 @@ def test_errors_of_one_of_several_records_say_which():
         fq.fit(model, [fast, slow], band=(2, 80))
     with pytest.raises(ValueError, match=r"^data\[1\]: weights has shape \(7,\)"):
         fq.fit(model, [fast, slow], weights=[None, np.ones(7)])
-    with pytest.raises(ValueError, match="^band"):
+    with pytest.raises(ValueError, match=r"^band"):
         fq.fit(model, slow, band=(2, 80))
