@@ -71,7 +71,8 @@ def errors_at_stamps(model: Model, record: StampedRecord, hold: Hold | str | Non
             "samples at times of their own need a model in continuous time without delays; take "
             "record.regular(), which is resampled"
         )
-    return _at_samples(model, Reading.of(record, hold))
+    # the samples of a log come one after the other, all outputs of each
+    return _at_samples(model, Reading.of(record, hold)).reshape(-1, model.n_outputs)
 
 
 def errors_in_time(
@@ -79,27 +80,26 @@ def errors_in_time(
 ) -> FloatArray:
     """Errors ŷ − y (N, outputs) of a simulation, the initial state fitted.
 
-    Those of lines in time, but where the model integrates: without the line at zero a constant
-    force would be free.
+    Those of lines in time, but where a model in continuous time integrates an input that is held
+    from sample to sample: without the line at zero a constant force would be free.
     """
     reading = Reading.of(record, hold, domain="time")
     held = reading.hold
     every = isinstance(held, PeriodicHold) and np.isclose(held.period, record.input_dt, rtol=1e-9)
     if every and initial_state == "estimate" and model.integrates and not (model.dt or model.late):
-        return _at_samples(model, reading)
+        return _at_samples(model, reading).reshape(model.n_outputs, -1).T
     return line_errors(model, record, hold, None, initial_state, offset).in_time()
 
 
 def _at_samples(model: Model, reading: Reading) -> FloatArray:
-    """Errors ŷ − y (N, outputs) in time, the initial state fitted."""
+    """Errors ŷ − y in time, as the rows of an experiment, the initial state fitted."""
     (experiment,) = read_for((model.n_outputs, model.n_inputs), [reading])
     evaluation = experiment.at(model.still())
     rows = evaluation.residual
     if evaluation.transient is not None:
         Q, _ = eliminate(evaluation.transient, rows)
         rows = rows - (Q @ rows) @ Q
-    errors: FloatArray = rows.reshape(-1, model.n_outputs)
-    return errors
+    return rows
 
 
 def errors_of(model: Model, reading: Reading) -> LineErrors:

@@ -129,6 +129,8 @@ def compare(
             (``offset="estimate"``). A plant that integrates is simulated with the constant part of
             the input, which a fit leaves out with the line at zero: its ``fit_percent`` may be
             higher than what is told here where a force or an offset of the input was not recorded.
+            Behind a delay, of a discrete model and of an input that is held for longer than its
+            samples a constant force stays free here as well.
         band: in Hz; only what lies inside it is compared, of both. None compares everything.
 
     Raises ValueError for channels that do not match, a band that the record does not have, or an
