@@ -30,7 +30,7 @@ from freqid.data.readers.table import named_with
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of
 from freqid.data.replacing import check_replacing
-from freqid.data.response_files import read_response
+from freqid.data.response_files import picked, read_response
 from freqid.data.running import alone, configured, every_core, in_turn, unordered
 from freqid.data.selection import as_holds, check_hold, flat
 from freqid.data.sources import in_python, source, that_estimates

@@ -83,7 +83,7 @@ def read_response(
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-    return _picked(found, input, output)
+    return picked(found, input, output)
 
 
 def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> FrequencyResponse:
@@ -171,7 +171,7 @@ def _long(frame: pd.DataFrame) -> FrequencyResponse:
     return AveragedResponse(**found.__dict__, memory=memory)
 
 
-def _picked(
+def picked(
     frf: FrequencyResponse, input: int | str | None, output: int | str | None
 ) -> FrequencyResponse:
     """The response from some of its inputs to some of its outputs."""

@@ -25,6 +25,7 @@ from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.printed import call_of
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
+from freqid.fitting.search.descent import INTERRUPTED
 from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
 from freqid.frf import stretches
@@ -194,12 +195,15 @@ def fit(
     explained = bool(way.loops)
     free = reference == "auto" and not near and could_go(readings, way)
     with _shown(progress):
-        if free and count is None and isinstance(model, GreyBox):
-            # a search among noise that comes back through a loop is long, and for nothing
-            one = dataclasses.replace(options, n_starts=1)
-            if pulled_by_noise(*_fitted(model, readings, one, loss, explained), way):
+        # a search among noise that comes back through a loop is long, and for nothing
+        look = free and count is None and isinstance(model, GreyBox)
+        few = dataclasses.replace(options, n_starts=1) if look else options
+        est, seen = _fitted(model, readings, few, loss, explained)
+        if look and est.message != INTERRUPTED:
+            if pulled_by_noise(est, seen, way):
                 return back()
-        est, readings = _fitted(model, readings, options, loss, explained)
+            est, seen = _fitted(model, readings, options, loss, explained)
+        readings = seen
     what, said = type(model).__name__, est.message.rstrip(".")
     _LOG.info("%s: cost %.6g, starts: %d; %s", what, est.cost, est.n_starts, said)
     if offset is not None:
@@ -214,7 +218,8 @@ def fit(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes],
     )  # fmt: skip
-    return back() if free and fed_back(est, readings, way) else est
+    go_on = free and est.message != INTERRUPTED
+    return back() if go_on and fed_back(est, readings, way) else est
 
 
 def _in_one_pass(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, an, choice, whole
-from freqid.data import FrequencyResponse, Record
+from freqid.data import FrequencyResponse, PeriodicResponse, Record, picked
 from freqid.fitting import Estimate
 from freqid.plots.bode_plots import bode
 from freqid.plots.curves import CHI2, UNITS, Drawable, frequency_label
@@ -56,17 +56,13 @@ def _entries(
     """Each from one input to one output, with labels that tell them apart."""
     if all(r.response[..., 0].size == 1 for r in responses):
         return tuple(responses), labels
+    if labels is not None and len(labels) != len(responses):
+        raise InputError(f"labels has {len(labels)} entries for {len(responses)} responses")
     found, named = [], []
     for n, r in enumerate(responses):
+        plain = r.plain() if isinstance(r, PeriodicResponse) else r
         for o, i in np.ndindex(r.response.shape[:2]):
-            spectrum = None if r.input_spectrum is None else r.input_spectrum[i]
-            variance, coherence = (
-                None if X is None else X[o, i] for X in (r.variance, r.coherence)
-            )
-            found.append(FrequencyResponse(
-                r.frequency, r.response[o, i], variance=variance, dt=r.dt, coherence=coherence,
-                input_spectrum=spectrum,
-            ))  # fmt: skip
+            found.append(picked(plain, i, o))
             entry = f"{r.input_names[i]} to {r.output_names[o]}"
             named.append(entry if labels is None else f"{labels[n]}: {entry}")
     return tuple(found), named

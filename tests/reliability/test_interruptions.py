@@ -111,3 +111,31 @@ def test_what_goes_on_after_a_fit_ends_too(tmp_path):
         model, _ = plant(count - 4)
         with pytest.raises(KeyboardInterrupt):
             job(model)
+
+
+def test_a_fit_beside_a_loop_ends_at_the_first_interruption():
+    """The first look at whether noise comes back was interrupted, and all starts were made."""
+    lag = fq.first_order().sampled(fq.ZeroOrderHold(5e-3))
+    rng, r = np.random.default_rng(0), fq.white_noise(800, seed=1)
+    u, y, x = np.zeros(800), np.zeros(800), 0.0
+    for k in range(800):
+        y[k] = x + 0.01 * rng.standard_normal()
+        u[k] = r[k] - 0.3 * y[k]
+        x = lag.phi[0, 0] * x + lag.gamma[0, 0] * u[k]
+    record = fq.Record(u, y, 5e-3, reference=r)
+    model, calls = plant(10**9)
+    est = fq.fit(model, record)
+    assert any("reference" in note for note in est.notes)
+    for after in range(8, len(calls) - 3, 4):
+        model, calls_here = plant(after)
+        if len(calls_here) >= after:
+            continue
+        try:
+            est = fq.fit(model, record)
+        except KeyboardInterrupt:
+            continue
+        if est.message.startswith("interrupted"):
+            assert len(calls_here) < after + 40, (after, len(calls_here))
+            break
+    else:
+        pytest.fail("no interruption was met in a fit")

@@ -326,13 +326,14 @@ def test_a_program_that_stamps_late_loses_no_samples():
 
 def test_a_comparison_draws_what_it_tells_where_an_output_came_before_the_input_and_a_gap():
     """The grid began at the input, the samples after the gap: the curve was shifted by it."""
-    u_time, u, y_time, y = logged(late=0.2, noise=0.3)
+    u_time, u, y_time, y = logged(late=0.5, noise=2.0)
     y_time, y = np.concatenate([[-1e-3], y_time]), np.concatenate([[0.0], y])
     record = fq.Record.from_logs(u_time, u, y_time, y)
-    assert record.y_time[0] >= 0.2
+    assert record.y_time[0] >= 0.5
     compared = fq.compare(fq.fit(LAG, record), record)
     left = np.linalg.norm(compared.residuals)
     drawn = 100 * (1 - left / np.linalg.norm(compared.measured - compared.measured.mean()))
-    assert drawn == pytest.approx(compared.fit_percent[0], abs=6)
+    # 7.35 % told, -14.7 % drawn; straight lines between the stamps take off a little noise
+    assert drawn == pytest.approx(compared.fit_percent[0], abs=1.5)
     # nothing is drawn across the gap
-    assert record.n_samples * record.dt <= y_time[-1] - 0.2 + 2 * record.dt
+    assert record.n_samples * record.dt <= y_time[-1] - 0.5 + 2 * record.dt

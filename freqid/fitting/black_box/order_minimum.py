@@ -95,7 +95,7 @@ class Orders:
     def _not_above_below(self, spec: OutputError, lines: Lines) -> Descent:
         """The best of the starts, and of those that hold the order below."""
         chained = _chained(lines)
-        own = self._begun_well(spec, lines, chained, self.more)
+        own = self._begun_well(spec, lines, self.more)
         if not chained and self.more:
             rng = np.random.default_rng(self.seed)
             others = [
@@ -105,14 +105,12 @@ class Orders:
         if chained or not 1 < spec.order <= HIGH:
             return own
         less = dataclasses.replace(spec, order=spec.order - 1)
-        below = self._begun_well(less, lines, chained, None)
+        below = self._begun_well(less, lines, None)
         if own[1].cost <= below[1].cost:
             return own
         return self._better(spec, lines, own, _with_a_pole(below, lines, spec.feedthrough))
 
-    def _begun_well(
-        self, spec: OutputError, lines: Lines, chained: bool, more: int | None
-    ) -> Descent:
+    def _begun_well(self, spec: OutputError, lines: Lines, more: int | None) -> Descent:
         """The best of the starts from the data."""
         n, options = spec.order, (spec.feedthrough, spec.stable)
         start = nested_model(lines, n, *options, more, self.seed, self.count)
@@ -121,7 +119,7 @@ class Orders:
             tame = nested_model(lines, n, spec.feedthrough, True, more, self.seed, self.count)
             own = self._better(spec, lines, own, [tame])
         # which of them leads farther the costs of starts do not tell
-        second = [] if chained else identified_models(lines, n, *options)[1:]
+        second = [] if _chained(lines) else identified_models(lines, n, *options)[1:]
         return self._better(spec, lines, own, second)
 
     def _better(

@@ -16,8 +16,8 @@ from freqid.models import Model
 
 # level at which it is, and the part of an output that is but rounding
 _HEARD, _ROUNDING = 1e-3, 1e-16
-# part of an output's power from which on a constant is most of it
-_MOSTLY = 0.4
+# part of an output's power from which on a constant may drown what the input does
+_DROWNS = 0.4
 
 
 def silent(scene: Scene) -> list[Finding]:
@@ -36,14 +36,14 @@ def silent(scene: Scene) -> list[Finding]:
 
 
 def constant(scene: Scene, model: Model) -> list[Finding]:
-    """Whether most of an output is a constant, in which an input that is heard may be lost."""
+    """Whether so much of an output is a constant that an input that is heard may be lost in it."""
     for s in scene.seen:
         seen = (s.experiment.lines.omega == 0).any()
         if s.record is None or s.reading.offset or model.integrates or not seen:
             continue
         y = s.record.outputs
         shares = len(y) * y.mean(axis=0) ** 2 / np.maximum((y**2).sum(axis=0), 1e-300)
-        if shares.max() > _MOSTLY:
+        if shares.max() > _DROWNS:
             name = s.record.output_names[int(np.argmax(shares))]
             text = (
                 f"{100 * shares.max():.3g} % of the power of {name} is a constant, beside which "
