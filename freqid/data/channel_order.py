@@ -9,7 +9,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from freqid.checks import InputError
+from freqid.data.averaged_response import AveragedResponse
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.local_response import LineNoise, LocalResponse
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.record import Record
 
@@ -67,12 +69,17 @@ def _order(wanted: Sequence[str], given: Sequence[str]) -> list[int] | None:
 def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> FrequencyResponse:
     u, y = list(u), list(y)
     at = np.ix_(y, u)
-    means: dict[str, Any] = {}
-    if isinstance(frf, PeriodicResponse):
+    kept: dict[str, Any] = {}
+    if isinstance(frf, AveragedResponse):
+        kept = {"memory": frf.memory}
+    elif isinstance(frf, LocalResponse) and frf.line_noise is not None:
+        own = frf.line_noise
+        kept = {"line_noise": LineNoise(own.first, own.rows[:, y][:, :, u], own.power[y])}
+    elif isinstance(frf, PeriodicResponse):
         # outputs come first in the noise
         both = np.array([*y, *(len(y) + i for i in u)])
         noise = frf.noise[..., both[:, None], both]
-        means = {"inputs": frf.inputs[u], "outputs": frf.outputs[y], "noise": noise}
+        kept = {"inputs": frf.inputs[u], "outputs": frf.outputs[y], "noise": noise}
     return dataclasses.replace(
         frf, response=frf.response[at],
         variance=None if frf.variance is None else frf.variance[at],
@@ -80,5 +87,5 @@ def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> Frequ
         input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[u],
         input_names=tuple(frf.input_names[i] for i in u),
         output_names=tuple(frf.output_names[i] for i in y),
-        **means,
+        **kept,
     )  # fmt: skip

@@ -266,7 +266,8 @@ class Reading:
 
     def samples(self, plane: Plane | None = None) -> TimeExperiment:
         """The samples of a record as residuals; ValueError where the input's do not tell."""
-        assert isinstance(self.data, Record)
+        if not isinstance(self.data, Record):
+            raise InputError(f"initial_state={self.initial_state!r} needs samples: a record")
         record, hold = self.data, self.hold
         if not self.noise.plain:
             raise InputError("weights need domain='frequency' and an initial state not at rest")

@@ -24,8 +24,9 @@ def plot_response(
 ) -> Panels:
     """Bode with its bands, and under it the coherence and the input's spectrum, where known.
 
-    Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them,
-    of which those with several inputs or outputs are drawn entry by entry, each with its names.
+    Takes what ``bode`` takes; the rows below are those of the FrequencyResponse objects among them.
+    Where nothing else is drawn, those with several inputs or outputs come entry by entry, each with
+    its names.
     Returns the axes: amplitude, phase, then coherence and spectrum as far as there are any.
     """
     if all(isinstance(r, FrequencyResponse) for r in responses):

@@ -61,3 +61,15 @@ def test_other_names_go_by_place():
     other = fq.Record(other.u, other.y, other.dt, input_names=["p", "q"])
     est = fq.fit(MODEL, [record(0), other])
     assert est["a"] == pytest.approx(5, rel=1e-6)
+
+
+@pytest.mark.parametrize("estimate", [fq.local_polynomial, lambda s: fq.h1(s, segment=80)])
+def test_a_turned_response_keeps_what_it_knows_of_its_noise(estimate):
+    """How lines share their noise was lost, and standard errors were five times other ones."""
+    sets = [record(seed).with_noise(0.02, seed=seed) for seed in range(3)]
+    turned = [s.select(IN[::-1], OUT[::-1]) for s in sets]
+    named = fq.GreyBox(plant, MODEL.parameters, inputs=IN, outputs=OUT)
+    one, other = (fq.fit(named, estimate(s)) for s in (sets, turned))
+    np.testing.assert_allclose(other.values, one.values, rtol=1e-6)
+    np.testing.assert_allclose(other.parameters["std"], one.parameters["std"], rtol=1e-4)
+    assert [w.kind for w in other.warnings] == [w.kind for w in one.warnings]

@@ -246,3 +246,11 @@ def test_errors_of_one_of_several_records_say_which():
         fq.fit(model, [fast, slow], weights=[None, np.ones(7)])
     with pytest.raises(ValueError, match=r"^band"):
         fq.fit(model, slow, band=(2, 80))
+
+
+def test_a_response_has_no_samples_at_rest():
+    """An assertion without a word."""
+    record = fq.simulate(fq.first_order(), fq.white_noise(600), 1e-3)
+    for data in (fq.h1(record, segment=100), [record, fq.h1(record, segment=100)]):
+        with pytest.raises(ValueError, match="initial_state='zero' needs samples: a record"):
+            fq.fit(fq.first_order(), data, initial_state="zero")
