@@ -27,9 +27,13 @@ class Nuisance(ABC):
     size: float
     name: ClassVar[str]
     unit: ClassVar[str] = "s"
-    lower: ClassVar[float] = -np.inf
     upper: ClassVar[float] = np.inf
     scattered: ClassVar[tuple[float, float]] = (0.0, 1.0)
+
+    @property
+    def lower(self) -> float:
+        """What it is at the least, in ``unit``."""
+        return -np.inf
 
     @abstractmethod
     def applied(self, plant: Realisation, value: float, parameter: int | None) -> Realisation:
@@ -60,11 +64,26 @@ class HoldPeriod(Nuisance):
 
 @dataclass(frozen=True)
 class Delay(Nuisance):
-    """Delay of the inputs; ``size`` is the sample time of the input."""
+    """Delay of all inputs, or of number ``only``, on top of the plant's own; ``size`` is the sample
+    time of the input. It may come ``sooner`` than that by so much.
+    """
 
     name: ClassVar[str] = "delay"
-    lower: ClassVar[float] = 0.0
+    only: int | None = None
+    sooner: float = 0.0
+
+    @property
+    def lower(self) -> float:
+        """What it is at the least, in ``unit``."""
+        return -self.sooner
 
     def applied(self, plant: Realisation, value: float, parameter: int | None) -> Realisation:
         """The plant behind this delay."""
-        return dataclasses.replace(plant, delay=(Timing(value, parameter, self.size),))
+        own = Timing(value, parameter, self.size)
+        if self.only is None and plant.delay is None:
+            return dataclasses.replace(plant, delay=(own,))
+        delays = [
+            dataclasses.replace(own, value=t.value + value) if self.only in (None, i) else t
+            for i, t in enumerate(plant.delays)
+        ]
+        return dataclasses.replace(plant, delay=tuple(delays))

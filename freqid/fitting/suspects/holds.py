@@ -14,7 +14,8 @@ from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
 from freqid.fitting.sight import out_of_sight
 from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.refits import held, late
+from freqid.fitting.suspects.late_inputs import late
+from freqid.fitting.suspects.refits import held
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.lti import PeriodicHold, ZeroOrderHold
@@ -46,7 +47,7 @@ def fitted_again(inquiry: Asking, scene: Scene, a: Asked) -> Asked:
     """The suspect after a fit with it free, where that is worth one."""
     again = None
     if a.name == "delay":
-        again = late(inquiry.minimum, inquiry.readings, a.test.size)
+        again = late(inquiry.minimum, inquiry.readings, a.test.size, scene.freedom)
     elif a.name == "hold rejected":
         again = held(inquiry.minimum, inquiry.readings)
     # a hold that is possible may reach much less than a change of the response by as much
@@ -55,9 +56,9 @@ def fitted_again(inquiry: Asking, scene: Scene, a: Asked) -> Asked:
     if again is None:
         return a
     if possible and reached <= a.test.gain:
-        return dataclasses.replace(a, odd=again.odd, detail=again.sentence)
+        return dataclasses.replace(a, odd=again.odd, detail=again.detail)
     test = dataclasses.replace(a.test, gain=reached, size=again.size)
-    return dataclasses.replace(a, test=test, detail=again.sentence, odd=again.odd)
+    return dataclasses.replace(a, test=test, detail=again.detail, odd=again.odd)
 
 
 def unmirrored(inquiry: Asking, scene: Scene, most: float) -> Asked | None:
@@ -86,7 +87,7 @@ def unmirrored(inquiry: Asking, scene: Scene, most: float) -> Asked | None:
     f = gain / (again.cost / freedom)
     p = float(scipy.stats.f.sf(f, 1, freedom))
     test = Score(f, 1, p, again.size, 1.0, np.inf, gain)
-    return Asked("hold rejected", test, "s", p, again.sentence, odd=again.odd)
+    return Asked("hold rejected", test, "s", p, again.detail, odd=again.odd)
 
 
 def remembered(reading: Reading) -> bool:

@@ -25,7 +25,7 @@ from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
-from freqid.fitting.suspects.order import LIKELY, evidence, ordered
+from freqid.fitting.suspects.order import LIKELY, evidence, ordered, outdone
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.register import SUSPECTS, Columns
@@ -164,8 +164,9 @@ class Inquiry:
         if "saturation" in merged:
             # samples at a limit are what is left of peaks
             merged.pop("spikes", None)
-        # an early input is no delay where another hold, or the freedom of a black box, explains it
-        early = "delay" in merged and merged["delay"].test.size < 0
+        # an early input is no delay where another hold, or the freedom of a black box, explains it,
+        # unless the model has it late
+        early = "delay" in merged and merged["delay"].test.size < 0 and not self.model.late
         if early and ("hold rejected" in merged or not isinstance(self.model, GreyBox)):
             del merged["delay"]
         if not merged:
@@ -208,7 +209,8 @@ class Inquiry:
         found = leaking(*asked) or still_moving(*asked, self.readings)
         if found := found or begun_in_motion(self.minimum, scene, self.readings):
             return found
-        if turn := turned(self, scene):
+        turn = turned(self, scene)
+        if turn and not outdone(turn[0].number or 0.0, named, scene):
             return turn
         if not named:
             return []
@@ -244,8 +246,6 @@ class Inquiry:
             holds = {repr(r.hold) for r in self.readings}
             what = f"the data contradict {', '.join(sorted(holds))}"
             what += f"; {a.detail} explains them better" if a.detail else ""
-        elif a.name == "delay" and a.detail:
-            what = a.detail
         else:
             what = words(a.name, a.test.size, a.unit, a.detail)
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)

@@ -23,6 +23,8 @@ _AS_MUCH = 0.8
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
 BENT, _HALF = ("friction", "nonlinear"), 0.5
 _SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
+# part of what a turned channel leaves that a delay has to leave to be said instead
+_LATE = 0.5
 # what a sharp mode looks like from near: it has to explain more
 _NARROW = ("unsteady", "tone")
 # faults of a sensor leave room for a plant that changes, and a mode that moves looks like two
@@ -38,6 +40,15 @@ def evidence(scene: Scene, a: Asked) -> float:
         # where the noise differs a quiet experiment says much that costs little
         better = max(better, np.log1p(a.test.statistic * a.test.degrees / n))
     return float(n * better - a.test.degrees * np.log(n) - 2 * np.log(a.trials))
+
+
+def outdone(left: float, named: Sequence[Asked], scene: Scene) -> bool:
+    """Whether a delay that was fitted again leaves clearly less than this part of the energy.
+
+    To a mode half a turn of delay looks like the other sign.
+    """
+    delays = [scene.cost - a.test.gain for a in named if a.name == "delay"]
+    return any(cost < _LATE * left * scene.energy for cost in delays)
 
 
 def _clearly(a: Asked, other: Asked) -> bool:

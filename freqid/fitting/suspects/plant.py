@@ -10,6 +10,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data import input_dt
 from freqid.fitting.suspects.clean_inputs import clean
+from freqid.fitting.suspects.late_inputs import apart, called, together
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
@@ -31,13 +32,16 @@ def responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
 
 @suspect("delay")
 def delay(scene: Scene, model: Model) -> list[Columns]:
-    """The input acts later: −dy/dt at the samples, and what whole samples of delay would change.
+    """Inputs act later, all of them or one: −dy/dt at the samples, and what whole samples change.
 
     To a rough input a delay of some samples is another input, which no derivative reaches.
     """
-    if any(isinstance(d, str) for d in getattr(model, "delay_sources", ())):
-        return []
-    smooth, late = [], {q: [] for q in _SAMPLES}  # type: ignore[var-annotated]
+    which: list[int | None] = [None] if together(scene.structure, model) else []
+    which += apart(scene.structure, model) if model.n_inputs > 1 else []
+    smooth: list[list[FloatArray]] = []
+    # an input is early where a model has it late
+    samples = [*_SAMPLES, *(-q for q in _SAMPLES if model.late)]
+    late: dict[int, list[list[FloatArray]]] = {q: [] for q in samples}
     for s in scene.seen:
         omega, hold, step = s.omega_input, s.reading.hold, s.reading.sample_time
         own = s.own(model)
@@ -45,13 +49,25 @@ def delay(scene: Scene, model: Model) -> list[Columns]:
         if not model.dt:
             held = isinstance(hold, PeriodicHold) and not model.late
             slope = _slope(own, hold, omega) if held else -1j * omega * G
-            smooth.append(s.answered(slope)[None])
-        for q in _SAMPLES if s.record is not None else ():
-            moved = np.exp(-1j * omega * q * step) - 1
-            late[q].append(s.answered(moved * G)[None] / (q * step))
-    drawn = [smooth, *late.values()]
-    whole = [d for d in drawn if len(d) == len(scene.seen)]
-    return [Columns(d, "s", len(whole)) for d in whole]
+            smooth.append([s.answered(_of(slope, i))[None] for i in which])
+        for q in samples if s.record is not None else ():
+            moved = (np.exp(-1j * omega * q * step) - 1) / (q * step)
+            late[q].append([s.answered(_of(moved * G, i))[None] for i in which])
+    whole = [d for d in (smooth, *late.values()) if len(d) == len(scene.seen)]
+    trials, several = len(whole) * len(which), model.n_inputs > 1
+    # an early input is no delay where a black box could have it, and hides none that is late
+    onesided = several and not isinstance(model, GreyBox)
+    names = [called(i, [s.reading for s in scene.seen]) if several else "" for i in which]
+    return [
+        Columns(list(drawn), "s", trials, name, onesided=onesided)
+        for d in whole
+        for name, drawn in zip(names, zip(*d, strict=True), strict=True)
+    ]
+
+
+def _of(G: ComplexArray, index: int | None) -> ComplexArray:
+    """A response (outputs, inputs, K), where not all inputs are meant that of one alone."""
+    return G if index is None else G * (np.arange(G.shape[1]) == index)[:, None]
 
 
 def _slope(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:

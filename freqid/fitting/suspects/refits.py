@@ -1,4 +1,4 @@
-"""Suspects that a score names are fitted again, as unknowns of their own: a delay, another hold."""
+"""Another hold, which a score names, is fitted again as an unknown of its own."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import input_dt
-from freqid.fitting.cost.nuisance import Delay, HoldPeriod
+from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -19,56 +19,28 @@ from freqid.fitting.search.descent import minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import BandLimited, FirstOrderHold, Hold, PeriodicHold
 
-# samples of delay, and holds as parts of the sample time, from which a fit begins
-_DELAYS = (0.3, 1.5, 3.5, 8.0)
+# holds as parts of the sample time, from which a fit begins
 _PERIODS = (1.0, 0.3)
 # holds shorter than this part of the sample time are none, and longer ones no converter's
 _LEAST, _MOST = 0.02, 1.02
 # converters hold for the sample time or a whole part of it: so far from all of those is odd, above
 # a part so small that another is never far
 _ODD, _ANY = 0.1, 0.22
-# evaluations of each, of the first look from every start, and the gain that ends one
-_LIMIT, _LOOK, _TOLERANCE = 40, 12, 1e-6
+# evaluations of each, and the gain that ends one
+_LIMIT, _TOLERANCE = 40, 1e-6
 
 
 @dataclass(frozen=True)
 class Refit:
-    """A fit with the suspect free: its ``cost``, the suspect's ``size`` (s) and its own words.
+    """A fit with the suspect free: its ``cost``, the suspect's ``size`` (s) and what it says of it.
 
     A hold is ``odd`` where no converter has it: it is no whole part of the sample time.
     """
 
     cost: float
     size: float
-    sentence: str
+    detail: str
     odd: bool = False
-
-
-def late(minimum: Minimum, readings: Sequence[Reading], first: float) -> Refit | None:
-    """With a delay of all inputs, begun also from the score's own step ``first`` (s)."""
-    structure = minimum.structure
-    if not _plain(structure):
-        return None
-    # a response in continuous time has no sample: its fastest line is the measure
-    dt = readings[0].sample_time or 1 / max(float(r.lines().lines.omega.max()) for r in readings)
-    freed = structure.with_unknown(Delay(0.0, dt), _alone(minimum))
-    lines = [r.at_lines().with_(delayed=True).lines() for r in readings]
-    objective = Objective(freed, lines)
-    tried = []
-    for samples in (max(first / dt, 0.05), *_DELAYS):
-        try:
-            start = np.append(freed.start[:-1], samples)
-            tried.append(polish(objective, start, limit=_LOOK, tolerance=_TOLERANCE))
-        except InputError:
-            continue
-    if not tried:
-        return None
-    near = min(tried, key=lambda found: found.cost)
-    best = minimise(objective, near.x, limit=_LIMIT, tolerance=_TOLERANCE)
-    size = float(best.x[-1]) * dt
-    if size <= 0:
-        return None
-    return Refit(best.cost, size, f"the input acts {_time(size)} later than the model says")
 
 
 def held(
@@ -80,10 +52,10 @@ def held(
     """
     structure = minimum.structure
     dt = input_dt(readings[0].data)
-    if not _plain(structure) or not dt:
+    if not plain(structure) or not dt:
         return None
     at_lines = [r.at_lines().with_(delayed=True) for r in readings]
-    near = _alone(minimum) if near is None else near
+    near = where_data_alone(minimum) if near is None else near
     found = [_of_any_length(near, structure, at_lines, dt)]
     if all(input_dt(r.data) == dt for r in readings):
         others: list[tuple[Hold, str]] = [
@@ -95,7 +67,7 @@ def held(
     return min(told, key=lambda f: f.cost, default=None)
 
 
-def _plain(structure: object) -> TypeGuard[GreyStructure]:
+def plain(structure: object) -> TypeGuard[GreyStructure]:
     """Whether a grey box may be given one unknown more."""
     grey = isinstance(structure, GreyStructure) and not isinstance(structure, PlacedStructure)
     return grey and not structure.unknown  # type: ignore[attr-defined]
@@ -147,10 +119,6 @@ def _through(
     return Refit(found.cost, size, text)
 
 
-def _alone(minimum: Minimum) -> FloatArray:
+def where_data_alone(minimum: Minimum) -> FloatArray:
     """The unknowns where the data alone are least."""
     return minimum.x if minimum.alone is None else minimum.alone
-
-
-def _time(seconds: float) -> str:
-    return f"{1e3 * seconds:.4g} ms" if seconds < 0.1 else f"{seconds:.4g} s"

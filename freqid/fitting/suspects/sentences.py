@@ -56,7 +56,7 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
     halves = f" by {100 * abs(size):.3g} % of {detail or 'a parameter'}" if unit else ""
     parameter = f" of {detail}" if detail else ""
     return {
-        "delay": f"the input acts {size:.3g} s later than the model says",
+        "delay": f"{detail or 'the input'} {acts(size)} than the model says",
         "feedthrough": f"the input reaches an output at once, by {number}",
         "offset": f"an output has a constant of {number} added",
         "drift": f"an output drifts by {number}",
@@ -75,6 +75,13 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "unexplained": f"{detail} explain more of the output than the model makes of them",
         "another mode": detail or "a black box with one mode more explains the data better",
     }[name]
+
+
+def acts(delay: float) -> str:
+    """What an input does that comes late by a ``delay`` (s)."""
+    size = abs(delay)
+    time = f"{1e3 * size:.4g} ms" if size < 0.1 else f"{size:.4g} s"
+    return f"acts {time} {'later' if delay > 0 else 'earlier'}"
 
 
 def farthest(scene: Scene, moved: FloatArray, std: FloatArray) -> tuple[float, str]:
