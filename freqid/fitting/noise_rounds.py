@@ -105,14 +105,21 @@ def _left_by_boxes(
     structure, _ = structure_of(model, readings, options)
     if structure.model.delay_sources or not all(isinstance(r.data, Record) for r in readings):
         return None
-    seen = list(readings)
+    seen, boxes = list(readings), dict[int, Reference]()
     try:
         for _ in range(_BOX_ROUNDS):
             weighted, even = list(seen), True
             for group in groups_of(structure, seen):
                 one = seen[group[0]]
                 plant = structure.at(structure.start, one.place)
-                box = Reference.of(plant, [seen[i].beside() for i in group], _LINES)
+                own = [seen[i].beside() for i in group]
+                before = boxes.get(group[0])
+                box = (
+                    Reference.of(plant, own, _LINES)
+                    if before is None
+                    else before.on(own, count=_LINES)
+                )
+                boxes[group[0]] = box
                 for i in group:
                     left = errors_of(box.model(plant, one.hold), seen[i])
                     even = even and evenly_spread(left.error)

@@ -24,7 +24,7 @@ from freqid.fitting.black_box.refinement import (
 from freqid.fitting.black_box.sampled_lines import SampledLines
 from freqid.fitting.cost.box_distance import Surroundings
 from freqid.fitting.cost.charts import Chart, to_plane
-from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.experiments import Experiment, SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
@@ -134,11 +134,13 @@ class Reference:
         """How many numbers it could choose, initial states left out."""
         return self.chart.size
 
-    def on(self, readings: Sequence[Reading], worth: float = np.inf) -> Reference:
-        """The same followed to the minimum on all lines of other readings of the same data, as
-        long as it may come below a cost that makes it ``worth`` the way.
+    def on(
+        self, readings: Sequence[Reading], worth: float = np.inf, count: int | None = None
+    ) -> Reference:
+        """The same followed to the minimum on all lines, or about ``count``, of other readings of
+        the same data, as long as it may come below a cost that makes it ``worth`` the way.
         """
-        return self._from(self.chart.moved(self.solution.x), readings, worth)
+        return self._from(self.chart.moved(self.solution.x), readings, worth, count)
 
     def deepened(self, model: GreyBox, readings: Sequence[Reading]) -> Reference | None:
         """One that leaves less, begun from the model or with modes exchanged; None where none does.
@@ -182,12 +184,21 @@ class Reference:
         W, X = observed(model.state_space(), len(self.chart.centre.A))
         return to_plane(reduced(in_z, W, X), self.chart.plane)
 
-    def _from(self, chart: Chart, readings: Sequence[Reading], worth: float = np.inf) -> Reference:
-        """The minimum next to the centre of a chart, on all lines or means."""
+    def _from(
+        self,
+        chart: Chart,
+        readings: Sequence[Reading],
+        worth: float = np.inf,
+        count: int | None = None,
+    ) -> Reference:
+        """The minimum next to the centre of a chart, on all lines or means, or about ``count``."""
         seen = [r.beside() for r in readings]
         if self.bilinear:
             seen = [r.on_circle(chart.dt) for r in seen]
-        experiments = [r.experiment(chart.plane) for r in seen]
+        experiments: Sequence[Experiment] = [r.experiment(chart.plane) for r in seen]
+        lines = [e for e in experiments if isinstance(e, SpectralExperiment)]
+        if count is not None and len(lines) == len(experiments):
+            experiments = thinned_to(lines, count)
         return self._descended(Objective(chart, experiments), self.bilinear, worth)
 
     def beside(self, model: GreyBox, readings: Sequence[Reading]) -> Reference:

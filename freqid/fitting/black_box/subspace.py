@@ -12,7 +12,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.lti import BandLimited, Plane, StateSpace, basis_of, sum_runs, triangle
+from freqid.lti import BandLimited, Basis, Plane, StateSpace, basis_of, sum_runs, triangle
 
 
 def plane_for(z: ComplexArray) -> Plane:
@@ -107,8 +107,9 @@ def inputs_and_cost(
     """
     n, m, p = len(A), experiments[0].n_channels[1], len(C)
     rows, right = [], []
+    basis = _basis(A, C)
     for index, e in enumerate(experiments):
-        CR, lines, transient = _output_rows(A, C, e.points.z), e.lines, e.transient
+        CR, lines, transient = _output_rows(basis, e.points.z), e.lines, e.transient
         blocks = []
         for j in range(m):
             for i in range(n):
@@ -120,6 +121,7 @@ def inputs_and_cost(
                     y = np.zeros((p, *lines.U.shape[1:]), complex)
                     y[o] = lines.U[j]
                     blocks.append(lines.rows(sum_runs(y, lines.aliases)))
+        ends = np.zeros(0) if transient is None else _output_rows(basis, transient.z)
         for other in range(len(experiments)):
             if experiments[other].transient is None:
                 continue
@@ -127,7 +129,7 @@ def inputs_and_cost(
                 if other != index or transient is None:
                     blocks.append(np.zeros(2 * lines.Y.size))
                     continue
-                y = _output_rows(A, C, transient.z)[:, i, None] * transient.factor
+                y = ends[:, i, None] * transient.factor
                 blocks.append(lines.rows(sum_runs(y, transient.aliases)))
         rows.append(np.array(blocks).T)
         right.append(lines.rows(lines.Y))
@@ -145,9 +147,14 @@ def inputs_and_cost(
 
 
 @np.errstate(all="ignore")
-def _output_rows(A: FloatArray, C: FloatArray, w: ComplexArray) -> ComplexArray:
-    """C (wI − A)⁻¹, (outputs, states, lines)."""
+def _basis(A: FloatArray, C: FloatArray) -> Basis:
+    """Coordinates of the states, each of which is an input."""
     n, p = len(A), len(C)
-    basis = basis_of(StateSpace(A, np.eye(n), C, np.zeros((p, n))))
+    return basis_of(StateSpace(A, np.eye(n), C, np.zeros((p, n))))
+
+
+@np.errstate(all="ignore")
+def _output_rows(basis: Basis, w: ComplexArray) -> ComplexArray:
+    """C (wI − A)⁻¹ of the states before they were changed, (outputs, states, lines)."""
     rows = basis.through(BandLimited()).output_rows(w)
     return np.moveaxis(np.tensordot(basis.to_basis.T, rows, (1, 1)), 0, 1)
