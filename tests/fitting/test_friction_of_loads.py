@@ -55,17 +55,17 @@ def test_an_acceleration_shows_friction_at_once():
 
 @pytest.mark.study
 @pytest.mark.parametrize("kind", ["white", "binary", "multisine"])
-def test_friction_of_a_load_is_named_with_its_place(kind):
+@pytest.mark.parametrize("load", [0.02, 0.06])
+def test_friction_of_a_load_is_named_with_its_place(kind, load):
     """It was "another mode", or a friction of the motor. The dampers take a part of it."""
-    for load in (0.02, 0.06):
-        for record in measured(kind, load=load):
-            est = fq.fit(axis(0.8), record)
-            said = est.warnings[0]
-            assert said.kind == "friction"
-            assert "at the far end of k" in said
-            size = float(re.search(r"a friction of ([\d.]+)", said)[1])
-            assert 0.1 < size / (20 * load) < 1.1
-            assert not est.verdict.trusted
+    for record in measured(kind, load=load):
+        est = fq.fit(axis(0.8), record)
+        said = est.warnings[0]
+        assert said.kind == "friction"
+        assert "at the far end of k" in said
+        size = float(re.search(r"a friction of ([\d.]+)", said)[1])
+        assert 0.1 < size / (20 * load) < 1.1
+        assert not est.verdict.trusted
 
 
 @pytest.mark.study

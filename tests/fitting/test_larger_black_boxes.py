@@ -36,23 +36,21 @@ def off(est, y):
 
 
 @pytest.mark.study
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("channels", [(1, 1), (1, 2), (2, 1), (2, 2)])
-def test_too_low_an_order_is_no_longer_trusted(channels):
+def test_too_low_an_order_is_no_longer_trusted(channels, seed):
     """Of OutputError under white inputs 24 of 61 were, the worst 93 % off, most without a word."""
-    wrong = []
-    for seed in range(3):
-        order = 3 + seed
-        record, y = recorded(seed, order, channels, n=1000)
-        for low in range(1, order):
-            est = fq.fit(fq.OutputError(low), record)
-            if off(est, y) < 0.02:
-                continue
-            kinds = [w.kind for w in est.warnings]
-            if est.verdict.trusted and off(est, y) > 0.11:
-                wrong.append((seed, low, off(est, y), kinds))
-            if off(est, y) > 0.05 and "another mode" not in kinds:
-                assert not est.verdict.trusted, (seed, low, kinds)
-    assert not wrong
+    order = 3 + seed
+    record, y = recorded(seed, order, channels, n=1000)
+    for low in range(1, order):
+        est = fq.fit(fq.OutputError(low), record)
+        wrong = off(est, y)
+        if wrong < 0.02:
+            continue
+        kinds = [w.kind for w in est.warnings]
+        assert not est.verdict.trusted or wrong <= 0.11, (low, wrong, kinds)
+        if wrong > 0.05 and "another mode" not in kinds:
+            assert not est.verdict.trusted, (low, kinds)
 
 
 @pytest.mark.study

@@ -101,7 +101,7 @@ def test_plants_whose_black_box_was_lost_itself(studies, case):
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("case", [46, 135, 203])
+@pytest.mark.parametrize("case", [135, 46, 203])
 def test_plants_that_the_data_leave_open_are_not_called_complete(studies, case):
     """Costs 0.2 to 3 % above another minimum, in noise as large as the signal."""
     from search import plants

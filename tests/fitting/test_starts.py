@@ -17,9 +17,10 @@ def scattered(model, factor, count, seed=3):
 
 @pytest.mark.study
 @pytest.mark.parametrize("hold", ["zoh", "foh"])
-def test_starts_within_a_factor_of_ten_reach_the_best_cost(plant, slow, hold):
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_starts_within_a_factor_of_ten_reach_the_best_cost(plant, slow, hold, seed):
     best = fq.fit(plant, slow, hold=hold, band=BAND).cost
-    for start in scattered(plant, 10, 12):
+    for start in scattered(plant, 10, 5, seed):
         assert fq.fit(plant, slow, hold=hold, band=BAND, start=start).cost <= best * 1.001
 
 

@@ -123,7 +123,9 @@ def test_files_come_in_order_and_stay_in_their_folder(client, tmp_path):
     assert "etc" not in str(read(key="c" * 16))
 
 
-def test_links_and_records_of_any_kind():
+@pytest.mark.study
+@pytest.mark.parametrize("part", range(3))
+def test_links_and_records_of_any_kind(part):
     """A link ?sine=1e9, and records with a sample time of a second or more, ended in tracebacks."""
     u = RNG.standard_normal(400)
     y = np.convolve(u, [0, 0.3, 0.2, 0.1])[:400] + 0.01 * RNG.standard_normal(400)
@@ -131,7 +133,7 @@ def test_links_and_records_of_any_kind():
     for dt in (2.0, 10.0, 1e-6):
         records += [fq.Record(u, y, dt), fq.Record(u, y[::4], 4 * dt, input_dt=dt)]
         records += [fq.Record(np.c_[u, u**2], np.c_[y, y], dt)]
-    for i in range(120):
+    for i in range(40 * part, 40 * part + 40):
         r = random.Random(i)
         query = {
             "plant": r.choice([*PLANTS, "x"]), "hold": r.choice([*HOLDS, "y"]),

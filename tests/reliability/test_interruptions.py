@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
+from freqid.fitting.suspects import turned
 
 RECORD = fq.simulate(fq.first_order(), fq.chirp(2, 40, 4, 5e-3), 5e-3).with_noise(0.01)
 
@@ -64,6 +65,16 @@ def test_the_best_point_so_far_comes_back():
     assert done > 3
 
 
+def test_nothing_is_fitted_again_once_it_was_interrupted(monkeypatch):
+    """Other signs of the channels were: eight seconds after a Ctrl-C."""
+    monkeypatch.setattr(turned, "fitter_of", lambda model: pytest.fail("fitted again"))
+    _, calls = plant(10**9)
+    stopped, _ = plant(len(calls) + 12)
+    est = fq.fit(stopped, RECORD, start={"b": -10.0, "a": 1.0}, n_starts=1)
+    assert est.message.startswith("interrupted")
+    assert "interrupted" in est.verdict.reasons[0]
+
+
 def test_a_function_that_does_not_return_ends_with_ctrl_c():
     _, count = whole()
     model, _ = plant(count - 4, slow=True)
@@ -75,7 +86,7 @@ def test_a_function_that_does_not_return_ends_with_ctrl_c():
 
 def test_nothing_known_is_nothing_given_back():
     _, calls = plant(10**9)
-    again, _ = plant(len(calls) + 1, always=True)
+    again, _ = plant(len(calls) + 12, always=True)
     with pytest.raises(KeyboardInterrupt):
         fq.fit(again, RECORD)
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.lines import Lines, Transient
 from freqid.lti import on_circle
 
@@ -47,10 +47,17 @@ def open_ends(
             "known of the delay"
         )
     z = on_circle(lines.omega * transient.dt)
-    powers = np.concatenate([np.arange(first), -1.0 - np.arange(last)])
-    samples = transient.weight * z ** -powers[:, None]
-    each = np.zeros((p, len(powers), p, 1, K), complex)
+    turned = np.concatenate([_powers(z.conj(), first), z * _powers(z, last)])
+    samples = transient.weight * turned
+    each = np.zeros((p, len(turned), p, 1, K), complex)
     for output in range(p):
         each[output, :, output, 0] = samples
     after = transient.factor * np.repeat(z**-first, transient.aliases)
     return lines.rows(each.reshape(count, p, 1, K)), dataclasses.replace(transient, factor=after)
+
+
+def _powers(z: ComplexArray, count: int) -> ComplexArray:
+    """z⁰, z¹, … on the unit circle, (count, K), a product a row: powers take many times as long."""
+    rows = np.ones((count, len(z)), complex)
+    rows[1:] = z
+    return np.cumprod(rows, axis=0)

@@ -24,6 +24,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import INTERRUPTED
 from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.scene import Scene
@@ -67,7 +68,7 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
         return []
-    if isinstance(structure, PlacedStructure):
+    if isinstance(structure, PlacedStructure) or inquiry.minimum.solution.message == INTERRUPTED:
         return []
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
