@@ -14,7 +14,7 @@ import cyclopts
 import freqid as fq
 from freqid.checks import InputError
 from freqid.cli.estimates import USUAL_READING, fit, fit_many, new_model
-from freqid.cli.options import Band, Force, Reading, in_words
+from freqid.cli.options import Band, Between, Force, Reading, in_words, part_of
 from freqid.cli.planned import bias
 from freqid.cli.plants import in_python, model_of
 from freqid.cli.terminal import (
@@ -89,6 +89,7 @@ def frf(
     data: Path,
     *,
     reading: Reading = USUAL_READING,
+    between: Between = None,
     band: Band = None,
     method: Literal["etfe", "h1", "lpm", "lrm"] = "etfe",
     segment: int | None = None,
@@ -114,7 +115,7 @@ def frf(
     """
     may_write(out, [data], force, TABLES)
     may_write(plot, [data], force, PICTURES)
-    record, reference = reading.record(data), reading.reference
+    record, reference = part_of(reading.record(data), between), reading.reference
     if reference is not None and method == "etfe":
         raise InputError("--reference needs --method h1, lpm or lrm")
     if segment is not None and method != "h1":
@@ -141,6 +142,7 @@ def show_file(
     file: Path,
     *,
     reading: Reading = USUAL_READING,
+    between: Between = None,
     plot: Path | None = None,
     force: Force = False,
 ) -> None:
@@ -154,7 +156,7 @@ def show_file(
         picture of the record, or of the response.
     """
     may_write(plot, [file], force, PICTURES)
-    record = reading.data(file)
+    record = part_of(reading.data(file), between)
     if isinstance(record, fq.FrequencyResponse):
         print(repr(record).strip("<>"))
         if plot is not None:

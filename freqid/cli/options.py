@@ -5,10 +5,11 @@ Each group is a dataclass whose fields are options of the commands that take it.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from cyclopts import Parameter as Option
 
@@ -20,6 +21,10 @@ from freqid.lti import holds
 from freqid.models import GreyBox
 
 Band = Annotated[tuple[float, float] | None, Option(help="lowest and highest frequency in Hz")]
+Between = Annotated[
+    tuple[float, float] | None,
+    Option(help="START STOP: only what lies between, in s from the first sample; inf for the end"),
+]
 Hold = Annotated[
     str | None,
     Option(
@@ -30,6 +35,7 @@ Hold = Annotated[
 Force = Annotated[
     bool, Option(help="overwrite files that are there already; never those that are read")
 ]
+Recorded = TypeVar("Recorded", fq.Record, fq.Record | fq.FrequencyResponse)
 # options by their name as arguments, where that is another
 RENAMED = {"input": "inputs", "output": "outputs"}
 Limits = list[tuple[str, float, float]] | None
@@ -171,6 +177,21 @@ class Search:
             "error": None if self.error == "linear" else self.error,
         }  # fmt: skip
         return {k: v for k, v in asked.items() if v is not None}
+
+
+def part_of(data: Recorded, between: tuple[float, float] | None) -> Recorded:
+    """The part of a record that ``--between`` leaves."""
+    if between is None:
+        return data
+    start, stop = between
+    if not isinstance(data, fq.Record):
+        raise InputError("--between is for records; a response has no samples")
+    if not 0 <= start < stop:
+        raise InputError(
+            f"--between {start:g} {stop:g}: expected two times in s, the first one not below 0 and "
+            "before the second one"
+        )
+    return data.slice(start, None if math.isinf(stop) else stop)
 
 
 def hold_of(text: str | None) -> holds.Hold | str | None:

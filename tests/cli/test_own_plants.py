@@ -87,6 +87,23 @@ def test_options_of_the_plant(day, capsys):
     assert run("fit", "train.csv", "--model", "my_plant.py:plant", "--conditions", "J=0.1") == 0
 
 
+def test_a_part_of_a_record(day, capsys):
+    plant = ("--model", "my_plant.py:plant")
+    assert run("fit", "train.csv", *plant, "--between", "2", "8", "--out", "part.json") == 0
+    record = fq.read("train.csv").slice(2, 8)
+    scope = {}
+    exec(PLANT, scope)
+    kept = json.loads(Path("part.json").read_text())["parameters"]
+    assert kept["k"]["value"] == pytest.approx(fq.fit(scope["plant"], record)["k"], rel=1e-9)
+    capsys.readouterr()
+    assert run("show", "train.csv", "--between", "2", "inf") == 0
+    assert "1300 samples" in capsys.readouterr().out
+    for wrong in (("8", "2"), ("-1", "2"), ("80", "90")):
+        assert run("fit", "train.csv", *plant, "--between", *wrong) == 2
+        said = capsys.readouterr().err
+        assert "--between" in said or "the record runs from 0 to 15 s" in said
+
+
 def test_a_new_model_is_a_plant(day, capsys):
     assert run("new-model", "axis.py") == 0
     assert run("fit", "train.csv", "--model", "axis.py:plant") == 0
