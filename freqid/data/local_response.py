@@ -59,6 +59,29 @@ class LineNoise:
         return total
 
 
+@dataclass(frozen=True, eq=False)
+class OwnNoise:
+    """Noise that each entry of each line has for itself, of a ``variance`` (outputs, inputs, K)."""
+
+    variance: FloatArray
+
+    def along(self, at: ComplexArray) -> FloatArray:
+        """Covariance (P, P) of Re Σ conj(at)·error, ``at`` being (P, outputs, inputs, K)."""
+        each = (at * np.sqrt(self.variance)).reshape(len(at), -1)
+        return np.asarray((each.conj() @ each.T).real / 2)
+
+
+def noise_that_is_told(frf: FrequencyResponse) -> LineNoise | OwnNoise | None:
+    """What a response tells of the noise of its lines; None where its lines share it unknown how,
+    and where it tells nothing.
+    """
+    if isinstance(frf, LocalResponse) and frf.line_noise is not None:
+        return frf.line_noise
+    if frf.variance is None or frf.reach or not (frf.variance > 0).all():
+        return None
+    return OwnNoise(frf.variance)
+
+
 class LocalResponse(FrequencyResponse):
     """A FrequencyResponse whose lines share their noise in a way that is known.
 

@@ -22,6 +22,7 @@ from freqid.data import (
     channel_counts,
     check_hold,
     input_dt,
+    noise_that_is_told,
 )
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
@@ -257,12 +258,11 @@ class Reading:
     def _logarithm(self) -> LogResponse:
         assert isinstance(self.data, FrequencyResponse)
         frf = self.data if self.band is None else self.data.select(self.band)
-        if (frf.response == 0).any():
+        G, told = frf.response, noise_that_is_told(frf)
+        if (G == 0).any():
             raise InputError("error='log': the response is zero at a line; leave it out")
-        relative = RelativeNoise(self.noise).weights(frf, frf.response.shape)
-        weight = np.sqrt(relative) * np.abs(frf.response)
-        known = getattr(frf, "line_noise", None)
-        return LogResponse(frf.omega, frf.response, self.hold, weight, self.place, frf.reach, known)
+        weight = np.sqrt(RelativeNoise(self.noise).weights(frf, G.shape)) * np.abs(G)
+        return LogResponse(frf.omega, G, self.hold, weight, self.place, frf.reach, told)
 
     def samples(self, plane: Plane | None = None) -> TimeExperiment:
         """The samples of a record as residuals; ValueError where the input's do not tell."""

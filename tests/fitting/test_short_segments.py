@@ -118,3 +118,28 @@ def test_a_file_of_a_response_remembers_its_segments(tmp_path):
         est = fq.fit(fq.two_mass(), each)
         assert est.warnings[0].kind == "short segments"
     assert fq.read_response(tmp_path / "h1.csv").select((1, 50)).memory is not None
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_plant_that_integrates_is_told_by_how_much_it_is_moved():
+    """It was moved "by nan standard errors", and each such fit doubted: its answer has no end."""
+
+    def motor(b, a):
+        return [[0, 1], [0, -a]], [[0], [b]], [[1.0, 0]], [[0]]
+
+    plant = fq.GreyBox(motor, [fq.Parameter("b", 200.0), fq.Parameter("a", 10.0)])
+    u = np.random.default_rng(0).standard_normal(16_384)
+    # Newton's law between samples: v' = −a v + b u, θ' = v
+    dt, e = 2e-3, np.exp(-10.0 * 2e-3)
+    v = scipy.signal.lfilter([0, (1 - e) * 20.0], [1, -e], u)
+    turned = scipy.signal.lfilter([0, (1 - e) / 10.0], [1, -1], v)
+    driven = scipy.signal.lfilter([0, 200.0 * (dt / 10 - (1 - e) / 100)], [1, -1], u)
+    made = fq.Record(u, turned + driven, dt)
+    made = made.with_noise(0.002 * float(np.std(made.y)), seed=1)
+    short = fq.fit(plant, fq.h1(made, 512, band=(1, 100)), weights="noise")
+    assert kinds(short)[0] == "short segments"
+    assert "nan" not in str(short.warnings[0])
+    assert short.warnings[0].number > 1
+    long = fq.fit(plant, fq.h1(made, 4096, band=(1, 100)), weights="noise")
+    assert long.verdict.grade == "trust"
+    assert np.abs((long.values - [200, 10]) / long.parameters["std"]).max() < 4

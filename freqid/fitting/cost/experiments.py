@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
-from freqid.data import FrequencyResponse, LineNoise, LocalResponse
+from freqid.data import FrequencyResponse, LineNoise, OwnNoise, noise_that_is_told
 from freqid.fitting.cost.evaluation import SpectralEvaluation, SumOfEvaluations
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf import Spectra
@@ -87,7 +87,7 @@ class SpectralExperiment:
     discrete: bool = False
     response: bool = False
     reach: int = 0
-    line_noise: LineNoise | None = None
+    line_noise: LineNoise | OwnNoise | None = None
     added: FloatArray | None = None
     place: int = 0
 
@@ -157,7 +157,7 @@ class SpectralExperiment:
         scale = np.broadcast_to(np.sqrt(weights), frf.response.shape)
         lines = Lines.weighted(frf.omega, frf.omega[:, None], U, frf.response, scale)
         made = cls.of(lines, hold, None, plane=plane)
-        known = frf.line_noise if isinstance(frf, LocalResponse) else None
+        known = noise_that_is_told(frf)
         return dataclasses.replace(made, response=True, reach=frf.reach, line_noise=known)
 
     def with_offsets(self, n_samples: int) -> SpectralExperiment:

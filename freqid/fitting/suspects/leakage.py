@@ -7,6 +7,8 @@ Random Data, 2010, section 8.5.1).
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
@@ -15,10 +17,13 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.suspects.sentences import farthest
-from freqid.models import Model
+from freqid.lti import Hold, PeriodicHold
+from freqid.models import Model, simulate
 
 # standard errors, and part of itself, by which a parameter may be moved without a word
 _SMALL, _HARMLESS = 1.0, 1e-3
+# periods that are one but for rounding
+_SAME = 1e-9
 # periods of the transform that makes the impulse response, in segments: it rings on into the next
 _ROOM = 8
 
@@ -51,15 +56,39 @@ def _lost(s: Seen, model: Model) -> FloatArray:
     if not isinstance(data, AveragedResponse) or data.memory is None:
         return np.zeros(len(s.left))
     length = len(data.memory)
+    own = s.own(model)
+    at = np.round(s.omega_input * length * data.dt / (2 * np.pi)).astype(int)
+    hold = s.reading.hold
+    asked = own.responses_at(s.omega_input, None if own.dt else hold)
+    in_step = isinstance(hold, PeriodicHold) and abs(hold.period / data.dt - 1) < _SAME
+    if own.dt or in_step:
+        answer = _impulse_response(own, hold, data.dt, length)
+        return s.answered(np.fft.rfft(answer * data.memory)[..., at] - asked)
     padded = np.zeros(_ROOM * length)
     padded[:length] = data.memory
     every = 2 * np.pi / (_ROOM * length * data.dt) * np.arange(_ROOM * length // 2 + 1)
-    own = s.own(model)
-    hold = None if own.dt else s.reading.hold
-    G: ComplexArray = own.responses_at(every, hold)
+    with np.errstate(all="ignore"):
+        G: ComplexArray = own.responses_at(every, hold)
+    if not np.isfinite(G).all():
+        # an integrator's answer to a band-limited input has no end
+        return np.zeros(len(s.left))
     g = np.fft.irfft(G, _ROOM * length)
-    # causal but for a band-limited input's answer, which comes as much before as after
+    # a band-limited input's answer comes as much before as after
     g *= padded + np.roll(padded[::-1], 1) * (np.arange(len(padded)) > 0)
     seen = np.fft.rfft(g)[..., ::_ROOM]
-    at = np.round(s.omega_input * length * data.dt / (2 * np.pi)).astype(int)
-    return s.answered(seen[..., at] - own.responses_at(s.omega_input, hold))
+    return s.answered(seen[..., at] - asked)
+
+
+def _impulse_response(model: Model, hold: Hold, dt: float, length: int) -> FloatArray:
+    """Answers (outputs, inputs, length) to an input of one sample, which has no end where a plant
+    integrates.
+    """
+    # under a first-order hold the answer begins before its sample
+    u = np.zeros((length + 1, model.n_inputs, model.n_inputs))
+    u[1] = np.eye(model.n_inputs)
+    held = None if model.dt else hold
+    with warnings.catch_warnings():
+        # what rounding does in the ninth digit is no matter here
+        warnings.simplefilter("ignore", RuntimeWarning)
+        made = [simulate(model, u[:, :, i], dt, hold=held).outputs[1:].T for i in range(len(u[0]))]
+    return np.stack(made, axis=1)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from freqid.checks import FloatArray
-from freqid.data import LineNoise
+from freqid.checks import ComplexArray, FloatArray
+from freqid.data import LineNoise, OwnNoise
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.objective import Objective
@@ -22,6 +22,8 @@ _MEANS = 5
 _VALUES = 10
 # part of the largest direction of a Jacobian below which one is rounding
 _TOLD = 1e-14
+# standard errors by which variances are too large for certain
+_CERTAIN = 4.0
 # leverage that is believed at the most
 MOST_LEVERAGE = 0.9
 
@@ -205,22 +207,25 @@ def _of_stamps(
 
 
 def _of_response(
-    J: FloatArray, residual: FloatArray, scale: FloatArray, reach: int, noise: LineNoise | None
+    J: FloatArray,
+    residual: FloatArray,
+    scale: FloatArray,
+    reach: int,
+    noise: LineNoise | OwnNoise | None,
 ) -> FloatArray:
     """What the noise of a response makes of the gradient, (P, P); its errors (outputs, inputs, K)
     were multiplied by the ``scale``.
 
     Its size is each line's own, divided by what the fit leaves of it (MacKinnon and White's HC3, J.
     Econometrics 29, 1985): a resonance that few lines tell has noise like none of its neighbours.
-    Within the ``reach`` of a line noise goes together as it does on average, or, where that is
-    known, as the local models that made the response take it from the outputs' lines.
+    Within the ``reach`` of a line noise goes together as it does on average. Where its variance is
+    told that counts, which few lines that tell a resonance leave no sign of, and in a response by
+    local models as these take it from the outputs' lines.
     """
     error, lines = residual.view(complex), scale.shape[-1]
     at = J[:, ::2] + 1j * J[:, 1::2]
     if noise is not None:
-        # noise moves denominators, and what is left is larger than its first order says
-        told = float((scale**2 * noise.variance).sum())
-        wider = max(float(residual @ residual) / told, 1.0) if told > 0 else 1.0
+        wider = _against_what_is_told(error, scale**2 * noise.variance)
         return wider * noise.along(at.reshape(len(at), *scale.shape) * scale)
     gram = J @ J.T
     size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
@@ -242,6 +247,25 @@ def _of_response(
         ).T
         total += (pairs + pairs.conj().T).real / 2
     return total
+
+
+def _against_what_is_told(error: ComplexArray, told: FloatArray) -> float:
+    """By how much the variances of errors (rows,) are larger than those that are ``told``, or
+    smaller at all lines alike.
+
+    Noise moves denominators, and what is left is larger than its first order says.
+    """
+    power, told = np.abs(error) ** 2, told.ravel()
+    counted = told > 0
+    if not counted.any():
+        return 1.0
+    level = float(power[counted].sum() / told[counted].sum())
+    if level >= 1:
+        return level
+    # few lines may make up the sum: only all of them together say that too much was told
+    each = float(np.mean(power[counted] / told[counted]))
+    certain = each < 1 - _CERTAIN / np.sqrt(counted.sum())
+    return max(level, each) if certain else 1.0
 
 
 def _of_logarithms(
