@@ -20,6 +20,8 @@ _PHASE = r"(phase|ph|phi|angle|arg|deg|degrees|∠)"
 _SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db|dbv)"
 # what stands beside a response and is none
 _BESIDE = r"(gamma\d*|coh|coherence|kohärenz|count|averages|n|no|#)"
+# a power, and a phase that is counted the other way
+_SQUARED, _LAG = r"(\^2|\*\*2|²|squared|power|psd)", r"lag"
 # phases that are within this size may be radians, unwrapped
 _FEW_RADIANS = 30.0
 
@@ -72,6 +74,10 @@ def complex_of(frame: pd.DataFrame, names: Sequence[str], units: Mapping[str, st
     magnitude = numbers_of(frame, size)
     if _in_decibel(size, units):
         magnitude = from_decibel(magnitude)
+    elif re.search(_SQUARED, size.casefold()):
+        raise InputError(
+            f"column {size!r} holds powers; a response needs magnitudes: write its square root"
+        )
     elif (magnitude < 0).any():
         raise InputError(
             f"column {size!r} is below zero, as magnitudes in dB are; name it {size} [dB], or real "
@@ -143,7 +149,9 @@ def _radians(frame: pd.DataFrame, phase: str, units: Mapping[str, str]) -> Float
             f"column {phase!r} may be in degrees or in radians; name it {phase} [deg] or "
             f"{phase} [rad]"
         )
-    return turn if radians else np.deg2rad(turn)
+    turn = turn if radians else np.deg2rad(turn)
+    # a lag of 90 degrees is a phase of −90
+    return -turn if all_of([phase], _LAG) else turn
 
 
 def _written(frame: pd.DataFrame, name: str) -> ComplexArray:

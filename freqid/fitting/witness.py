@@ -241,7 +241,7 @@ def weighted_by(
                 weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
             left = errors_of(model, r) if isinstance(r.data, Record) else None
             # weights that are not needed would add their own scatter
-            if left is not None and (every or not evenly_spread(left.error)):
+            if left is not None and (every or not evenly_spread(left.error, together=True)):
                 weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))
     return weighted
 

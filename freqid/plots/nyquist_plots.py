@@ -52,7 +52,8 @@ def nyquist(
                 G = frf.response[pair]
                 name, look = _of_pair(frf, label, style, pair, styles is None)
                 colour = look.get("color")
-                ax.plot(G.real, G.imag, label=name, **look)
+                # a single line makes no curve
+                ax.plot(G.real, G.imag, label=name, marker="o" if len(G) == 1 else None, **look)
                 for tick in ticks or ():
                     f = tick / UNITS[unit]
                     if not frf.frequency[0] <= f <= frf.frequency[-1]:

@@ -191,3 +191,16 @@ def test_responses_of_no_numbers_are_refused(tmp_path):
     path.write_text("f,mag,phase [mrad]\n1,2,3\n2,3,4\n3,4,5\n")
     with pytest.raises(ValueError, match="'mrad'"):
         fq.read_response(path)
+
+
+def test_a_phase_lag_is_turned_and_powers_are_refused(frf, tmp_path):
+    """Both were read as they stood: the wrong sign, and squares."""
+    G = frf.response[0, 0]
+    path = tmp_path / "frf.csv"
+    lag = -np.rad2deg(np.unwrap(np.angle(G)))
+    path.write_text("f [Hz],magnitude,phase lag [deg]\n" + table([F, np.abs(G), lag]))
+    np.testing.assert_allclose(fq.read_response(path).response[0, 0], G, rtol=1e-9)
+    for name in ("|H|^2 mag", "magnitude squared", "power gain"):
+        path.write_text(f"f [Hz],{name},phase [deg]\n" + table([F, np.abs(G) ** 2, -lag]))
+        with pytest.raises(ValueError, match="square root"):
+            fq.read_response(path)

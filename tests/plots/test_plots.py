@@ -171,6 +171,12 @@ def test_a_comparison_zooms_into_its_worst_stretch(plant, slow):
     plt.close("all")
 
 
+def test_a_single_line_is_a_dot_in_the_complex_plane():
+    """There was nothing to be seen."""
+    ax = fq.nyquist(fq.FrequencyResponse([2.0], [1 - 1j]))
+    assert [line.get_marker() for line in ax.lines] == ["o"]
+
+
 def test_nyquist_curves_of_several_channels_can_be_told_apart():
     plant = fq.drivetrain(2, outputs=("motor velocity", "arm velocity"))
     ax = fq.nyquist(plant, plant.with_values(d1=20.0), labels=["before", "after"])

@@ -25,13 +25,13 @@ from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
-from freqid.fitting.suspects.order import LIKELY, evidence, ordered, outdone
+from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import Asked, Glance, of_several, score
+from freqid.fitting.suspects.scores import Asked, Glance, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import constant, silent, unheard
 from freqid.fitting.suspects.spread import compared
@@ -112,9 +112,7 @@ class Inquiry:
             told = [(c, t) for c, t in tried if t and (t.size > 0 or not c.onesided)]
             if told:
                 c, t = min(told, key=lambda pair: (pair[1].p_value, -pair[1].gain))
-                p = max(min(of_several(t.p_value, c.trials), 1.0), c.chance)
-                much = abs(t.size) >= c.harmful
-                found.append(Asked(name, t, c.unit, p, c.detail, c.trials, c.certain, much))
+                found.append(Asked.of(name, c, t))
         found = asked_again(self, scene, found, self._std)
         found += unlike(self, scene)
         found = midway(self, scene, found)
@@ -184,7 +182,7 @@ class Inquiry:
         # a fault that explains what is left leaves no room for a loop
         runaway = bool((self.model.poles.real > 0).any()) and not self.model.dt
         alike = "unlike experiments" not in merged and self.share is None
-        if not alike or (ranked[0].name not in ("another mode", "feedback") and not runaway):
+        if not alike or (ranked[0].name not in (*LACKING, "feedback") and not runaway):
             return ranked
         loop = looped(self, scene, limit)
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
@@ -247,7 +245,7 @@ class Inquiry:
             what = f"the data contradict {', '.join(sorted(holds))}"
             what += f"; {a.detail} explains them better" if a.detail else ""
         else:
-            what = words(a.name, a.test.size, a.unit, a.detail)
+            what = words(a.name, a.test.size, a.unit, a.detail, a.channel)
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
         if a.name == "another mode" and all(_equally_weighted(r) for r in self.readings):
             text += "; where errors are a share of the response, fit with error='log'"

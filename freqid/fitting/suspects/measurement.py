@@ -56,7 +56,15 @@ def _shapes(scene: Scene, shape, unit: str) -> Columns | None:  # type: ignore[n
         rows[at : at + p] = s.sampled(every)
         at += p
         drawn.append(rows)
-    return Columns(drawn, unit)
+    return Columns(drawn, unit, channels=_channels(scene))
+
+
+def _channels(scene: Scene, each: int = 1) -> list[str]:
+    """The output of each column in words, ``each`` of them an output; none where it is the only
+    one.
+    """
+    names = [n for s in scene.seen for n in s.reading.data.output_names for _ in range(each)]
+    return [f"output {n!r}" for n in names] if scene.seen[0].n_outputs > 1 else []
 
 
 @suspect("spikes")
@@ -89,7 +97,7 @@ def spikes(scene: Scene, model: Model) -> list[Columns]:
         where_in_time += (
             ", an end of a decimated record: decimate(n, keep_input=True) keeps what was folded"
         )
-    return [Columns(drawn, "", count, where_in_time)]
+    return [Columns(drawn, "", count, where_in_time, channels=_channels(scene)[o : o + 1])]
 
 
 def _faster_held(record: Record) -> bool:
@@ -127,7 +135,9 @@ def tone(scene: Scene, model: Model) -> Columns | None:
         drawn.append(s.rows_of(waves))
     # between the lines there are as many places again; beside its neighbours it is but this one
     chance = float(scipy.stats.f.sf(above, 2, 2 * _NEIGHBOURS))
-    return Columns(drawn, "", rows, f"at {omega / (2 * np.pi):.4g} Hz", chance=chance)
+    channels = _channels(scene, 2)
+    place = f"at {omega / (2 * np.pi):.4g} Hz"
+    return Columns(drawn, "", rows, place, chance=chance, channels=channels)
 
 
 def _sticking_out(s: Seen) -> list[tuple[float, float]]:
@@ -189,7 +199,8 @@ def saturation(scene: Scene, model: Model) -> list[Columns]:
                 ends.append(alone)
         drawn.append(np.array(rows))
     if found:
-        return [Columns(drawn, certain=certain, onesided=not certain)]
+        channels = _channels(scene, 2)[: len(drawn[0])]
+        return [Columns(drawn, certain=certain, onesided=not certain, channels=channels)]
     return [Columns(alone, "", len(ends), _INSIDE, onesided=True) for alone in ends]
 
 

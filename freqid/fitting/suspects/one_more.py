@@ -38,6 +38,8 @@ from freqid.models import DiscreteModel, GreyBox, observed_order
 _LINES = 3000
 # level of a gain that is worth a way to its end, and the part of it that a short way has to show
 _RARE, _PART = 1e-3, 0.6
+# part of a larger box's gain that one of the plant's own order has to make to be as good
+_AS_MUCH = 0.9
 # part of a line's noise that is left at least
 _KEPT = 0.1
 
@@ -148,8 +150,17 @@ class _Comparison:
         test = Score(f, degrees, p, np.nan, 1.0, np.nan, gain)
         found = Asked("another mode", test, "", p, trials=int(places))
         if isinstance(inquiry.model, GreyBox):
-            return found
+            alike = p < _RARE and self._without_a_mode(weighted, told[0][0])
+            return dataclasses.replace(found, name="structure") if alike else found
         return _weighed(found, inquiry, scene, begun.on(inquiry.readings))
+
+    def _without_a_mode(self, readings: Sequence[Reading], more: float) -> bool:
+        """Whether a black box of the plant's own order explains as much: it lacks no mode then."""
+        try:
+            alike = Reference.of(self.model, readings, _LINES).on(readings)
+        except (InputError, np.linalg.LinAlgError):
+            return False
+        return self._least(readings) / alike.cost - 1 > _AS_MUCH * more
 
     def _least(self, readings: Sequence[Reading]) -> float:
         """What the model leaves of readings that are weighted in another way."""

@@ -25,10 +25,12 @@ BENT, _HALF = ("friction", "nonlinear"), 0.5
 _SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
 # part of what a turned channel leaves that a delay has to leave to be said instead
 _LATE = 0.5
+# that a model lacks something, which only what is simpler can say better
+LACKING = ("another mode", "structure")
 # what a sharp mode looks like from near: it has to explain more
 _NARROW = ("unsteady", "tone")
 # faults of a sensor leave room for a plant that changes, and a mode that moves looks like two
-_BESIDE = ("unsteady", "another mode", "offset", "drift", "spikes", "saturation", "tone")
+_BESIDE = ("unsteady", *LACKING, "offset", "drift", "spikes", "saturation", "tone")
 
 
 def evidence(scene: Scene, a: Asked) -> float:
@@ -72,7 +74,7 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
     if ranked[0].name in likely:
         equal.sort(key=lambda a: likely.index(a.name))
         ranked = [*equal, *(a for a in ranked if a not in equal)]
-    if ranked[0].name == "another mode":
+    if ranked[0].name in LACKING:
         enough = _AS_MUCH * ranked[0].test.gain
         simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name not in _NARROW]
         # a wrong hold leaves what no hold explains as well; its evidence tells how sure it is

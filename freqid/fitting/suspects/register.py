@@ -20,7 +20,7 @@ class Columns:
     ``beside`` are columns that are free, too, and explain nothing of it. ``certain`` is what the
     data themselves show, however little it explains. Lines are weighed by the noise unless
     ``alike``. ``chance`` is what the data themselves allow at least, ``harmful`` the size that
-    makes a black box another.
+    makes a black box another. ``channels`` are the outputs of its columns, where there are several.
     """
 
     columns: Sequence[FloatArray]
@@ -33,6 +33,7 @@ class Columns:
     chance: float = 0.0
     onesided: bool = False
     harmful: float = math.inf
+    channels: Sequence[str] = ()
 
 
 Drawn = Columns | Sequence[Columns] | None

@@ -36,10 +36,10 @@ _GLANCE, _MANY = 0.05, 4000
 class Score:
     """A test: ``statistic`` on ``degrees`` of freedom (F), ``p_value``, and what it is about.
 
-    ``size`` in its own unit, that of the largest where there are several; ``power`` is the part of
-    it that the parameters leave to be seen; ``largest_shift`` what it would do to a parameter, in
-    standard errors, and ``largest_change`` the same as a part of the parameter. ``gain`` is what it
-    explains of the cost.
+    ``size`` in its own unit, that of number ``largest`` where there are several; ``power`` is the
+    part of it that the parameters leave to be seen; ``largest_shift`` what it would do to a
+    parameter, in standard errors, and ``largest_change`` the same as a part of the parameter.
+    ``gain`` is what it explains of the cost.
     """
 
     statistic: float
@@ -50,6 +50,7 @@ class Score:
     largest_shift: float
     gain: float
     largest_change: float = float("nan")
+    largest: int = 0
 
     @property
     def chi(self) -> float:
@@ -62,8 +63,9 @@ class Asked:
     """A suspect with its test, its unit, what it was found at, and its corrected p.
 
     What is ``certain`` the data themselves show, however little it explains; ``odd`` is a hold that
-    no converter has. ``harm`` is the part of the data's energy that a black box lacks for it,
-    infinite where its modes move; ``much`` says that its size makes a black box another.
+    no converter has; ``channel`` is the output that it is said of. ``harm`` is the part of the
+    data's energy that a black box lacks for it, infinite where its modes move; ``much`` says that
+    its size makes a black box another.
     """
 
     name: str
@@ -76,6 +78,17 @@ class Asked:
     much: bool = False
     odd: bool = False
     harm: float = float("nan")
+    channel: str = ""
+
+    @classmethod
+    def of(cls, name: str, drawn: Columns, test: Score) -> Asked:
+        """What was drawn, with its test, its p that of all places in which it was looked for."""
+        p = max(min(of_several(test.p_value, drawn.trials), 1.0), drawn.chance)
+        return cls(
+            name, test, drawn.unit, p, drawn.detail, drawn.trials, drawn.certain,
+            much=abs(test.size) >= drawn.harmful,
+            channel=drawn.channels[test.largest] if drawn.channels else "",
+        )  # fmt: skip
 
 
 def of_several(p: float, trials: int) -> float:
@@ -98,6 +111,7 @@ def score(
     size = np.linalg.norm(raw, axis=1)
     if not np.isfinite(size).all() or not (size > 0).any():
         return None
+    drawn_at = np.flatnonzero(size > 0)
     raw, columns = raw[size > 0], [c[size > 0] for c in columns]
     size = size[size > 0]
     clear = scene.clear(columns) / size[:, None]
@@ -132,9 +146,11 @@ def score(
     largest = float(np.nanmax(shift[np.isfinite(shift)], initial=0.0))
     sizes = delta / size
     p = float(scipy.special.fdtrc(chance.degrees, freedom, chi / q))
-    biggest = float(sizes[np.argmax(np.abs(delta))])
+    # delta is what each makes of the data
+    most = int(np.argmax(np.abs(delta)))
     change = scene.relative(moved)
-    return Score(chi / q, q, p, biggest, power, largest, gain, change)
+    at = int(drawn_at[most])
+    return Score(chi / q, q, p, float(sizes[most]), power, largest, gain, change, at)
 
 
 def _weighed(

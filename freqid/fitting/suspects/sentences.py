@@ -34,6 +34,10 @@ CURES = {
     "amplitude": "the plant is not linear: identify it at the level at which it will work",
     "unsteady": "see est.spread, fit the halves apart, and find out what has changed",
     "unexplained": "it lacks something: a delay, a mode, another structure",
+    "structure": (
+        "no mode is missing: check the scale and the sign of each channel, what the model ties or "
+        "fixes, and what it holds to be zero"
+    ),
     "another mode": (
         "give the model one more mode, a black box a higher order, or narrow the band"
     ),
@@ -49,20 +53,25 @@ def sentence(kind: str, what: str, test: Score, p: float, freedom: int) -> str:
     return f"{what} ({certain}){moved}; {CURES[kind]}"
 
 
-def words(name: str, size: float, unit: str, detail: str) -> str:
-    """What a suspect says of the data, in words."""
+def words(name: str, size: float, unit: str, detail: str, channel: str = "") -> str:
+    """What a suspect says of the data, of one output where there are several, in words."""
     number = f"{size:.3g}{unit}"
     level = f", by about {float(f'{size:.2g}'):+g} % from small motions to these" if unit else ""
     halves = f" by {100 * abs(size):.3g} % of {detail or 'a parameter'}" if unit else ""
     parameter = f" of {detail}" if detail else ""
+    one, of, to = (
+        "an output",
+        f" of {channel}" if channel else "",
+        f" to {channel}" if channel else "",
+    )
     return {
         "delay": f"{detail or 'the input'} {acts(size)} than the model says",
         "feedthrough": f"the input reaches an output at once, by {number}",
-        "offset": f"an output has a constant of {number} added",
-        "drift": f"an output drifts by {number}",
-        "spikes": f"one sample is off by {number} {detail}",
-        "tone": f"a sine of {number} {detail} is added that the input does not have",
-        "saturation": f"{detail or 'an output stays at one extreme value'}, as at a limit",
+        "offset": f"{channel or 'an output'} has a constant of {number} added",
+        "drift": f"{channel or 'an output'} drifts by {number}",
+        "spikes": f"one sample{of} is off by {number} {detail}",
+        "tone": f"a sine of {number} {detail} is added{to} that the input does not have",
+        "saturation": f"{detail or f'{channel or one} stays at one extreme value'}, as at a limit",
         # a sensor that looks the other way makes it negative
         "friction": f"a friction of {abs(size):.3g}{unit} {detail}",
         "nonlinear": f"the plant is not linear: {detail}{level}",
@@ -73,6 +82,7 @@ def words(name: str, size: float, unit: str, detail: str) -> str:
         "amplitude": "the parameters change with the level of the input",
         "unsteady": f"the second half of the record differs from the first{halves}",
         "unexplained": f"{detail} explain more of the output than the model makes of them",
+        "structure": "a black box of the model's own order explains the data better",
         "another mode": detail or "a black box with one mode more explains the data better",
     }[name]
 

@@ -6,17 +6,15 @@ of its order, which takes milliseconds, says beforehand where that is in vain.
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import Any, cast
+from functools import cached_property
+from typing import cast
 
 import numpy as np
 import scipy
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record, StampedRecord
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -28,6 +26,7 @@ from freqid.fitting.search.descent import INTERRUPTED
 from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.turns import Turn, all_turns
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.models import GreyBox
 
@@ -40,23 +39,14 @@ _MORE, _CHANCE = 4.0, 1e-6
 _MOST, _NEAR = 0.7, 4.0
 # the same where values alone speak against a fit: no more than so much may be left
 _AS_GOOD = 1.1
-# starts of the fits to the data turned back, channels that are turned one by one at the most, and
-# lines of a black box
-_STARTS, _CHANNELS, _LINES = 3, 8, 600
+# starts of the fits to the data turned back, and lines of a black box
+_STARTS, _LINES = 3, 600
+# turns that are followed from all starts
+_FOLLOWED = 2
 # standard errors by which a value is not physical for certain
 _CERTAIN = 2.0
-_SIDES = {"y": "output", "u": "input"}
 # part of an output left that may mean trouble, and that from which no black box has to say so
 _LEFT, _MOST_LEFT = 0.05, 0.3
-
-
-@dataclass(frozen=True)
-class _Turn:
-    """A kind of warning, what it says, how a reading is turned back."""
-
-    kind: str
-    what: str
-    back: Callable[[Reading], Reading]
 
 
 def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Finding]:
@@ -78,8 +68,8 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
     unphysical = _unphysical(inquiry.minimum, model) or (hidden and asked.share < _BETTER)
     if not (unphysical or quiet or asked.shares.max() > _LEFT):
         return []
-    best: tuple[float, _Turn] | None = None
-    for turn in _turns(model, inquiry.readings[0].data):
+    best: tuple[float, Turn] | None = None
+    for turn in _likeliest(all_turns(model, inquiry.readings[0].data), begun, inquiry.readings):
         try:
             readings = [turn.back(r) for r in inquiry.readings]
             if not unphysical and not asked.worth(model, readings, turn.kind):
@@ -227,55 +217,16 @@ def _room(scene: Scene) -> float:
     return float(scene.variance.sum() / max(scene.variance.max(), 1e-300))
 
 
-def _turns(model: GreyBox, data: DataSet) -> list[_Turn]:
-    """All outputs of the other sign, input and output exchanged, single channels of the other."""
-    sign = "of the opposite sign of the model's"
-    found = [_Turn("wrong sign", f"the outputs are {sign}", _negated)]
-    if model.n_inputs == model.n_outputs == 1:
-        return [*found, _Turn("swapped channels", "input and output are exchanged", _exchanged)]
-    if model.n_inputs + model.n_outputs > _CHANNELS:
-        return found
-    for side, names in (("y", data.output_names), ("u", data.input_names)):
-        for i, name in enumerate(names if len(names) > 1 else ()):
-            back = partial(_negated, side=side, channel=i)
-            found.append(_Turn("wrong sign", f"{_SIDES[side]} {name!r} is {sign}", back))
-    return found
-
-
-def _negated(r: Reading, side: str = "y", channel: int | None = None) -> Reading:
-    data = r.data
-    taken = slice(None) if channel is None else channel
-    if isinstance(data, FrequencyResponse):
-        return r.with_(data=_negated_response(data, side, taken))
-    # a log's samples stand beside those of its grid
-    names = {f"{side}_logged"} if isinstance(data, StampedRecord) else set()
-    signals: dict[str, Any] = {}
-    for name in names | {side}:
-        signal = np.array(getattr(data, name), dtype=float)
-        signal[..., taken] *= -1
-        signals[name] = signal
-    return r.with_(data=dataclasses.replace(data, **signals))
-
-
-def _negated_response(data: FrequencyResponse, side: str, taken: int | slice) -> FrequencyResponse:
-    signs = np.ones(data.response.shape[0]), np.ones(data.response.shape[1])
-    signs[0 if side == "y" else 1][taken] = -1
-    response = data.response * np.outer(*signs)[..., None]
-    if not isinstance(data, PeriodicResponse):
-        return dataclasses.replace(data, response=response)
-    # outputs come first in the noise
-    both = np.concatenate(signs)
-    return dataclasses.replace(
-        data, response=response, outputs=data.outputs * signs[0][:, None, None],
-        inputs=data.inputs * signs[1][:, None, None], noise=data.noise * np.outer(both, both),
-    )  # fmt: skip
-
-
-def _exchanged(r: Reading) -> Reading:
-    data = r.data
-    if type(data) is not Record or data.factor > 1:
-        raise InputError("only records of one rate can have their channels exchanged")
-    turned = dataclasses.replace(
-        data, u=data.y, y=data.u, input_names=data.output_names, output_names=data.input_names
-    )
-    return r.with_(data=turned)
+def _likeliest(turns: list[Turn], begun: GreyBox, readings: Sequence[Reading]) -> Sequence[Turn]:
+    """Of many those that leave least from one start: where no turn is right each takes its time."""
+    if len(turns) <= _FOLLOWED:
+        return turns
+    left: list[tuple[float, Turn]] = []
+    for turn in turns:
+        try:
+            back = [turn.back(r) for r in readings]
+            est = fitter_of(begun)(begun, back, SearchOptions(n_starts=1))
+        except (InputError, np.linalg.LinAlgError, ArithmeticError):
+            continue
+        left.append((float(shares(est.minimum, None)[0]), turn))
+    return [turn for _, turn in sorted(left, key=lambda pair: pair[0])[:_FOLLOWED]]

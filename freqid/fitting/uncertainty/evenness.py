@@ -45,11 +45,16 @@ def is_white(residual: FloatArray, e: SpectralExperiment) -> bool:
     return evenly_spread(each[:, e.lines.counted])
 
 
-def evenly_spread(error: ComplexArray) -> bool:
-    """Whether the power of errors (channels, K) is spread evenly over the lines.
+def evenly_spread(error: ComplexArray, together: bool = False) -> bool:
+    """Whether the power of errors (channels, K) is spread evenly over the lines, and where they are
+    taken ``together`` over channels.
 
     Each of several channels may be the odd one.
     """
+    if together and len(error) > 1:
+        counts = np.full(len(error), 2 * error.shape[-1])
+        if not alike((np.abs(error) ** 2).mean(axis=-1) / 2, counts):
+            return False
     return bool((levels_of_evenness(error) >= _LEVEL / len(error)).all())
 
 
