@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, numbers
 from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record, StampedRecord
-from freqid.fitting.uncertainty.noise_spectrum import noise_weights
+from freqid.fitting.uncertainty.noise_spectrum import noise_weights, settled
 
 
 class NoiseModel(ABC):
@@ -91,7 +91,7 @@ class ResponseNoise(NoiseModel):
     def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
         assert isinstance(data, FrequencyResponse)
         assert data.variance is not None
-        return 1 / data.variance
+        return 1 / settled(data.variance)
 
 
 @dataclass(frozen=True, eq=False)

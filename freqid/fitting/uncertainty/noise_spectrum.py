@@ -9,6 +9,9 @@ from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.uncertainty.evenness import evenly_spread
 
+# median step of the logarithm of variances from line to line above which they are those of a few
+# averages (of ten 0.3), and by how much one is above its neighbours that is none of theirs
+_SCATTERED, _TONE = 0.2, 6.0
 # autoregressions of at most this order, and lines that each order needs
 _ORDERS, _ORDER_LINES = 8, 15
 
@@ -24,6 +27,25 @@ def smoothed_power(error: ComplexArray) -> FloatArray:
     K = power.shape[-1]
     shape = _autoregressive(power.reshape(-1, K)).reshape(power.shape)
     return shape * local_mean(power / shape)
+
+
+def settled(variance: FloatArray) -> FloatArray:
+    """Variances (…, K) of lines, those of a few averages as their neighbours have them: as they are
+    they scatter from line to line, and the lines that they are too small at would count for most.
+
+    One that is far above its neighbours is a tone's, and stays.
+    """
+    if variance.shape[-1] < _ORDER_LINES or not (variance > 0).all():
+        return variance
+    scatter = np.median(np.abs(np.diff(np.log(variance), axis=-1)), axis=-1, keepdims=True)
+    if not (scatter > _SCATTERED).any():
+        return variance
+    size = (1,) * (variance.ndim - 1) + (2 * int(np.sqrt(variance.shape[-1])) + 1,)
+    middle = scipy.ndimage.median_filter(variance, size, mode="reflect")
+    alone = variance > _TONE * middle
+    # a tone would lift its neighbours
+    smooth = smoothed_power(np.sqrt(np.where(alone, middle, variance)).astype(complex))
+    return np.asarray(np.where((scatter > _SCATTERED) & ~alone, smooth, variance))
 
 
 def _spectrum(error: ComplexArray) -> FloatArray:
