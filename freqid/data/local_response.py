@@ -77,9 +77,10 @@ def noise_that_is_told(frf: FrequencyResponse) -> LineNoise | OwnNoise | None:
     """
     if isinstance(frf, LocalResponse) and frf.line_noise is not None:
         return frf.line_noise
-    if frf.variance is None or frf.reach or not (frf.variance > 0).all():
+    told = frf.variance
+    if told is None or frf.reach or not (np.isfinite(told) & (told > 0)).all():
         return None
-    return OwnNoise(frf.variance)
+    return OwnNoise(told)
 
 
 class LocalResponse(FrequencyResponse):

@@ -14,8 +14,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import ComplexArray, FloatArray, InputError, choice, numbers
-from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record, StampedRecord
+from freqid.data import (
+    DataSet,
+    FrequencyResponse,
+    LocalResponse,
+    PeriodicResponse,
+    Record,
+    StampedRecord,
+)
 from freqid.fitting.uncertainty.noise_spectrum import noise_weights, settled
+
+# lines on either side of one that a window makes err together
+_NEAR = 2
 
 
 class NoiseModel(ABC):
@@ -91,7 +101,9 @@ class ResponseNoise(NoiseModel):
     def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
         assert isinstance(data, FrequencyResponse)
         assert data.variance is not None
-        return 1 / settled(data.variance)
+        # local models tell theirs by many lines, and large where they miss a resonance
+        alone = data.reach <= _NEAR and not isinstance(data, LocalResponse)
+        return 1 / (settled(data.variance) if alone else data.variance)
 
 
 @dataclass(frozen=True, eq=False)

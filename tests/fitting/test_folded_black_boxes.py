@@ -141,3 +141,18 @@ def test_few_lines_for_many_inputs(factor, slow):
             data, left = record([rate], [1, rate], u, factor, 0.01, seed + 3)
             est = fq.fit(fq.OutputError(1), data)
             assert est.cost < 2 * left, (rate, seed, est.cost / left)
+
+
+@pytest.mark.parametrize("slow_first", [True, False])
+def test_a_record_beside_a_slow_one_may_come_first(slow_first):
+    """An IndexError in the verdict: the period was read off an experiment without aliases."""
+    plant = fq.GreyBox(
+        lambda k, c: ([[0, 1], [-k, -c]], [[0], [1]], [[1.0, 0]], None),
+        [fq.Parameter("k", 400.0), fq.Parameter("c", 4.0)],
+    )
+    made = fq.simulate(plant, fq.white_noise(900, seed=3), 5e-3)
+    made = made.with_noise(0.05 * float(np.std(made.y)), seed=4)
+    both = [made, made.decimate(3, keep_input=True)]
+    est = fq.fit(plant, both[::-1] if slow_first else both)
+    assert est.verdict.grade == "trust"
+    assert est.witness.verdict == "complete"

@@ -79,7 +79,7 @@ def _scattered(
         if rng.random() < 0.5:
             poles[0 : 2 * (order // 2) : 2] = size[: order // 2] * np.exp(1j * turned)
             poles[1 : 2 * (order // 2) : 2] = poles[0 : 2 * (order // 2) : 2].conj()
-        A, _ = with_poles(_plane_of(experiments[0]).points(poles))
+        A, _ = with_poles(_plane_of(experiments).points(poles))
         C = rng.standard_normal((experiments[0].n_channels[0], order))
         found = inputs_and_cost(few, A, C, feedthrough)[1]
         if np.isfinite(found):
@@ -101,7 +101,7 @@ def _lifted(
     columns = [_columns(e, i, experiments) for i, e in enumerate(experiments)]
     Y = np.concatenate([c[0] for c in columns], axis=1)
     V = np.concatenate([c[1] for c in columns], axis=1)
-    few, plane = thinned_to(experiments, _LINES), _plane_of(experiments[0])
+    few, plane = thinned_to(experiments, _LINES), _plane_of(experiments)
     tried: list[tuple[float, FloatArray, FloatArray]] = []
     for rows in _ROWS:
         A, C = spanned(slow.points(np.concatenate(z)), Y, V, order, rows)
@@ -191,8 +191,10 @@ def _period(e: SpectralExperiment) -> float:
     return float(2 * np.pi / (at[1] - at[0]) / e.lines.aliases)
 
 
-def _plane_of(e: SpectralExperiment) -> Plane:
-    """The plane in which an experiment's points are seen."""
+def _plane_of(experiments: Sequence[SpectralExperiment]) -> Plane:
+    """The plane in which the experiments' points are seen."""
+    # one without aliases does not tell the input's period
+    e = next(e for e in experiments if e.lines.aliases > 1)
     z, w = on_circle(e.lines.omega_input.ravel() * _period(e)), e.points.z
     at = int(np.argmax(np.abs(1 - w * z)))
     return Plane(float(((z - w)[at] / (1 - w * z)[at]).real))

@@ -70,8 +70,8 @@ def late(minimum: Minimum, readings: Sequence[Reading], first: float, freedom: i
     tried = [f for i in ways if (f := search.best([i], [np.array([q]) for q in steps]))]
     if len(own) > 1 and tried:
         each = [f.samples * np.array([f.late[0] in (None, i) for i in own]) for f in tried]
-        each.append(np.sum(each[-len(own) :], axis=0))
-        several = search.best(own, each)
+        alone = [e for e, f in zip(each, tried, strict=True) if f.late != [None]]
+        several = search.best(own, [*each, np.sum(alone, axis=0)] if alone else each)
         tried += [several] if several else []
     if not tried:
         return None

@@ -95,7 +95,7 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
     left, turn = best
     text = (
         f"{turn.what}: turned back, {100 * (1 - np.sqrt(left)):.4g} % of the data are explained by "
-        "physical values; turn the channel"
+        f"physical values; {'exchange them' if 'exchanged' in turn.what else 'turn the channel'}"
     )
     return [Finding(turn.kind, text, number=float(left))]
 

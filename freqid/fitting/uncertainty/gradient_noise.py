@@ -24,6 +24,8 @@ _VALUES = 10
 _TOLD = 1e-14
 # standard errors by which variances are too large for certain
 _CERTAIN = 4.0
+# leverage from which a line may be all but a parameter's own
+_ALONE = 0.5
 # leverage that is believed at the most
 MOST_LEVERAGE = 0.9
 
@@ -218,20 +220,20 @@ def _of_response(
 
     Its size is each line's own, divided by what the fit leaves of it (MacKinnon and White's HC3, J.
     Econometrics 29, 1985): a resonance that few lines tell has noise like none of its neighbours.
-    Within the ``reach`` of a line noise goes together as it does on average. Where its variance is
-    told that counts, which few lines that tell a resonance leave no sign of, and in a response by
-    local models as these take it from the outputs' lines.
+    Within the ``reach`` of a line noise goes together as it does on average. A variance that is
+    told counts, and in a response by local models as these take it from the outputs' lines.
     """
     error, lines = residual.view(complex), scale.shape[-1]
     at = J[:, ::2] + 1j * J[:, 1::2]
     if noise is not None:
         wider = _against_what_is_told(error, scale**2 * noise.variance)
         return wider * noise.along(at.reshape(len(at), *scale.shape) * scale)
-    gram = J @ J.T
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    lever = np.einsum("ak,ab,bk->k", at.conj(), half, at).real / 2
-    left = error / np.maximum(1 - lever, 0.1)
+    lever = leverage(J, np.zeros((0, J.shape[1])))[::2]
+    left = error / (1 - lever)
+    # a line that a parameter has all but to itself leaves nothing that tells: no less than all do
+    by_all = np.sqrt(np.mean(np.abs(error) ** 2) / (1 - np.mean(lever)))
+    low = (lever > _ALONE) & (np.abs(left) < by_all)
+    left[low] *= by_all / np.maximum(np.abs(left[low]), 1e-300)
     total: FloatArray = (np.abs(left) ** 2 * at.conj() @ at.T).real / 2
     if not reach:
         return total

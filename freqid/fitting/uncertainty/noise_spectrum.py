@@ -35,7 +35,8 @@ def settled(variance: FloatArray) -> FloatArray:
 
     One that is far above its neighbours is a tone's, and stays.
     """
-    if variance.shape[-1] < _ORDER_LINES or not (variance > 0).all():
+    known = np.isfinite(variance) & (variance > 0)
+    if variance.shape[-1] < _ORDER_LINES or not known.all():
         return variance
     scatter = np.median(np.abs(np.diff(np.log(variance), axis=-1)), axis=-1, keepdims=True)
     if not (scatter > _SCATTERED).any():
