@@ -226,7 +226,7 @@ def _of_response(
     error, lines = residual.view(complex), scale.shape[-1]
     at = J[:, ::2] + 1j * J[:, 1::2]
     if noise is not None:
-        wider = _against_what_is_told(error, scale**2 * noise.variance)
+        wider = _against_what_is_told(error, scale**2 * noise.variance, reach)
         return wider * noise.along(at.reshape(len(at), *scale.shape) * scale)
     lever = leverage(J, np.zeros((0, J.shape[1])))[::2]
     left = error / (1 - lever)
@@ -251,9 +251,9 @@ def _of_response(
     return total
 
 
-def _against_what_is_told(error: ComplexArray, told: FloatArray) -> float:
+def _against_what_is_told(error: ComplexArray, told: FloatArray, reach: int) -> float:
     """By how much the variances of errors (rows,) are larger than those that are ``told``, or
-    smaller at all lines alike.
+    smaller at all lines alike; those within the ``reach`` of a line are no news.
 
     Noise moves denominators, and what is left is larger than its first order says.
     """
@@ -266,7 +266,7 @@ def _against_what_is_told(error: ComplexArray, told: FloatArray) -> float:
         return level
     # few lines may make up the sum: only all of them together say that too much was told
     each = float(np.mean(power[counted] / told[counted]))
-    certain = each < 1 - _CERTAIN / np.sqrt(counted.sum())
+    certain = each < 1 - _CERTAIN * np.sqrt((2 * reach + 1) / counted.sum())
     return max(level, each) if certain else 1.0
 
 
