@@ -21,7 +21,7 @@ _SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db|dbv)"
 # what stands beside a response and is none
 _BESIDE = r"(gamma\d*|coh|coherence|kohärenz|count|averages|n|no|#)"
 # a power, and a phase that is counted the other way
-_SQUARED, _LAG = r"(\^2|\*\*2|²|squared|power|psd)", r"lag"
+_SQUARED, _LAG = r"(\^2|\*\*2|²|squared|power (gain|ratio|spectrum)|psd)", r"lag"
 # phases that are within this size may be radians, unwrapped
 _FEW_RADIANS = 30.0
 
@@ -150,8 +150,14 @@ def _radians(frame: pd.DataFrame, phase: str, units: Mapping[str, str]) -> Float
             f"{phase} [rad]"
         )
     turn = turn if radians else np.deg2rad(turn)
+    if not all_of([phase], _LAG):
+        return turn
     # a lag of 90 degrees is a phase of −90
-    return -turn if all_of([phase], _LAG) else turn
+    if np.median(turn) < 0:
+        raise InputError(
+            f"column {phase!r} is below zero, as a phase is and a lag is not; name it phase"
+        )
+    return -turn
 
 
 def _written(frame: pd.DataFrame, name: str) -> ComplexArray:

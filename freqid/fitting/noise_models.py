@@ -93,7 +93,9 @@ class GivenWeights(NoiseModel):
 
 
 class ResponseNoise(NoiseModel):
-    """1/variance of a response, that of its own measurement."""
+    """1/variance of a response, that of its own measurement; one of few averages as its
+    neighbours have it.
+    """
 
     # a complex error of unit variance has half of it in each of its parts
     variance = 0.5

@@ -200,6 +200,11 @@ def test_a_phase_lag_is_turned_and_powers_are_refused(frf, tmp_path):
     lag = -np.rad2deg(np.unwrap(np.angle(G)))
     path.write_text("f [Hz],magnitude,phase lag [deg]\n" + table([F, np.abs(G), lag]))
     np.testing.assert_allclose(fq.read_response(path).response[0, 0], G, rtol=1e-9)
+    path.write_text("f [Hz],magnitude,phase lag [deg]\n" + table([F, np.abs(G), -lag]))
+    with pytest.raises(ValueError, match="name it phase"):
+        fq.read_response(path)
+    path.write_text("f [Hz],power amplifier gain,phase [deg]\n" + table([F, np.abs(G), -lag]))
+    np.testing.assert_allclose(fq.read_response(path).response[0, 0], G, rtol=1e-9)
     for name in ("|H|^2 mag", "magnitude squared", "power gain"):
         path.write_text(f"f [Hz],{name},phase [deg]\n" + table([F, np.abs(G) ** 2, -lag]))
         with pytest.raises(ValueError, match="square root"):

@@ -78,7 +78,10 @@ def test_under_other_inputs_as_well(late, known, told, kind):
 
 def test_a_delay_of_all_inputs_is_said_of_all():
     est = fq.fit(plant(), record([0.013, 0.013], "white", 0.05))
-    assert "every input acts 1" in est.verdict.reasons[0]
+    said = est.verdict.reasons[0]
+    assert float(said.split("every input acts ")[1].split(" ms later")[0]) == pytest.approx(
+        13, 0.05
+    )
 
 
 def test_beside_an_input_whose_delay_is_fitted_the_other_is_named():

@@ -143,3 +143,21 @@ def test_a_plant_that_integrates_is_told_by_how_much_it_is_moved():
     long = fq.fit(plant, fq.h1(made, 4096, band=(1, 100)), weights="noise")
     assert long.verdict.grade == "trust"
     assert np.abs((long.values - [200, 10]) / long.parameters["std"]).max() < 4
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_segments_cut_off_an_integrator_behind_a_measured_input(seed):
+    """Nothing is known of it where its answer is taken from a circle that its pole lies on."""
+    plant = fq.GreyBox(
+        lambda b, a: ([[0, 1], [0, -a]], [[0], [b]], [[1.0, 0]], None),
+        [fq.Parameter("b", 200.0), fq.Parameter("a", 10.0)],
+    )
+    # a smooth input in steps that are eight times finer than the samples
+    smooth = scipy.signal.butter(6, 0.08, output="sos")
+    u = scipy.signal.sosfilt(smooth, np.random.default_rng(seed).standard_normal(16_384 * 8))
+    fine = fq.simulate(plant, u, 2e-3 / 8)
+    made = fq.Record(fine.u[::8], fine.y[::8], 2e-3, hold="bl")
+    made = made.with_noise(0.002 * float(np.std(made.y)), seed=seed)
+    est = fq.fit(plant, fq.h1(made, 512, band=(1, 100)), weights="noise")
+    assert kinds(est)[0] == "short segments"
+    assert 1 < est.warnings[0].number < 4

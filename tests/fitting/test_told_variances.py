@@ -72,7 +72,7 @@ def test_a_line_that_a_parameter_has_to_itself_leaves_no_sign_of_its_noise(lines
 
 @pytest.mark.parametrize("options", [{}, {"weights": "noise"}, {"error": "log"}])
 def test_a_variance_that_is_of_the_wrong_size_is_set_right_by_what_is_left(options):
-    """Ten times too small, or too large at all lines alike."""
+    """A hundred times too small, or too large, at all lines alike."""
     f = np.geomspace(0.5, 100, 300)
     own = fq.fit(begun(), measured(f, 3), **options).parameters["std"]
     for told in (0.01, 100.0):
@@ -83,8 +83,8 @@ def test_a_variance_that_is_of_the_wrong_size_is_set_right_by_what_is_left(optio
 @pytest.mark.study
 @pytest.mark.parametrize("averages", [3, 5])
 def test_variances_of_few_averages_blame_no_model(averages):
-    """Lines at which they happen to be small counted for most: 29 of 60 good fits were doubted
-    ("another mode").
+    """Lines at which they happen to be small counted for most: 17 of 24 good fits were doubted
+    with three averages ("another mode").
     """
     f, doubted, off = np.linspace(1, 60, 250), 0, []
     for seed in range(12):

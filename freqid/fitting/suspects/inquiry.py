@@ -247,7 +247,7 @@ class Inquiry:
         else:
             what = words(a.name, a.test.size, a.unit, a.detail, a.channel)
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
-        if a.name == "another mode" and all(_equally_weighted(r) for r in self.readings):
+        if a.name in LACKING and all(_equally_weighted(r) for r in self.readings):
             text += "; where errors are a share of the response, fit with error='log'"
         small = (
             a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS or a.harm < LITTLE

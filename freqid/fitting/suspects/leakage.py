@@ -17,7 +17,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.suspects.sentences import farthest
-from freqid.lti import Hold, PeriodicHold
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
 from freqid.models import Model, simulate
 
 # standard errors, and part of itself, by which a parameter may be moved without a word
@@ -59,24 +59,27 @@ def _lost(s: Seen, model: Model) -> FloatArray:
     own = s.own(model)
     at = np.round(s.omega_input * length * data.dt / (2 * np.pi)).astype(int)
     hold = s.reading.hold
-    asked = own.responses_at(s.omega_input, None if own.dt else hold)
-    in_step = isinstance(hold, PeriodicHold) and abs(hold.period / data.dt - 1) < _SAME
-    if own.dt or in_step:
-        answer = _impulse_response(own, hold, data.dt, length)
+
+    def held(between: Hold) -> FloatArray:
+        answer = _impulse_response(own, between, data.dt, length)
+        asked = own.responses_at(s.omega_input, None if own.dt else between)
         return s.answered(np.fft.rfft(answer * data.memory)[..., at] - asked)
+
+    if own.dt or (isinstance(hold, PeriodicHold) and abs(hold.period / data.dt - 1) < _SAME):
+        return held(hold)
     padded = np.zeros(_ROOM * length)
     padded[:length] = data.memory
     every = 2 * np.pi / (_ROOM * length * data.dt) * np.arange(_ROOM * length // 2 + 1)
     with np.errstate(all="ignore"):
         G: ComplexArray = own.responses_at(every, hold)
     if not np.isfinite(G).all():
-        # an integrator's answer to a band-limited input has no end
-        return np.zeros(len(s.left))
+        # an integrator's answer has no end, and a hold of one sample changes little of it
+        return held(ZeroOrderHold(data.dt))
     g = np.fft.irfft(G, _ROOM * length)
     # a band-limited input's answer comes as much before as after
     g *= padded + np.roll(padded[::-1], 1) * (np.arange(len(padded)) > 0)
     seen = np.fft.rfft(g)[..., ::_ROOM]
-    return s.answered(seen[..., at] - asked)
+    return s.answered(seen[..., at] - own.responses_at(s.omega_input, hold))
 
 
 def _impulse_response(model: Model, hold: Hold, dt: float, length: int) -> FloatArray:

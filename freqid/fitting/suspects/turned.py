@@ -93,9 +93,10 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
     if best is None:
         return []
     left, turn = best
+    swapped = turn.kind == "swapped channels"
     text = (
         f"{turn.what}: turned back, {100 * (1 - np.sqrt(left)):.4g} % of the data are explained by "
-        f"physical values; {'exchange them' if 'exchanged' in turn.what else 'turn the channel'}"
+        f"physical values; {'exchange them' if swapped else 'turn the channel'}"
     )
     return [Finding(turn.kind, text, number=float(left))]
 
