@@ -25,7 +25,8 @@ class SearchOptions:
 
     ``estimated_hold`` makes the period of a zero-order hold one more unknown, ``separate`` those
     parameters that each experiment has for itself. A ``refit`` begins
-    next to its minimum: it walks there on the cost itself, and ``meant`` is where the user began.
+    next to its minimum: it walks there on the cost itself, and ``meant`` is where the user began;
+    a black box walks there from the estimate ``before``.
     """
 
     n_starts: int | None = None
@@ -35,6 +36,7 @@ class SearchOptions:
     separate: Sequence[str] = ()
     refit: bool = False
     meant: Mapping[str, float] | None = None
+    before: Estimate | None = None
 
 
 Fitter = Callable[[Any, Sequence[Reading], SearchOptions], Estimate]

@@ -25,6 +25,8 @@ from freqid.models import GreyBox
 # fits with the noise of the one before, and the part of a standard error that ends them
 _NOISE_ROUNDS = 8
 _STANDS = 0.01
+# part of the cost by which another start's end is another minimum
+_DEEPER = 1e-6
 # the same of black boxes, and the lines that these are found on
 _BOX_ROUNDS, _LINES = 3, 3000
 
@@ -66,17 +68,30 @@ def _in_turn(
     model: object, readings: Sequence[Reading], options: SearchOptions
 ) -> tuple[Estimate, Estimate, Sequence[Reading]]:
     """The first estimate, the one that stands, and the readings by whose noise it was found."""
-    first = est = fitter_of(model)(model, readings, options)
-    for _ in range(_NOISE_ROUNDS):
+    fit = fitter_of(model)
+    first = est = whole = fit(model, readings, options)
+    for i in range(_NOISE_ROUNDS):
         if est.message == INTERRUPTED:
-            break
+            return first, est, readings
         readings = [_learnt(est, r, options.estimated_hold) for r in readings]
-        before = est
-        est = fitter_of(model)(model, readings, again(est, options))
-        std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
-        if (np.abs(est.values - before.values) <= _STANDS * std).all():
+        before, anew = est, again(est, options)
+        # a black box begins by itself where noise is first told, and walks from there
+        walks = anew.start is None and i > 0
+        est = fit(model, readings, dataclasses.replace(anew, before=before) if walks else anew)
+        whole = whole if walks else est
+        if _stands(est, before):
             break
+    if not _stands(est, whole):
+        # what is noise has changed on the way, and with it perhaps which minimum is the least
+        other = fit(model, readings, anew)
+        est = other if other.cost < est.cost * (1 - _DEEPER) else est
     return first, est, readings
+
+
+def _stands(est: Estimate, before: Estimate) -> bool:
+    """Whether a round has moved nothing."""
+    std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
+    return bool((np.abs(est.values - before.values) <= _STANDS * std).all())
 
 
 def _lack(est: Estimate) -> float:

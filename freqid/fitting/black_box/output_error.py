@@ -9,11 +9,12 @@ import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
-from freqid.fitting.black_box.order_minimum import HIGH, Orders, descended
+from freqid.fitting.black_box.channel_units import Descent
+from freqid.fitting.black_box.order_minimum import HIGH, Orders, descended, within_circle
 from freqid.fitting.black_box.refinement import LINES, first_model, nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.black_box.stability_edge import at_the_edge, held_back, pressed
-from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
@@ -54,7 +55,10 @@ def fit_output_error(
     asked, seed = (options.n_starts, options.seed) if options else (None, 0)
     more = None if asked is None else asked - 1
     told_apart(lines)
-    chart, solution, objective = Orders(lines, plane, dt, more, seed, count).least(spec)
+    if options is not None and options.before is not None:
+        chart, solution, objective = _next_to(options.before, spec, lines, plane)
+    else:
+        chart, solution, objective = Orders(lines, plane, dt, more, seed, count).least(spec)
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
@@ -79,6 +83,17 @@ def fit_output_error(
     if edge is not None:
         est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution)])
     return dataclasses.replace(est, n_starts=asked or 1)
+
+
+def _next_to(
+    before: Estimate, spec: OutputError, lines: Sequence[SpectralExperiment], plane: Plane
+) -> Descent:
+    """The minimum next to an estimate from the same data, weighted in another way."""
+    chart = before.minimum.structure
+    assert isinstance(chart, Chart)
+    centre = to_plane(chart.in_z(before.minimum.x), plane)
+    centre = within_circle(centre) if spec.stable else centre
+    return descended(Chart(centre, spec.feedthrough, plane, chart.dt, stable=spec.stable), lines)
 
 
 def _enough_lines(

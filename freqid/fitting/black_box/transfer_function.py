@@ -92,7 +92,11 @@ def fit_transfer_function(
             solution = polish(objective, structure.start, limit=_DESCENT)
             ends.append((solution, objective, delay))
 
-    for delay in _delays(spec, readings, omega, unit):
+    before = None if options is None else options.before
+    if before is not None:
+        near = Objective(before.minimum.structure, experiments)
+        ends.append((polish(near, before.minimum.x, limit=_DESCENT), near, 0.0))
+    for delay in [] if before is not None else _delays(spec, readings, omega, unit):
         for poles in _starting_poles(spec, readings, omega, delay):
             descend(poles, delay)
     if not ends:
