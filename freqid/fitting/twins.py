@@ -28,8 +28,9 @@ from freqid.models import GreyBox
 _EQUAL, _COST = 1e-8, 1e-9
 # nepers by which another answer has to be nearer to the start to be worth a look
 _NEARER = 0.05
-# a start that is nearer to one answer by a factor of two, over all parameters, tells which is meant
-_TOLD = float(np.log(2))
+# a start that is nearer to one answer by a factor of two, over all parameters, tells which is
+# meant, or one from which the other answer is so many times as far
+_TOLD, _TIMES = float(np.log(2)), 3.0
 # nepers of a change of sign
 _FARTHEST = 1e3
 # standard errors by which values differ
@@ -85,12 +86,10 @@ def _twins(
     start = [structure.meant[name] for name in names]
     values = (x * structure.scale).tolist()
     for exchange in _exchanges(tuple(names), tuple(units)):
-        farther_by = sum(
-            _apart(start[i], values[j]) - _apart(start[i], values[i])
-            for pair in exchange
-            for i, j in (pair, pair[::-1])
-        )
-        if farther_by > farther:
+        turned = [(i, j) for pair in exchange for i, j in (pair, pair[::-1])]
+        own = sum(_apart(start[i], values[i]) for i, _ in turned)
+        others = sum(_apart(start[i], values[j]) for i, j in turned)
+        if others - own > farther or (farther > 0 and others > _TIMES * own):
             continue
         other = _exchanged(structure, x, exchange)
         if other is not None and _alike(structure, x, other):

@@ -201,7 +201,7 @@ class Inquiry:
         if scene is None:
             nothing = unheard(self.minimum, self.model, self.readings)
             return nothing or turned(self, None) or late_stamps(self.minimum, self.readings)
-        if found := silent(scene):
+        if found := silent(scene, self.minimum, self.model):
             return turned(self, scene, quiet=True) or constant(scene, self.model) or found
         asked = scene, self.model, self._std
         found = leaking(*asked) or still_moving(*asked, self.readings)

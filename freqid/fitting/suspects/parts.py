@@ -53,11 +53,18 @@ def each(readings: Sequence[Reading]) -> Parting:
 
 
 def record_halves(readings: Sequence[Reading], unknowns: int = 1) -> Parting | None:
-    """First and second halves of every record; None where there are none, or too short ones."""
+    """First and second halves of every record; None where there are none, or too short ones, or
+    ones that show nothing.
+    """
     for r in readings:
         if not isinstance(r.data, Record) or r.data.n_samples < 2 * _ENOUGH * unknowns:
             return None
-    return Parting(HALVES, [[_half(r, first) for r in readings] for first in (True, False)])
+    try:
+        halves = [[_half(r, first) for r in readings] for first in (True, False)]
+    except InputError:
+        # the input rests in one of them, as after a blow
+        return None
+    return Parting(HALVES, halves)
 
 
 def confirming(readings: Sequence[Reading], unknowns: int = 1) -> Parting | None:

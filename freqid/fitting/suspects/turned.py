@@ -41,6 +41,8 @@ _MOST, _NEAR = 0.7, 4.0
 _AS_GOOD = 1.1
 # starts of the fits to the data turned back, and lines of a black box
 _STARTS, _LINES = 3, 600
+# part of the gain that the input has to make
+_DRIVEN = 0.5
 # turns that are followed from all starts
 _FOLLOWED = 2
 # standard errors by which a value is not physical for certain
@@ -76,6 +78,7 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
                 continue
             est = fitter_of(model)(begun, readings, options)
             told = asked.explained(est, readings, turn.kind)
+            driven = asked.driven(est, readings, turn.kind)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             continue
         mirrored = any(w.kind == "above Nyquist" for w in est.signs)
@@ -84,7 +87,7 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
         left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
         as_good = est.minimum.exact or left < _AS_GOOD * asked.share
         # of what is not heard values are on either side of zero by chance
-        if not (told or (unphysical and as_good and not quiet)):
+        if not (driven and (told or (unphysical and as_good and not quiet))):
             continue
         if best is None or left < best[0]:
             best = left, turn
@@ -177,6 +180,19 @@ class _Asked:
         if len(own) < 2 or len(self.shares) < 2:
             return left < _BETTER * self.share
         return bool(own[worst] < _BETTER * self.shares[worst])
+
+    def driven(self, est: Estimate, readings: Sequence[Reading], kind: str) -> bool:
+        """Whether most of the gain is what the input does: a smooth input, taken for an output, is
+        a free motion of some plant.
+        """
+        try:
+            scene = Scene.of(est.minimum, readings)
+        except (InputError, np.linalg.LinAlgError, ArithmeticError):
+            return True
+        left = scene.cost / max(scene.energy, 1e-300)
+        rest = sum(float(s.at_rest @ s.at_rest) for s in scene.seen) / max(scene.energy, 1e-300)
+        before = 1.0 if kind == "swapped channels" else self.share
+        return rest - left >= _DRIVEN * (before - left)
 
     @cached_property
     def _boxes(self) -> dict[str, float | None]:
