@@ -19,7 +19,8 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
-from freqid.fitting.reading import Reading, read_for
+from freqid.fitting.reading import Reading
+from freqid.fitting.reading_sets import read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
 from freqid.fitting.sight import gone_with, hold_that_changes, out_of_sight

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from freqid.checks import InputError, of_data
+from freqid.checks import InputError
 from freqid.data import (
     Band,
     DataSet,
@@ -19,7 +19,6 @@ from freqid.data import (
     StampedRecord,
     as_band,
     as_holds,
-    channel_counts,
     check_hold,
     input_dt,
     noise_that_is_told,
@@ -30,6 +29,7 @@ from freqid.fitting.cost.noise_ends import noise_ends
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
+from freqid.fitting.cost.trends import trend_shapes, trends_taken
 from freqid.fitting.noise_models import (
     BiasIntegral,
     GivenWeights,
@@ -242,16 +242,22 @@ class Reading:
         )
         lifted = bool(at_input) and plane is None and not self.delayed
         s = spectra(record, self.band, lifted=lifted)
-        if self.skip_zero:
+        # of a constant that was taken off nothing is left to see at zero but free motions
+        taken = 0 if self.offset else trends_taken(record)
+        if self.skip_zero or taken:
             s = s.without_zero()
         weights = self.noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
         other = like if isinstance(like, SpectralExperiment) else None
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane, other)
         made = dataclasses.replace(made, place=self.place)
+        number = np.round(s.omega * s.n_samples * s.dt / (2 * np.pi)).astype(int)
+        if taken > 1 and free:
+            # an integrator makes of what was taken off its input a degree more
+            most = taken + self.skip_zero
+            made = made.with_shapes(trend_shapes(number, s.n_samples, len(s.Y), most))
         whole = self.band is None
         if whole and free and self.noise.to_be_learnt and not self.noise.plain:
-            number = np.round(s.omega * s.n_samples * s.dt / (2 * np.pi)).astype(int)
             made = made.with_shapes(noise_ends(number, s.n_samples, np.atleast_2d(weights)))
         return made.with_offsets(s.n_samples) if self.offset else made
 
@@ -280,21 +286,3 @@ class Reading:
         lines = None if self.band is None else spectra(record, self.band)
         free = self.initial_state == "estimate"
         return TimeExperiment(record, hold if plane is None else None, lines, free, self.place)
-
-
-def read_for(
-    shape: tuple[int, int], readings: Sequence[Reading], plane: Plane | None = None
-) -> list[Experiment]:
-    """Every reading as residuals of a model with (outputs, inputs); ValueError for other data."""
-    for r in readings:
-        given = channel_counts(r.data)
-        if given != shape:
-            raise InputError(
-                f"data have {given[0]} outputs and {given[1]} inputs; the model has {shape[0]} "
-                f"and {shape[1]}"
-            )
-    made: list[Experiment] = []
-    for i, r in enumerate(readings):
-        with of_data(i, len(readings)):
-            made.append(r.experiment(plane, made[-1] if made else None))
-    return made

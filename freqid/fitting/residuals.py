@@ -9,7 +9,8 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, StampedRecord, channel_counts
-from freqid.fitting.reading import Reading, read_for
+from freqid.fitting.reading import Reading
+from freqid.fitting.reading_sets import read_for
 from freqid.frf import lines_of
 from freqid.lti import Hold, PeriodicHold, Plane, eliminate
 from freqid.models import Model

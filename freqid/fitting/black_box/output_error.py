@@ -20,7 +20,8 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.noise_models import GivenWeights
-from freqid.fitting.reading import Reading, read_for
+from freqid.fitting.reading import Reading
+from freqid.fitting.reading_sets import read_for
 from freqid.fitting.search.descent import polish
 from freqid.fitting.sight import out_of_sight
 from freqid.fitting.signs import Evidence, findings

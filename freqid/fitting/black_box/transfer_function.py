@@ -25,7 +25,8 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fits
-from freqid.fitting.reading import Reading, read_for
+from freqid.fitting.reading import Reading
+from freqid.fitting.reading_sets import read_for
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.sufficiency import enough_rows, told_apart
 from freqid.fitting.uncertainty.minimum import Minimum
