@@ -15,7 +15,7 @@ from freqid.cli.plants import TEMPLATE, pairs
 from freqid.cli.terminal import PICTURES, may_write, progress, show, write_picture
 from freqid.cli.words import typed
 from freqid.data import whole_file
-from freqid.fitting import in_digits
+from freqid.fitting import in_digits, made_by_a_store
 
 USUAL_READING, USUAL_SEARCH = Reading(), Search()
 Texts = Annotated[list[str] | None, Option(consume_multiple=True)]
@@ -120,7 +120,8 @@ def fit(
         print(f"note: {typed(note)}")
     if compared is not None and validate is not None:
         shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)
-        print(f"{validate.name}, which was not fitted: {shares} explained")
+        told = "which was fitted, too" if validate.samefile(data) else "which was not fitted"
+        print(f"{validate.name}, {told}: {shares} explained")
     return 0 if estimate.converged else 1
 
 
@@ -151,11 +152,15 @@ def fit_many(
     verdicts
         --no-verdicts leaves out witness, warnings and verdict, which take longer than the fit.
     """
+    may_write(out, [], True, (".parquet",))
     # what is replaced stays until all is fitted
     table_at = out.with_name(f"{out.stem}.new{out.suffix}") if force and out.exists() else out
-    # a pattern may take in the table of an earlier call
+    # a pattern may take in the table of an earlier call, and a log may stand where one is wanted
+    found = matching(data)
+    if out.exists() and not made_by_a_store(out):
+        may_write(out, [Path(file) for file in found], force)
     own = {out.resolve(), table_at.resolve()}
-    files = [file for file in matching(data) if Path(file).resolve() not in own]
+    files = [file for file in found if Path(file).resolve() not in own]
     if not files:
         raise InputError(f"{' '.join(data)} matches no file but {out}, which is the table's")
     options = search.given()

@@ -88,10 +88,28 @@ class Reading:
         try:
             return self.record(path)
         except ResponseFile:
-            told = {"sep": self.sep, "decimal": self.decimal, "columns": self.columns}
-            ends = {"input": self.input, "output": self.output}
-            one = {k: v[0] for k, v in ends.items() if v is not None}
-            return fq.read_response(path, **told, **one)  # type: ignore[arg-type]
+            return self._response(path)
+
+    def _response(self, path: Path) -> fq.FrequencyResponse:
+        for option in ("reference", "time", "group", "resample"):
+            if getattr(self, option):
+                raise InputError(f"{path} holds a response; --{option} is for records")
+        told: dict[str, Any] = {
+            "sep": self.sep, "decimal": self.decimal, "columns": self.columns,
+            "units": texts("--units", self.units) or None,
+        }  # fmt: skip
+        for option in ("input", "output"):
+            ends = getattr(self, option)
+            if ends is not None and len(ends) > 1:
+                raise InputError(
+                    f"--{option} {' '.join(ends)}: of a response one {option} is read, or all; "
+                    "give one, or leave it out"
+                )
+            told[option] = ends[0] if ends else None
+        found = fq.read_response(path, **told)
+        if self.dt is None:
+            return found
+        return type(found)(**{**found.__dict__, "dt": self.dt})
 
 
 @Option(name="*")

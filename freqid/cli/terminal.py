@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -73,8 +74,10 @@ def write_table(path: Path, frame: pd.DataFrame) -> None:
 
 def write_picture(path: Path, axes: Panels) -> None:
     """Write the figure to which axes belong, whole or not at all."""
+    # those of several channels stand in rows
+    first = np.asarray(axes, dtype=object).flat[0]
     with whole_file(path) as beside:
-        axes[0].figure.savefig(beside)  # type: ignore[union-attr]
+        first.figure.savefig(beside)
 
 
 def show(title: str, frame: pd.DataFrame) -> None:

@@ -22,6 +22,8 @@ _SIZE = r"(mag|magnitude|amp|amplitude|gain|abs|betrag|modulus|db|dbv)"
 _BESIDE = r"(gamma\d*|coh|coherence|kohärenz|count|averages|n|no|#)"
 # a power, and a phase that is counted the other way
 _SQUARED, _LAG = r"(\^2|\*\*2|²|squared|power (gain|ratio|spectrum)|psd)", r"lag"
+# what inputs are measured in
+_DRIVES = r"(m|k|c)?(N[ ·]?(m|mm|cm)|N|V|A)"
 # phases that are within this size may be radians, unwrapped
 _FEW_RADIANS = 30.0
 
@@ -88,6 +90,38 @@ def complex_of(frame: pd.DataFrame, names: Sequence[str], units: Mapping[str, st
             f"the columns {', '.join(names)} hold no phase: a fit needs it; export it too"
         )
     return polar(magnitude, _radians(frame, phase, units))
+
+
+def is_of_response(name: str) -> bool:
+    """Whether a column is a part of a response, or stands beside one, and holds no frequencies."""
+    parts = (_REAL, _IMAGINARY, _PHASE, _SIZE, _BESIDE)
+    return any(all_of([name], pattern) for pattern in parts)
+
+
+def is_in_parts(names: Sequence[str]) -> bool:
+    """Whether columns are real and imaginary parts."""
+    return bool(all_of(names, _REAL) and all_of(names, _IMAGINARY))
+
+
+def power_of_spread(name: str) -> int:
+    """The power of a column that makes it a variance: 1 of a variance, 2 of a standard deviation;
+    0 of another.
+    """
+    if all_of([name], r"(variance|var)"):
+        return 1
+    return 2 if all_of([name], r"(std|sigma|σ|stdev|standard deviation)") else 0
+
+
+def ends_of_quotient(units: Sequence[str]) -> dict[str, str] | None:
+    """The units of output and input, y and u, of a response in m/N or (rad/s)/(N m); None where
+    none of the columns' ``units`` says both.
+    """
+    for unit in units:
+        above, _, below = unit.rpartition("/")
+        plain = below.strip(" ()")
+        if above and re.fullmatch(_DRIVES, plain):
+            return {"y": above.strip(" ()"), "u": plain}
+    return None
 
 
 def from_decibel(size: FloatArray) -> FloatArray:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 # Hz of each unit of frequency
 HERTZ = {
-    "hz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9, "rad/s": 1 / (2 * np.pi),
-    "rad/sec": 1 / (2 * np.pi),
+    "hz": 1.0, "hertz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9,
+    "rad/s": 1 / (2 * np.pi), "rad/sec": 1 / (2 * np.pi),
 }  # fmt: skip
 FREQUENCY = r"(f|freq|frequency|frequenz|angular frequency|w|omega|ω)"
 
@@ -34,10 +34,15 @@ def in_hertz(name: str, unit: str) -> float:
     plain = name.casefold().strip()
     if re.search(r"(?<![a-z])log", plain):
         raise InputError(f"column {name!r} may hold logarithms; give frequencies in Hz")
+    if unit.strip() == "mHz":
+        return 1e-3
+    turned = re.search(r"^(w|omega|ω)(?![a-z])|rad|angular", plain)
+    if text in ("1/s", "s^-1", "s-1") and turned:
+        # the unit of an angular frequency, where the angle has none
+        text = "rad/s"
     # "omega_rad/s" is a name and a unit of its own where the end is taken for one
     if not text or (text == "s" and plain.endswith("rad")):
-        tail = re.search(r"(?:^f|[_\s]|frequency)(hz|khz|mhz|ghz)$", plain)
-        turned = re.search(r"^(w|omega|ω)(?![a-z])|rad|angular", plain)
+        tail = re.search(r"(?:^f?|[_\s./-]|frequency)(hz|khz|mhz|ghz)\.*$", plain)
         text = tail[1] if tail else "rad/s" if turned else "hz"
     if text not in HERTZ:
         raise InputError(f"the unit of {name!r} is {unit!r}; expected one of {', '.join(HERTZ)}")
@@ -49,7 +54,8 @@ def of_touchstone(path: Path) -> FrequencyResponse:
         import skrf
     except ImportError:
         raise missing("Touchstone", "scikit-rf", "rf") from None
-    content = io.StringIO(text_of(existing(path).read_bytes()).lstrip("\ufeff"))
+    text = text_of(existing(path).read_bytes()).lstrip("\ufeff")
+    content = io.StringIO(text)
     # by its name scikit-rf would unpickle the file before it takes it for text; the name tells how
     # many ports there are
     content.name = str(path)
@@ -59,7 +65,11 @@ def of_touchstone(path: Path) -> FrequencyResponse:
     except Exception as error:
         # scikit-rf has errors of many kinds for a file that is not what it says
         raise damaged("Touchstone", error) from None
-    return FrequencyResponse(np.asarray(network.f), np.moveaxis(np.asarray(network.s), 0, -1))
+    # impedances, say, are what such a file holds, and no scattering made of them
+    option = re.search(r"^\s*#\s*\S+\s+([SYZ])\s", text, re.I | re.M)
+    kind = option[1].lower() if option else "s"
+    G = np.asarray(getattr(network, kind))
+    return FrequencyResponse(np.asarray(network.f), np.moveaxis(G, 0, -1))
 
 
 def of_universal(path: Path) -> FrequencyResponse:
@@ -81,6 +91,8 @@ def of_universal(path: Path) -> FrequencyResponse:
             unit = str(s.get(f"{label}_axis_units_lab") or "").strip()
             if unit and unit.upper() != "NONE":
                 units[name] = unit
+    label = str(found[0].get("abscissa_axis_units_lab") or "").strip()
+    unit = "" if label.upper() == "NONE" else label
     f = np.asarray(found[0]["x"], dtype=float)
     G = np.full((len(outputs), len(inputs), len(f)), np.nan + 0j)
     for s in found:
@@ -93,7 +105,11 @@ def of_universal(path: Path) -> FrequencyResponse:
         raise InputError(f"holds {len(found)} responses, not all of {outputs} from {inputs}")
     apart = not set(inputs) & set(outputs)
     return FrequencyResponse(
-        f, G, input_names=inputs, output_names=outputs, units=units if apart else None
+        f * in_hertz("abscissa", unit),
+        G,
+        input_names=inputs,
+        output_names=outputs,
+        units=units if apart else None,
     )
 
 
@@ -124,7 +140,7 @@ def of_matlab(
         raise InputError(f"{axes[0]!r} holds {f.dtype}; expected frequencies, numbers")
     # what is beyond numbers is told below
     with np.errstate(all="ignore"):
-        f = f.astype(float) * in_hertz(axes[0], "")
+        f = f.astype(float) * in_hertz(axes[0], str(np.squeeze(arrays.get("FrequencyUnit", ""))))
     G = arrays[found[0]]
     if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
         G = np.moveaxis(G, 0, -1)

@@ -10,16 +10,17 @@ import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import InputError, an, finite, flag, listed, path_of, unknown
+from freqid.checks import InputError, an, finite, flag, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
 from freqid.data.argument_order import read_in_either_order
+from freqid.data.column_names import known
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
-from freqid.data.readers.table import named, named_with
+from freqid.data.readers.table import named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
 from freqid.data.replacing import check_replacing, has_written
@@ -112,11 +113,10 @@ def read(
         for name in units or {}:
             if name not in (*frame.columns, "time", "reference"):
                 raise InputError(unknown("units", name, [str(c) for c in frame.columns]))
-        if (
-            inputs is None
-            and outputs is None
-            and looks_like_response(frame, frame.attrs.get("units", {}))
-        ):
+        ends = known(inputs, frame, "inputs"), known(outputs, frame, "outputs")
+        asked = [n for e in ends if e is not None for n in ([e] if isinstance(e, str) else e)]
+        signals = bool(asked) and set(asked) <= set(map(str, frame.columns))
+        if not signals and looks_like_response(frame, frame.attrs.get("units", {})):
             raise ResponseFile(path)
         told = {**frame.attrs.get("units", {}), **(units or {})}
         frame, said = with_time(frame, time, told, dt)
@@ -125,8 +125,8 @@ def read(
 
         def made(rows: pd.DataFrame) -> Record:
             return Record.from_frame(
-                rows, _known(inputs, rows), _known(outputs, rows), dt, hold,
-                _known(reference, rows), units=told, resample=resample,
+                rows, known(inputs, rows), known(outputs, rows), dt, hold,
+                known(reference, rows), units=told, resample=resample,
             )  # fmt: skip
 
         try:
@@ -176,26 +176,6 @@ def _no_table(path: Path, given: Mapping[str, object]) -> None:
                 f"{path}: {name}={value!r} is for tables; the channels of a log have names and "
                 "times of their own: leave it out"
             )
-
-
-@overload
-def _known(names: str | None, frame: pd.DataFrame) -> str | None: ...
-
-
-@overload
-def _known(
-    names: Sequence[str] | str | None, frame: pd.DataFrame
-) -> Sequence[str] | str | None: ...
-
-
-def _known(names: Sequence[str] | str | None, frame: pd.DataFrame) -> Sequence[str] | str | None:
-    """Columns as the frame calls them: the unit in brackets behind a name may be given or not."""
-    if names is None:
-        return None
-    given = [names] if isinstance(names, str) else listed("columns", names)
-    plain = [n if n in frame.columns or named(n)[0] not in frame.columns else named(n)[0]
-             for n in given]  # fmt: skip
-    return plain[0] if isinstance(names, str) else plain
 
 
 def _cut(record: Record, start: float | None, stop: float | None, detrend: int | None) -> Record:

@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, listed, positive, real, unknown
 from freqid.data.cells import no_number
+from freqid.data.column_names import known, without_units
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
 from freqid.data.readers.table import named
@@ -52,7 +53,10 @@ def record_of(
 ) -> Record:
     """The record of that kind that a frame holds: columns to channels, time to periods."""
     frame, own_units, own_step, own_inputs = as_pandas(frame)
-    units = own_units if units is None else units
+    if units is None:
+        frame, units = without_units(frame, own_units)
+        inputs, outputs = known(inputs, frame, "inputs"), known(outputs, frame, "outputs")
+        reference = known(reference, frame)
     dt = own_step if dt is None else dt
     if own_inputs is not None and inputs is None and outputs is None:
         inputs, outputs = own_inputs, [c for c in frame.columns if c not in own_inputs]

@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from freqid.checks import Array, InputError, listed, numbers, path_of
+from freqid.checks import Array, InputError, listed, named_values, numbers, path_of, unknown
 from freqid.data.analyser_columns import (
     coherence_of,
     complex_of,
+    ends_of_quotient,
     from_decibel,
+    is_in_parts,
+    is_of_response,
     joined,
     numbers_of,
     one_of,
     polar,
+    power_of_spread,
 )
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
 from freqid.data.averaged_response import MEMORY, SEGMENT, AveragedResponse, remembered_memory
+from freqid.data.column_names import without_units
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.table import named
@@ -44,6 +49,7 @@ def read_response(
     input: int | str | None = None,
     output: int | str | None = None,
     columns: Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> FrequencyResponse:
     r"""A frequency response from a file, as an analyser or another program wrote it.
 
@@ -55,6 +61,8 @@ def read_response(
     Args:
         sep, decimal: of a table, where they cannot be found out.
         columns: names for a table that has none, units behind them: ``magnitude [dB]``.
+        units: of the columns of a table, such as ``{"frequency": "rad/s"}``, where its own names
+            do not tell.
         input, output: which of several, by name or number from 0; all where not given.
 
     Raises FileNotFoundError for a missing file and ValueError, with what was found, where a file
@@ -69,6 +77,8 @@ def read_response(
     path = path_of("path", path)
     kind = path.suffix.lower()
     try:
+        if units and (kind in (".uff", ".unv", ".mat") or re.fullmatch(r"\.s\d+p", kind)):
+            raise InputError(f"units={dict(units)!r} is for tables; the file has its own")
         if re.fullmatch(r"\.s\d+p", kind):
             found = of_touchstone(path)
         elif kind in (".uff", ".unv"):
@@ -79,7 +89,11 @@ def read_response(
             frame = frame_of(path, sep, decimal)
             if columns is not None:
                 frame = _renamed(frame, listed("columns", columns))
-            found = of_frame(frame, frame.attrs.get("units", {}))
+            own = frame.attrs.get("units", {})
+            for name in named_values("units", units):
+                if name not in frame.columns:
+                    raise InputError(unknown("units", name, [str(c) for c in frame.columns]))
+            found = of_frame(frame, {**own, **(units or {})})
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
@@ -89,22 +103,46 @@ def read_response(
 def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> FrequencyResponse:
     """The response that a table holds; ValueError, with its columns, where that is none."""
     frame, own_units, *_ = as_pandas(frame)
-    names = [str(c) for c in frame.columns]
+    if units is None:
+        frame, units = _as_in_a_file(frame, own_units)
+    names, told = [str(c) for c in frame.columns], dict(units)
     if {"frequency", "output", "input", "real", "imag"} <= set(names):
-        return _long(frame)
-    told = dict(units or own_units)
-    at = one_of([re.sub(r"_hz$", "", n) for n in names], FREQUENCY)
-    at = next((n for n in names if at and n.startswith(at)), names[0])
+        return _long(frame, in_hertz("frequency", told.get("frequency", "")))
+    word = one_of([re.sub(r"_hz$", "", n) for n in names], FREQUENCY)
+    at = next((n for n in names if word and n.startswith(word)), names[0])
+    if word is None and is_of_response(at):
+        raise InputError(
+            f"holds no frequencies among the columns {', '.join(names)}; name one frequency [Hz]"
+        )
     f = numbers_of(frame, at) * in_hertz(at, told.get(at, ""))
     rest = [n for n in names if n != at]
-    held = one_of(rest, "coherence")
+    held = one_of(rest, r"(coherence|coh|kohärenz|gamma2|gamma\^2|γ²)")
     rest = [n for n in rest if n != held]
-    G = complex_of(frame, rest, told)
+    # beside real and imaginary parts it is that of their sum of squares; beside others nobody knows
+    spread = {n: power for n in rest if (power := power_of_spread(n))}
+    G = complex_of(frame, [n for n in rest if n not in spread], told)
     order = np.argsort(f, kind="stable")
     if len(order) < 1 or (np.diff(f[order]) <= 0).any():
         raise InputError(f"column {at!r} holds a frequency twice; keep one of them")
     coherence = None if held is None else coherence_of(held, frame, told)[order]
-    return FrequencyResponse(f[order], G[order], coherence=coherence)
+    variance = None
+    if len(spread) == 1 and is_in_parts(rest):
+        (name, power), *_ = spread.items()
+        variance = (numbers_of(frame, name) ** power)[order]
+    ends = ends_of_quotient([told.get(n, "") for n in rest if n not in spread])
+    return FrequencyResponse(f[order], G[order], coherence=coherence, variance=variance, units=ends)
+
+
+def _as_in_a_file(
+    frame: pd.DataFrame, units: Mapping[str, str]
+) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Columns without the units in brackets behind their names, and these; an index of frequencies
+    is a column.
+    """
+    index = frame.index.name
+    if index is not None and one_of([re.sub(r"_hz$", "", str(index).casefold())], FREQUENCY):
+        frame = frame.reset_index()
+    return without_units(frame, units)
 
 
 def _renamed(frame: pd.DataFrame, columns: Sequence[object]) -> pd.DataFrame:
@@ -129,12 +167,12 @@ def of_db(
     return FrequencyResponse(frequency, polar(from_decibel(size), np.deg2rad(turn)), **fields)
 
 
-def _long(frame: pd.DataFrame) -> FrequencyResponse:
+def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
     # names may be numbers
     frame = frame.assign(output=frame["output"].astype(str), input=frame["input"].astype(str))
     outputs, inputs = list(dict.fromkeys(frame["output"])), list(dict.fromkeys(frame["input"]))
     first = frame[(frame["output"] == outputs[0]) & (frame["input"] == inputs[0])]
-    f = numbers_of(first, "frequency")
+    f = numbers_of(first, "frequency") * hertz
     fields: dict[str, Array] = {}
     columns: dict[str, Array] = {
         n: numbers_of(frame, n) for n in ("variance", "coherence") if n in frame.columns

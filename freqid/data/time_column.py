@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 # seconds of each unit by its names
 UNITS = {
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "µs", "μs", "usec", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nsec", "nanos", "nanosecond", "nanoseconds"), 1e-9),
     **dict.fromkeys(("min", "minute", "minutes"), 60.0),
     **dict.fromkeys(("h", "hour", "hours"), 3600.0),
 }
@@ -38,7 +38,10 @@ EPOCHS = ((1e18, 4.1e18, 1e-9, "ns"), (1e15, 4.1e15, 1e-6, "µs"), (1e12, 4.1e12
 # steps that differ by no more than this part make an unnamed column a time
 _EVEN = 1e-3
 # a name that ends in a unit, and steps in s that nobody samples a machine with
-_SUFFIX, _SLOW = r"(?:^|_)(s|ms|us|µs|ns)$", 0.2
+_SUFFIX = r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos)\.*$"
+_SLOW = 0.2
+# names of the time with a longer unit behind them, which may be something else behind another name
+_LONG = re.compile(r"(t|time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
 # units of a count by its steps in them, and what they are called
 _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms", "milliseconds"))
 # a date and a time of day in columns of their own, and seconds of a day
@@ -69,7 +72,7 @@ def with_time(
     rest.insert(0, "time", seconds)
     plain = name == "time" and said == "s"
     notes = [] if plain else [f"column {name!r} was taken for the time, in {said}"]
-    told = units.get(name) or re.search(_SUFFIX, name.casefold())
+    told = units.get(name) or _unit_in(name)
     # times that are no numbers are refused by whoever makes a record of them
     with np.errstate(all="ignore"):
         step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
@@ -81,6 +84,13 @@ def with_time(
     return rest, notes
 
 
+def _unit_in(name: str) -> str:
+    """The unit in which a name ends; empty where it is none of time."""
+    plain = name.strip().casefold()
+    long, short = _LONG.fullmatch(plain), re.search(_SUFFIX, plain)
+    return long[2] if long else short[1] if short else ""
+
+
 def time_named(columns: Sequence[str]) -> str | None:
     """The column whose name, its unit apart, means the time; None where none does."""
     if "time" in columns:
@@ -88,6 +98,8 @@ def time_named(columns: Sequence[str]) -> str | None:
     for column in columns:
         plain = named(column)[0].strip().casefold()
         if re.sub(r"[\s_]+", " ", plain) in _NAMES or plain in _NAMES:
+            return column
+        if re.sub(_SUFFIX, "", plain) in _NAMES or _LONG.fullmatch(plain):
             return column
     return None
 
@@ -196,8 +208,7 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
             )
         return in_seconds(name, converted, unit)
     values = of_this_world(name, _less_the_first(column.to_numpy()))
-    suffix = re.search(_SUFFIX, name.casefold())
-    wanted = unit or (suffix[1] if suffix else "")
+    wanted = unit or _unit_in(name)
     if wanted:
         if wanted.casefold() not in UNITS:
             raise InputError(

@@ -39,17 +39,33 @@ def _bracketed(unit: str) -> str:
 # what a logger writes, by the coherent unit that it is a multiple of, and that
 _OTHERS = {
     "rad": {"°": np.pi / 180, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180,
-            "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6},
+            "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6, "rev": 2 * np.pi, "turn": 2 * np.pi,
+            "turns": 2 * np.pi},
     "rad/s": {"rpm": np.pi / 30, "1/min": np.pi / 30, "r/min": np.pi / 30, "U/min": np.pi / 30,
-              "°/s": np.pi / 180, "deg/s": np.pi / 180},
+              "rev/min": np.pi / 30, "min^-1": np.pi / 30, "min-1": np.pi / 30,
+              "rev/s": 2 * np.pi, "°/s": np.pi / 180, "deg/s": np.pi / 180,
+              "deg/sec": np.pi / 180, "dps": np.pi / 180, "mrad/s": 1e-3},
     "N m": {"mNm": 1e-3, "mN m": 1e-3, "Nmm": 1e-3, "N mm": 1e-3, "Ncm": 1e-2, "N cm": 1e-2,
-            "kNm": 1e3, "kN m": 1e3},
-    "N": {"mN": 1e-3, "kN": 1e3},
-    "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6},
+            "kNm": 1e3, "kN m": 1e3, "lbf ft": 1.3558179, "ft lbf": 1.3558179, "lb ft": 1.3558179,
+            "ft lb": 1.3558179, "lbf in": 0.11298483, "in lbf": 0.11298483},
+    "N": {"mN": 1e-3, "kN": 1e3, "lbf": 4.4482216},
+    "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "inch": 0.0254,
+          "ft": 0.3048},
     "m/s": {"mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6},
     "A": {"mA": 1e-3},
     "V": {"mV": 1e-3},
 }  # fmt: skip
+
+
+# those that mean one thing however they are written
+_ANY_CASE = {
+    other.casefold(): (base, factor)
+    for base in ("rad", "rad/s") for other, factor in _OTHERS[base].items()
+}  # fmt: skip
+# what a converter counts, which are no multiples of anything that is known here
+_COUNTS = {"count", "counts", "cnt", "cnts", "lsb", "lsbs", "tick", "ticks", "bit", "bits", "inc"}
+# units that names end in: angle_deg, speed_rpm
+_ENDS = {"deg", "rpm", "mrad", "mNm", "Nmm", "Ncm", "mm", "cm", "mA", "dps", "counts", "ticks"}
 
 
 def coherent(unit: str) -> tuple[str, float] | None:
@@ -58,6 +74,42 @@ def coherent(unit: str) -> tuple[str, float] | None:
     >>> coherent("mNm"), coherent("rad")
     (('N m', 0.001), None)
     """
-    plain = unit.replace("·", " ").strip()
-    found = ((base, others[plain]) for base, others in _OTHERS.items() if plain in others)
-    return next(found, None)
+    plain = re.sub(r"[·*]", " ", unit).strip()
+    # a hyphen parts factors, but not an exponent
+    parted = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", plain)
+    for written in (plain, parted):
+        for base, others in _OTHERS.items():
+            if written in others:
+                return base, others[written]
+    return _ANY_CASE.get(plain.casefold())
+
+
+def units_of_channels(names: Sequence[str], units: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Channels and their units, of those that have one or whose name ends in one.
+
+    >>> units_of_channels(["torque", "angle_deg"], {"torque": "N m"})
+    [('torque', 'N m'), ('angle_deg', 'deg')]
+    """
+    told = [(name, units.get(name) or unit_in_name(name)) for name in names]
+    return [(name, unit) for name, unit in told if unit]
+
+
+def is_count(unit: str) -> bool:
+    """Whether a unit is that of a converter's numbers.
+
+    >>> is_count("LSB"), is_count("V")
+    (True, False)
+    """
+    return unit.strip().casefold() in _COUNTS
+
+
+def unit_in_name(name: str) -> str:
+    """The unit that a name ends in; empty where that is none.
+
+    >>> unit_in_name("angle_deg"), unit_in_name("speed_RPM"), unit_in_name("torque")
+    ('deg', 'rpm', '')
+    """
+    end = name.rpartition("_")[2]
+    if end == name or (coherent(end) is None and not is_count(end)):
+        return ""
+    return next((u for u in _ENDS if end in (u, u.upper(), u.capitalize())), "")

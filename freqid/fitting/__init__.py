@@ -14,7 +14,7 @@ from freqid.fitting.fitters import FITTERS, Near, SearchOptions, fitter_of
 from freqid.fitting.grades import Verdict
 from freqid.fitting.grey_box import fit_grey_box
 from freqid.fitting.kept import load
-from freqid.fitting.many import TableStore, fit_many
+from freqid.fitting.many import TableStore, fit_many, made_by_a_store
 from freqid.fitting.met import data_digest, met, offset_is_free, remembered
 from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order

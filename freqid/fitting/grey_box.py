@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from freqid.checks import InputError, unknown
-from freqid.data import Record, input_dt, output_dt, rate_factor
+from freqid.data import Record, input_dt, output_dt, rate_factor, units_of_channels
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
@@ -232,7 +232,11 @@ def _estimate(
         aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         units=dict.fromkeys(
-            each for r in readings for each in getattr(r.data, "units", {}).items()
+            each
+            for r in readings
+            for each in units_of_channels(
+                (*r.data.input_names, *r.data.output_names), getattr(r.data, "units", {})
+            )
         ),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
         # what rounding leaves wants nothing

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.data import coherent
+from freqid.data import coherent, is_count
 from freqid.fitting.findings import FOLDED, Finding, Severity
 from freqid.models import Parameter
 
@@ -142,10 +142,12 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
             yield Finding("edge of a bound", sentence, severity, float(value))
 
 
-# how the unit of a parameter has that of a channel in it
+# how the unit of a parameter has that of a channel in it, a moment of inertia N m s²/rad
+_INERTIA = r"kg\s*m(²|\^2|2)"
 _MENTIONS = {
-    "rad": r"/\s*\(?rad", "rad/s": r"/\s*\(?rad", "N m": r"N\s*m", "N": r"N(?!\s*m)",
-    "m": r"/\s*\(?m\b", "m/s": r"/\s*\(?m\b", "A": r"A\b", "V": r"V\b",
+    "rad": rf"/\s*\(?rad|{_INERTIA}", "rad/s": rf"/\s*\(?rad|{_INERTIA}",
+    "N m": rf"N\s*m|{_INERTIA}", "N": r"N(?!\s*m)|kg(?!\s*m)",
+    "m": r"/\s*\(?m\b|kg(?!\s*m)", "m/s": r"/\s*\(?m\b|kg(?!\s*m)", "A": r"A\b", "V": r"V\b",
 }  # fmt: skip
 
 
@@ -155,6 +157,14 @@ def other_units(e: Evidence) -> Iterator[Finding]:
     for channel, unit in e.units:
         told = coherent(unit)
         if told is None:
+            named = sorted({p.unit for p in e.parameters if p.unit})
+            if is_count(unit) and named and not any(unit in u for u in named):
+                yield Finding(
+                    "units",
+                    f"{channel} is in {unit}, and parameters are in {', '.join(named)}: their "
+                    "numbers are of another unit than is printed beside them; multiply the "
+                    f"samples of {channel} by what one of {unit} is in the parameters' units",
+                )
             continue
         base, factor = told
         # who has the channel's own unit in his parameters means it
@@ -165,7 +175,7 @@ def other_units(e: Evidence) -> Iterator[Finding]:
                 "units",
                 f"{channel} is in {unit}, and parameters in {', '.join(met)} are those of a "
                 f"channel in {base}: their numbers are of another unit than is printed beside "
-                f"them; multiply it by {factor:.6g}",
+                f"them; multiply the samples of {channel} by {factor:.6g}",
                 number=factor,
             )
 

@@ -154,6 +154,17 @@ class TableStore:
         return InputError(f"{at} holds {self.what}{why}; give another path or remove it")
 
 
+def made_by_a_store(path: Path) -> bool:
+    """Whether a file is a table that was written here, and no log that somebody measured."""
+    import pyarrow.parquet
+
+    try:
+        told = pyarrow.parquet.read_schema(path).pandas_metadata or {}
+    except (OSError, pyarrow.ArrowException):
+        return False
+    return _KEY in (told.get("attributes") or {})
+
+
 def _sum_of(path: Path) -> str:
     with naming(path):
         return hashlib.sha256(path.read_bytes()).hexdigest()[:_SUM]

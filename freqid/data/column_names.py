@@ -1,0 +1,45 @@
+"""Names of columns with a unit in brackets behind them, and without."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, overload
+
+from freqid.checks import listed
+from freqid.data.readers.table import named
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def without_units(
+    frame: pd.DataFrame, units: Mapping[str, str]
+) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Columns without the units in brackets behind their names, and these."""
+    told = [named(str(c)) for c in frame.columns]
+    if len({name for name, _ in told}) < len(told) or not any(unit for _, unit in told):
+        return frame, dict(units)
+    own = {name: unit for name, unit in told if unit}
+    return frame.set_axis([name for name, _ in told], axis=1), {**own, **units}
+
+
+@overload
+def known(names: str | None, frame: pd.DataFrame, argument: str = ...) -> str | None: ...
+
+
+@overload
+def known(
+    names: Sequence[str] | str | None, frame: pd.DataFrame, argument: str = "columns"
+) -> Sequence[str] | str | None: ...
+
+
+def known(
+    names: Sequence[str] | str | None, frame: pd.DataFrame, argument: str = "columns"
+) -> Sequence[str] | str | None:
+    """Columns as the frame calls them: the unit in brackets behind a name may be given or not."""
+    if names is None:
+        return None
+    given = [names] if isinstance(names, str) else listed(argument, names)
+    plain = [n if n in frame.columns or named(n)[0] not in frame.columns else named(n)[0]
+             for n in given]  # fmt: skip
+    return plain[0] if isinstance(names, str) else plain

@@ -1,0 +1,167 @@
+"""Units as people write them: of times, frequencies, channels and responses."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import signal
+
+import freqid as fq
+from freqid.data.units import coherent, unit_in_name
+
+OMEGA = np.linspace(3, 150, 80)
+G = 1 / (45 - 0.02 * OMEGA**2 + 0.15j * OMEGA)
+F = OMEGA / (2 * np.pi)
+
+
+def axis():
+    return fq.GreyBox(
+        lambda J, k, d: (
+            np.array([[0, 1], [-k / J, -d / J]]),
+            np.array([[0], [1 / J]]),
+            np.array([[1.0, 0]]),
+            np.zeros((1, 1)),
+        ),
+        [
+            fq.Parameter("J", 0.02, "kg m²"),
+            fq.Parameter("k", 45.0, "N m/rad"),
+            fq.Parameter("d", 0.15, "N m s/rad"),
+        ],
+    )
+
+
+def moved(n=1500, dt=1e-2):
+    u = np.random.default_rng(3).standard_normal(n)
+    at = axis().state_space()
+    y = signal.lsim((at.A, at.B, at.C, at.D), u, dt * np.arange(n), interp=False)[1]
+    return u, y + 0.01 * np.std(y) * np.random.default_rng(4).standard_normal(n)
+
+
+@pytest.mark.parametrize(
+    ("header", "seconds"),
+    [
+        ("Time ms", 1e-3), ("time_msec", 1e-3), ("time.ms", 1e-3), ("Time..ms.", 1e-3),
+        ("time_millis", 1e-3), ("time_usec", 1e-6), ("time_sec", 1.0), ("time_min", 60.0),
+        ("elapsed h", 3600.0), ("time-us", 1e-6),
+    ],
+)  # fmt: skip
+def test_the_unit_in_the_name_of_the_time(tmp_path, header, seconds):
+    u, y = moved(50)
+    table = pd.DataFrame({header: np.arange(50) * 1e-2 / seconds, "torque": u, "angle": y})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    assert fq.read(tmp_path / "log.csv").dt == pytest.approx(1e-2, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("unit", "base", "factor"),
+    [
+        ("RPM", "rad/s", np.pi / 30), ("Deg", "rad", np.pi / 180), ("min^-1", "rad/s", np.pi / 30),
+        ("rev", "rad", 2 * np.pi), ("lbf-ft", "N m", 1.3558179), ("N·mm", "N m", 1e-3),
+        ("mN", "N", 1e-3),
+    ],
+)  # fmt: skip
+def test_units_in_other_spellings(unit, base, factor):
+    assert coherent(unit) == (base, pytest.approx(factor))
+
+
+@pytest.mark.parametrize("unit", ["MN", "rad", "N m", "V", "", "min"])
+def test_other_units_stay_what_they_are(unit):
+    assert coherent(unit) is None
+
+
+@pytest.mark.parametrize("name", ["torque", "q_in", "pos_m", "deg", "speed_Ms", "a_b"])
+def test_names_that_end_in_no_unit(name):
+    assert unit_in_name(name) == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "in_file"), [("angle [Deg]", True), ("angle_deg", True), ("angle [counts]", True),
+                          ("angle [deg]", False), ("angle_deg", False)]
+)  # fmt: skip
+def test_a_channel_of_another_unit_is_doubted(tmp_path, name, in_file):
+    u, y = moved()
+    table = pd.DataFrame({"time": 1e-2 * np.arange(len(u)), "torque [N m]": u})
+    table[name] = np.rad2deg(y)
+    table.to_csv(tmp_path / "log.csv", index=False)
+    record = fq.read(tmp_path / "log.csv") if in_file else fq.Record.from_frame(table)
+    assert record.input_names == ("torque",)
+    est = fq.fit(axis(), record, n_starts=1)
+    (reason,) = [r for r in est.verdict.reasons if r.startswith("units")]
+    assert "kg m²" in reason
+    assert "multiply the samples of angle" in reason
+
+
+def test_columns_of_a_frame_are_named_with_their_units_or_without():
+    u, y = moved(60)
+    table = pd.DataFrame({"Time [ms]": 10.0 * np.arange(60), "angle [rad]": y, "torque [N m]": u})
+    for given in ("torque [N m]", "torque"):
+        record = fq.Record.from_frame(table, inputs=given, outputs=["angle [rad]"])
+        assert record.dt == pytest.approx(1e-2)
+        assert (record.input_names, record.output_names) == (("torque",), ("angle",))
+        assert record.units == {"torque": "N m", "angle": "rad"}
+
+
+FREQUENCIES = {
+    "omega [1/s]": OMEGA, "w [1/s]": OMEGA, "f [1/s]": F, "f [mHz]": 1e3 * F, "f [MHz]": F / 1e6,
+    "frequency [rad/s]": OMEGA, "freq.kHz": F / 1e3, "kHz": F / 1e3, "frequency-khz": F / 1e3,
+    "f/kHz": F / 1e3, "Frequency [hertz]": F,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("header", FREQUENCIES)
+def test_units_of_frequencies(tmp_path, header):
+    table = pd.DataFrame({header: FREQUENCIES[header], "real": G.real, "imag": G.imag})
+    table.to_csv(tmp_path / "frf.csv", index=False)
+    for frf in (fq.read_response(tmp_path / "frf.csv"), fq.FrequencyResponse.from_frame(table)):
+        assert np.allclose(frf.frequency, F)
+        assert np.allclose(frf.response[0, 0], G)
+
+
+def test_rows_of_a_long_table_have_their_unit(tmp_path):
+    long = fq.FrequencyResponse(F, G).to_frame()
+    long = long.assign(frequency=OMEGA).rename(columns={"frequency": "frequency [rad/s]"})
+    long.to_csv(tmp_path / "frf.csv", index=False)
+    assert np.allclose(fq.read_response(tmp_path / "frf.csv").frequency, F)
+
+
+def test_an_index_of_frequencies_is_the_frequency():
+    index = pd.Index(F, name="frequency")
+    table = pd.DataFrame({"coherence": 0.9, "real": G.real, "imag": G.imag}, index=index)
+    frf = fq.FrequencyResponse.from_frame(table)
+    assert np.allclose(frf.frequency, F)
+    assert np.allclose(frf.coherence, 0.9)
+    with pytest.raises(ValueError, match="holds no frequencies among the columns coherence"):
+        fq.FrequencyResponse.from_frame(table.reset_index(drop=True))
+
+
+def test_a_matlab_file_says_its_unit(tmp_path):
+    from scipy.io import savemat
+
+    held = {"Frequency": OMEGA, "FrequencyUnit": "rad/s", "ResponseData": G}
+    savemat(tmp_path / "frf.mat", held)
+    assert np.allclose(fq.read_response(tmp_path / "frf.mat").frequency, F)
+
+
+def test_impedances_stay_impedances(tmp_path):
+    pytest.importorskip("skrf")
+    rows = "".join(f"{f:.12g} {z.real:.12g} {z.imag:.12g}\n" for f, z in zip(F, G, strict=True))
+    (tmp_path / "one.s1p").write_text("# Hz Z RI R 1\n" + rows)
+    assert np.allclose(fq.read_response(tmp_path / "one.s1p").response[0, 0], G)
+
+
+@pytest.mark.parametrize(("column", "power"), [("variance", 1), ("std", 2)])
+def test_variances_beside_a_response_are_taken(tmp_path, column, power):
+    size = (0.01 * np.abs(G)) ** (2 / power)
+    table = pd.DataFrame({"frequency [Hz]": F, "real": G.real, "imag": G.imag, column: size})
+    table.to_csv(tmp_path / "frf.csv", index=False)
+    frf = fq.read_response(tmp_path / "frf.csv")
+    assert np.allclose(frf.variance[0, 0], (0.01 * np.abs(G)) ** 2)
+
+
+def test_the_unit_of_a_response_is_that_of_its_ends(tmp_path):
+    table = pd.DataFrame(
+        {"f [Hz]": F, "gain [deg/Nm]": np.rad2deg(np.abs(G)), "phase [rad]": np.angle(G)}
+    )
+    table.to_csv(tmp_path / "frf.csv", index=False)
+    frf = fq.read_response(tmp_path / "frf.csv")
+    assert frf.units == {"y": "deg", "u": "Nm"}
+    assert any(r.startswith("units") for r in fq.fit(axis(), frf, n_starts=1).verdict.reasons)
