@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from freqid.checks import InputError, unknown
+from freqid.checks import FloatArray, InputError, unknown
 from freqid.data import Record, input_dt, output_dt, rate_factor, units_of_channels
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.nuisance import HoldPeriod
@@ -136,12 +136,13 @@ def _with_prior(
     """The minimum with the priors in the cost, once the data alone have told their noise."""
     known = [r.noise.variance for r in readings]
     variance = known[0] if None not in known else None
-    if variance is None:
-        noise = Minimum(objective, found.solution).noise_variance
-        variance = max(noise, 1e-15 * objective.energy / objective.n_rows)
-    prior = Prior.of(structure.parameters, structure.scale, variance)
-    if prior is None:
+    if all(p.prior is None for p in structure.parameters):
         return found, objective
+    alone = Minimum(objective, found.solution)
+    if variance is None:
+        variance = max(alone.noise_variance, 1e-15 * objective.energy / objective.n_rows)
+    prior = Prior.of(structure.parameters, structure.scale, variance, _wider(alone))
+    assert prior is not None
     with_prior = objective.of(structure, prior)
     means = np.array([p.value if p.prior is None else p.prior[0] for p in structure.parameters])
     believed = found.solution.x.copy()
@@ -149,6 +150,16 @@ def _with_prior(
     tried = [minimise(with_prior, x) for x in (found.solution.x, believed)]
     best = min(tried, key=lambda solution: solution.cost)
     return dataclasses.replace(found, solution=best), with_prior
+
+
+def _wider(alone: Minimum) -> FloatArray:
+    """How much wider (P,), in variance, the data's own noise makes the unknowns scatter than white
+    noise of its size: the prior is weighed against what they tell, and that is so much less.
+    """
+    plain = alone.noise_variance * np.einsum("ij,ij->i", *[alone.determined.half] * 2)
+    with np.errstate(all="ignore"):
+        ratio = np.diag(alone.covariance) / plain
+    return np.where(np.isfinite(ratio), np.maximum(ratio, 1.0), 1.0)
 
 
 def _common_dt(readings: Sequence[Reading]) -> float:

@@ -34,7 +34,8 @@ def measured(units):
         ({"torque": "mNm", "angle": "rad"}, "torque is in mNm"),
         ({"torque": "mN·m"}, "torque is in mN·m"),
         ({"torque": "N m", "angle": "rad"}, None),
-        ({"torque": "Nm", "angle": "ticks"}, None),
+        ({"torque": "Nm", "angle": "ticks"}, "angle is in ticks"),
+        ({"torque": "Nm", "angle": "widths"}, None),
         ({}, None),
     ],
 )

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import freqid as fq
+from tests.fitting.test_smooth_inputs import lag, measured
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +71,26 @@ def test_a_spike_at_the_end_of_a_decimated_record_says_where_it_comes_from():
     assert "at 0 s, an end of a decimated record: decimate(n, keep_input=True)" in spikes[0]
     kept = fq.fit(fq.two_mass(), fast.decimate(10, keep_input=True), band=(10, 80))
     assert kept.verdict.grade == "trust"
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("weights", [None, "noise"])
+def test_honest_priors_in_coloured_noise_are_believed_for_what_they_are(weights):
+    """A lag in AR(0.9) noise: white noise of its size would tell the gain ten times as well."""
+    model, true, std = lag(), np.array([3.0, 0.1]), 0.06
+    contradicted, errors, off = 0, [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.standard_normal(30), 20)
+        clean = measured(model, u, 0.01, 0.0, 0).outputs[:, 0]
+        noise = signal.lfilter([1], [1, -0.9], rng.standard_normal(800))[200:]
+        record = fq.Record(u, clean + 0.3 * np.std(clean) * noise / np.std(noise), 0.01)
+        known = model.with_prior(K=(3.0 + std * rng.standard_normal(), std))
+        est = fq.fit(known, record, weights=weights, n_starts=1)
+        contradicted += any("contradicted" in r for r in est.verdict.reasons)
+        errors.append((est.values - true) / np.sqrt(np.diag(est.covariance_matrix)))
+        off.append((est["K"] - 3.0) / std)
+    assert contradicted <= 1
+    assert np.sqrt(np.mean(np.square(errors))) < 1.5
+    # no worse than the prior alone, whose own errors are of size one
+    assert np.sqrt(np.mean(np.square(off))) < 1.4

@@ -41,8 +41,8 @@ _MOST, _NEAR = 0.7, 4.0
 _AS_GOOD = 1.1
 # starts of the fits to the data turned back, and lines of a black box
 _STARTS, _LINES = 3, 600
-# part of the gain that the input has to make
-_DRIVEN = 0.5
+# part of the gain that the input has to make, and of an output that free motions have to leave it
+_DRIVEN, _MOVED = 0.5, 0.01
 # turns that are followed from all starts
 _FOLLOWED = 2
 # standard errors by which a value is not physical for certain
@@ -191,8 +191,9 @@ class _Asked:
             return True
         left = scene.cost / max(scene.energy, 1e-300)
         rest = sum(float(s.at_rest @ s.at_rest) for s in scene.seen) / max(scene.energy, 1e-300)
-        before = 1.0 if kind == "swapped channels" else self.share
-        return rest - left >= _DRIVEN * (before - left)
+        if kind == "swapped channels":
+            return rest >= _MOVED and left <= _DRIVEN * rest
+        return rest - left >= _DRIVEN * (self.share - left)
 
     @cached_property
     def _boxes(self) -> dict[str, float | None]:

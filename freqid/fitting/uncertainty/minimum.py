@@ -172,7 +172,7 @@ class Minimum:
             wider = self.inflation * float(np.mean(each))
             return np.sqrt(wider * self._level) * half
         if self.prior is not None:
-            score = score + self.prior.variance * self.prior.slope.T @ self.prior.slope
+            score = score + self.prior.score
         return np.sqrt(self.inflation) * half @ root(half.T @ score @ half)
 
     @property
