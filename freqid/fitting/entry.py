@@ -82,7 +82,9 @@ def fit(
             ``"estimate"`` makes the period of a zero-order hold one more unknown. A hold that the
             data reject is reported in ``est.warnings``.
         band: (low, high) in Hz; None takes all lines, and the cost is the output error of the
-            time domain (Parseval), but for the line at zero of a plant that integrates. Where the
+            time domain (Parseval), but for the line at zero of a plant that integrates: what the
+            input's constant part does there is left to the initial state, so that an offset does
+            no harm; of a step it is nearly all, which domain="time" takes. Where the
             input is faster than the output this is the input's band.
         weights: None for ones (for a response its input spectrum, where known), ``"noise"`` for
             1/variance: that of a response, or, for a record, that of what a first fit leaves,

@@ -35,6 +35,8 @@ from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 _STEPS = 80
 # a motion that grows e-fold this often within the data is no integrator's, whose pole noise moved
 _STILL = 3.0
+# and by how much rounding makes an integrator's grow there
+_ROUNDED = 1e-8
 
 
 @fits(OutputError, black_box=True)
@@ -158,7 +160,7 @@ def coefficient_estimate(
     solution = minimum.solution
     failure = "" if solution.converged else solution.message
     rows = minimum.objective.n_rows
-    growing = _growing(model)
+    growing = _growing(model, rows * dt)
     evidence = Evidence(
         [],
         none,
@@ -185,10 +187,12 @@ def coefficient_estimate(
     )
 
 
-def _growing(model: Model) -> ComplexArray:
-    """Poles of motions that grow."""
+def _growing(model: Model, duration: float) -> ComplexArray:
+    """Poles of motions that grow by more than rounding does within the data (s)."""
     poles = model.poles
-    return poles[np.abs(poles) > 1] if model.dt else poles[poles.real > 0]
+    with np.errstate(divide="ignore"):
+        rate = np.log(np.abs(poles)) / model.dt if model.dt else poles.real
+    return poles[rate * (duration or np.inf) > _ROUNDED]
 
 
 def _growth(minimum: Minimum, spread: Spread, duration: float) -> float:
