@@ -138,10 +138,12 @@ def _with_prior(
     variance = known[0] if None not in known else None
     if all(p.prior is None for p in structure.parameters):
         return found, objective
-    alone = Minimum(objective, found.solution)
+    wider = None
     if variance is None:
+        alone = Minimum(objective, found.solution)
         variance = max(alone.noise_variance, 1e-15 * objective.energy / objective.n_rows)
-    prior = Prior.of(structure.parameters, structure.scale, variance, _wider(alone))
+        wider = _wider(alone)
+    prior = Prior.of(structure.parameters, structure.scale, variance, wider)
     assert prior is not None
     with_prior = objective.of(structure, prior)
     means = np.array([p.value if p.prior is None else p.prior[0] for p in structure.parameters])
