@@ -41,7 +41,7 @@ _EVEN = 1e-3
 _SUFFIX = r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos)\.*$"
 _SLOW = 0.2
 # names of the time with a longer unit behind them, which may be something else behind another name
-_LONG = re.compile(r"(t|time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
+_LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
 # units of a count by its steps in them, and what they are called
 _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms", "milliseconds"))
 # a date and a time of day in columns of their own, and seconds of a day

@@ -91,6 +91,11 @@ class GivenWeights(NoiseModel):
             raise InputError("weights must be finite and not negative, with at least one above 0")
         return array
 
+    def without_first(self, kept: int, every: int) -> GivenWeights:
+        """Those of the lines that are kept, where these are all but the first and all were given."""
+        longer = kept < every == self.given.shape[-1]
+        return GivenWeights(self.given[..., 1:]) if longer else self
+
 
 class ResponseNoise(NoiseModel):
     """1/variance of a response, that of its own measurement; one of few averages as its

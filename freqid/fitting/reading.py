@@ -244,9 +244,12 @@ class Reading:
         s = spectra(record, self.band, lifted=lifted)
         # of a constant that was taken off nothing is left to see at zero but free motions
         taken = 0 if self.offset else trends_taken(record)
+        noise, every = self.noise, s.Y.shape[-1]
         if self.skip_zero or taken:
             s = s.without_zero()
-        weights = self.noise.weights(record, s.Y.shape)
+            if isinstance(noise, GivenWeights):
+                noise = noise.without_first(s.Y.shape[-1], every)
+        weights = noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
         other = like if isinstance(like, SpectralExperiment) else None
         made = SpectralExperiment.of_record(s, record.n_inputs, hold, weights, free, plane, other)

@@ -69,3 +69,14 @@ def test_a_fleet_of_detrended_records_is_as_their_fits():
     for (_, row), record in zip(table.iterrows(), records, strict=True):
         est = fq.fit(lag(), record)
         assert np.allclose([row["K"], row["tau"]], est.values, rtol=1e-5)
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_weights_may_be_of_all_lines(more):
+    """With the line at zero, which tells nothing here, or without it."""
+    record = moving(lag(), 300, 4).detrend()
+    weights = np.linspace(1.0, 2.0, 150 + more)
+    est = fq.fit(lag(), record, weights=weights)
+    assert np.allclose(est.values, [3.0, 0.1], rtol=0.05)
+    with pytest.raises(ValueError, match=r"expected \(150,\)"):
+        fq.fit(lag(), record, weights=np.ones(149))
