@@ -92,7 +92,7 @@ class GivenWeights(NoiseModel):
         return array
 
     def without_first(self, kept: int, every: int) -> GivenWeights:
-        """Those of the lines that are kept, where these are all but the first and all were given."""
+        """Those of the kept lines, where all were given and these are all but the first."""
         longer = kept < every == self.given.shape[-1]
         return GivenWeights(self.given[..., 1:]) if longer else self
 
