@@ -105,7 +105,8 @@ class Reading:
                     f"--{option} {' '.join(ends)}: of a response one {option} is read, or all; "
                     "give one, or leave it out"
                 )
-            told[option] = ends[0] if ends else None
+            one = ends[0] if ends else None
+            told[option] = int(one) if one and one.isdecimal() else one
         found = fq.read_response(path, **told)
         if self.dt is None:
             return found

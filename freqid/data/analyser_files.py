@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 # Hz of each unit of frequency
 HERTZ = {
-    "hz": 1.0, "hertz": 1.0, "1/s": 1.0, "khz": 1e3, "mhz": 1e6, "ghz": 1e9,
+    "hz": 1.0, "hertz": 1.0, "1/s": 1.0, "s^-1": 1.0, "s-1": 1.0,
+    "khz": 1e3, "mhz": 1e6, "ghz": 1e9,
     "rad/s": 1 / (2 * np.pi), "rad/sec": 1 / (2 * np.pi),
 }  # fmt: skip
 FREQUENCY = r"(f|freq|frequency|frequenz|angular frequency|w|omega|ω)"

@@ -128,7 +128,10 @@ def of_frame(frame: pd.DataFrame, units: dict[str, str] | None = None) -> Freque
     variance = None
     if len(spread) == 1 and is_in_parts(rest):
         (name, power), *_ = spread.items()
-        variance = (numbers_of(frame, name) ** power)[order]
+        sizes = numbers_of(frame, name)
+        # one that is no size tells nothing
+        if np.isfinite(sizes).all() and (sizes > 0).all():
+            variance = (sizes**power)[order]
     ends = ends_of_quotient([told.get(n, "") for n in rest if n not in spread])
     return FrequencyResponse(f[order], G[order], coherence=coherence, variance=variance, units=ends)
 
@@ -139,10 +142,14 @@ def _as_in_a_file(
     """Columns without the units in brackets behind their names, and these; an index of frequencies
     is a column.
     """
+
+    def is_frequency(name: object) -> bool:
+        return bool(one_of([re.sub(r"_hz$", "", named(str(name))[0].casefold())], FREQUENCY))
+
     index = frame.index.name
-    if index is not None and one_of([re.sub(r"_hz$", "", str(index).casefold())], FREQUENCY):
+    if index is not None and is_frequency(index) and not any(map(is_frequency, frame.columns)):
         frame = frame.reset_index()
-    return without_units(frame, units)
+    return without_units(frame, units, lambda unit: True)
 
 
 def _renamed(frame: pd.DataFrame, columns: Sequence[object]) -> pd.DataFrame:

@@ -41,6 +41,7 @@ _EVEN = 1e-3
 _SUFFIX = r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos)\.*$"
 _SLOW = 0.2
 # names of the time with a longer unit behind them, which may be something else behind another name
+_STEMS = {"time", "elapsed", "elapsed time", "zeit", "temps", "timestamp"}
 _LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
 # units of a count by its steps in them, and what they are called
 _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms", "milliseconds"))
@@ -99,9 +100,10 @@ def time_named(columns: Sequence[str]) -> str | None:
         plain = named(column)[0].strip().casefold()
         if re.sub(r"[\s_]+", " ", plain) in _NAMES or plain in _NAMES:
             return column
-        if re.sub(_SUFFIX, "", plain) in _NAMES or _LONG.fullmatch(plain):
-            return column
-    return None
+    # a unit behind the name, of the first column alone: T_h may be a temperature
+    first = named(columns[0])[0].strip().casefold() if columns else ""
+    stem = re.sub(_SUFFIX, "", first)
+    return columns[0] if (stem != first and stem in _STEMS) or _LONG.fullmatch(first) else None
 
 
 def _joined(frame: pd.DataFrame) -> pd.DataFrame:

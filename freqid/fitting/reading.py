@@ -288,4 +288,7 @@ class Reading:
             )
         lines = None if self.band is None else spectra(record, self.band)
         free = self.initial_state == "estimate"
-        return TimeExperiment(record, hold if plane is None else None, lines, free, self.place)
+        taken = trends_taken(record)
+        trends = taken + self.skip_zero if taken else 0
+        held = hold if plane is None else None
+        return TimeExperiment(record, held, lines, free, self.place, trends)

@@ -165,3 +165,34 @@ def test_the_unit_of_a_response_is_that_of_its_ends(tmp_path):
     frf = fq.read_response(tmp_path / "frf.csv")
     assert frf.units == {"y": "deg", "u": "Nm"}
     assert any(r.startswith("units") for r in fq.fit(axis(), frf, n_starts=1).verdict.reasons)
+
+
+@pytest.mark.parametrize("name", ["T_h", "t_min", "T ms", "t s"])
+def test_signals_that_end_like_a_time_are_none(name):
+    t, u, y = 0.01 * np.arange(50), *np.random.default_rng(1).standard_normal((2, 50))
+    for rises in (20 + 0.5 * np.arange(50), y):
+        table = pd.DataFrame({name: rises, "u": u, "y": y, "Time": t})
+        assert fq.Record.from_frame(table, "u", "y").dt == pytest.approx(0.01)
+    table = pd.DataFrame({"u": u, name: y})
+    assert fq.Record.from_frame(table, "u", name, dt=0.01).output_names == (name,)
+
+
+def test_brackets_that_hold_no_unit_are_part_of_a_name():
+    record = fq.Record(*np.ones((2, 9)), 0.01, input_names=["x (raw)"], output_names=["a [b]"])
+    again = fq.Record.from_frame(record.to_frame())
+    assert (again.input_names, again.output_names) == (("x (raw)",), ("a [b]",))
+
+
+def test_an_index_beside_a_column_of_frequencies_is_none():
+    table = pd.DataFrame({"frequency": F, "real": G.real, "imag": G.imag})
+    for frame in (
+        table.set_index("frequency", drop=False),
+        table.set_index(pd.Index(range(len(F)), name="f")),
+    ):
+        assert np.allclose(fq.FrequencyResponse.from_frame(frame).frequency, F)
+
+
+@pytest.mark.parametrize("sizes", [0.0, -1.0, np.nan])
+def test_a_deviation_that_is_none_is_left_out(sizes):
+    table = pd.DataFrame({"f": F, "real": G.real, "imag": G.imag, "std": sizes})
+    assert fq.FrequencyResponse.from_frame(table).variance is None

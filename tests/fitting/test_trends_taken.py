@@ -80,3 +80,17 @@ def test_weights_may_be_of_all_lines(more):
     assert np.allclose(est.values, [3.0, 0.1], rtol=0.05)
     with pytest.raises(ValueError, match=r"expected \(150,\)"):
         fq.fit(lag(), record, weights=np.ones(149))
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("name", PLANTS)
+def test_the_same_in_time(order, name):
+    """A slope off the torque of an axis had moved J threefold, trusted."""
+    model = PLANTS[name]()
+    true = np.array(list(model.values.values()))
+    record = moving(model, 600, 0, slope=1.0, input_of="steps").detrend(order)
+    if order == 0:
+        record = moving(model, 600, 0, input_of="steps").detrend(0)
+    est = fq.fit(model, record, domain="time")
+    assert np.all(np.abs(est.values - true) < 4 * np.sqrt(np.diag(est.covariance_matrix)))
+    assert est.verdict.grade != "do not use"

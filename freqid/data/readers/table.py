@@ -167,6 +167,11 @@ def named(text: str) -> tuple[str, str]:
     return plain, ""
 
 
+def is_a_unit(text: str) -> bool:
+    """Whether a text is one of the units that loggers print."""
+    return re.fullmatch(_UNIT, text) is not None
+
+
 def named_with(text: str, unit: str) -> str:
     """A name with its unit behind it, as ``named`` tells them apart."""
     return f"{text} [{unit or '-'}]" if unit or named(text) != (text, "") else text

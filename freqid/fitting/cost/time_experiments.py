@@ -8,6 +8,7 @@ import scipy
 from freqid.checks import Array, FloatArray
 from freqid.data import Record
 from freqid.fitting.cost.late_samples import late_input
+from freqid.fitting.cost.trends import polynomials
 from freqid.frf import Spectra
 from freqid.lti import PeriodicHold, Realisation, Sampled
 from freqid.models import FreeMotion, forcing, propagate
@@ -28,12 +29,15 @@ class TimeExperiment:
         lines: Spectra | None,
         free_state: bool,
         place: int = 0,
+        trends: int = 0,
     ) -> None:
         self.factor = record.factor
         N = len(record.u) // self.factor
         self.u = record.inputs[: N * self.factor].T
         self.y = record.outputs[:N].T
         self.hold, self.free_state, self.place = hold, free_state, place
+        # polynomials of these degrees were taken off, and mean nothing: free as the state is
+        self.trends = polynomials(N, trends) if free_state else polynomials(N, 0)
         self.lines = None
         if lines is not None:
             index = np.round(lines.omega * N * record.dt / (2 * np.pi)).astype(int)
@@ -81,6 +85,10 @@ class TimeEvaluation:
             self.mix, self.transient = _independent(
                 e.rows((at.C @ self.free.motions)[..., ::every]), len(at.A)
             )
+            if len(e.trends):
+                each = np.eye(len(e.y))[:, None, :, None] * e.trends[:, None, :]
+                rows = e.rows(each.reshape(-1, *e.y.shape))
+                self.transient = np.concatenate([self.transient, rows])
         else:
             self.x = propagate(self.sampled.phi, push, self.sampled.gamma_next @ self.u[:, 0])
         self.residual = e.rows((at.C @ self.x + at.D @ self.u)[:, ::every] - e.y)
@@ -112,7 +120,8 @@ class TimeEvaluation:
         """The motion (n, N) that the unknowns of the initial state add up to."""
         if initial is None:
             return self.x
-        return self.x + np.tensordot(self.mix @ initial, self.free.motions, 1)
+        own = initial[: self.mix.shape[1]]
+        return self.x + np.tensordot(self.mix @ own, self.free.motions, 1)
 
 
 def _independent(motions: FloatArray, n: int) -> tuple[FloatArray, FloatArray]:

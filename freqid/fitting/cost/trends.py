@@ -41,6 +41,12 @@ def trend_shapes(number: IntArray, n_samples: int, outputs: int, count: int) -> 
     return shapes.reshape(-1, outputs, len(number))
 
 
+def polynomials(n_samples: int, count: int) -> FloatArray:
+    """The first so many, from the constant up, over the record, (count, samples)."""
+    each = [_polynomial(n_samples, degree) for degree in range(count)]
+    return np.array(each, float).reshape(count, n_samples)
+
+
 def _polynomial(n_samples: int, degree: int) -> FloatArray:
     """Legendre's, over the record."""
     along = np.linspace(-1, 1, n_samples)
