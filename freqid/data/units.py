@@ -64,8 +64,8 @@ _ANY_CASE = {
 }  # fmt: skip
 # what a converter counts, which are no multiples of anything that is known here
 _COUNTS = {"count", "counts", "cnt", "cnts", "lsb", "lsbs", "tick", "ticks", "bit", "bits", "inc"}
-# units that names end in: angle_deg, speed_rpm
-_ENDS = {"deg", "rpm", "mrad", "mNm", "Nmm", "Ncm", "mm", "cm", "mA", "dps", "counts", "ticks"}
+# units that names end in: angle_deg, speed_rpm; x_cm may be the centre of mass
+_ENDS = {"deg", "rpm", "mrad", "mNm", "Nmm", "Ncm", "mm", "mA", "dps", "counts", "ticks"}
 
 
 def coherent(unit: str) -> tuple[str, float] | None:

@@ -142,6 +142,8 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
             yield Finding("edge of a bound", sentence, severity, float(value))
 
 
+# units that have none of a channel in them: times, rates and plain numbers
+_TIMED = re.compile(r"|1|%|m?s|k?Hz|(1|rad)/s(²|\^2)?")
 # how the unit of a parameter has that of a channel in it, a moment of inertia N m s²/rad
 _INERTIA = r"kg\s*m(²|\^2|2)"
 _MENTIONS = {
@@ -157,8 +159,9 @@ def other_units(e: Evidence) -> Iterator[Finding]:
     for channel, unit in e.units:
         told = coherent(unit)
         if told is None:
-            named = sorted({p.unit for p in e.parameters if p.unit})
-            if is_count(unit) and named and not any(unit in u for u in named):
+            named = sorted({p.unit for p in e.parameters if not _TIMED.fullmatch(p.unit)})
+            counted = unit.casefold().removesuffix("s")
+            if is_count(unit) and named and not any(counted in u.casefold() for u in named):
                 yield Finding(
                     "units",
                     f"{channel} is in {unit}, and parameters are in {', '.join(named)}: their "

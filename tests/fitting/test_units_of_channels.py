@@ -48,6 +48,19 @@ def test_units_that_do_not_meet_are_a_doubt(units, said):
         assert said in est.warnings[0]
 
 
+@pytest.mark.parametrize(
+    ("gain", "doubted"), [("rad/(N m)", True), ("counts/(N m)", False), ("", False)]
+)
+def test_counts_are_doubted_where_a_parameter_means_another_unit(gain, doubted):
+    def matrices(w, z, g):
+        return [[0, 1], [-w * w, -2 * z * w]], [[0], [g * w * w]], [[1, 0]], None
+
+    values = [("w", 50.0, "rad/s"), ("z", 0.05, ""), ("g", 0.2, gain)]
+    plant = fq.GreyBox(matrices, [fq.Parameter(*v) for v in values])
+    est = fq.fit(plant, measured({"torque": "N m", "angle": "counts"}), n_starts=1)
+    assert any(w.kind == "units" for w in est.warnings) == doubted
+
+
 def test_who_means_the_unit_of_his_file_says_so_in_his_parameters():
     def matrices(w, z, g):
         return [[0, 1], [-w * w, -2 * z * w]], [[0], [g * w * w]], [[1, 0]], None
