@@ -21,8 +21,6 @@ from freqid.checks import Array, ComplexArray
 
 # lines worked on at once: their products stay in the processor's cache
 BLOCK = 4096
-# what lies between numbers next to one
-_NEXT = float(np.finfo(float).eps)
 
 
 class Moving(NamedTuple):
@@ -40,12 +38,6 @@ class Term(NamedTuple):
     derivative: Array
     left: ComplexArray | None
     right: ComplexArray
-
-
-def _gap(z: ComplexArray, pole: ComplexArray) -> ComplexArray:
-    """z − λ; of a pole that has come to lie on a line what the next number would leave."""
-    gap: ComplexArray = z - pole
-    return gap if gap.all() else np.where(gap == 0, _NEXT * np.abs(z), gap)
 
 
 @dataclass(frozen=True)
@@ -70,7 +62,7 @@ class SampledPlant:
 
     def resolvent(self, z: ComplexArray) -> ComplexArray | None:
         """1/(z − λ), (…, n, lines), in the eigenbasis: what ``solve`` and ``output_rows`` share."""
-        return None if self.triangular else 1 / _gap(z[..., None, :], self.phi[..., :, None])
+        return None if self.triangular else 1 / (z[..., None, :] - self.phi[..., :, None])
 
     def solve(
         self, z: ComplexArray, right: ComplexArray, known: ComplexArray | None = None
@@ -82,7 +74,7 @@ class SampledPlant:
         x = np.empty_like(right)
         for i in reversed(range(len(self.phi))):
             rest = right[i] + np.tensordot(self.phi[i, i + 1 :], x[i + 1 :], 1)
-            x[i] = rest / _gap(z, self.phi[i, i])
+            x[i] = rest / (z - self.phi[i, i])
         return x
 
     def output_rows(self, z: ComplexArray, known: ComplexArray | None = None) -> ComplexArray:
@@ -93,7 +85,7 @@ class SampledPlant:
         w = np.empty((*self.C.shape, len(z)), complex)
         for i in range(len(self.phi)):
             rest = self.C[:, i, None] + np.einsum("pjl,j->pl", w[:, :i], self.phi[:i, i])
-            w[:, i] = rest / _gap(z, self.phi[i, i])
+            w[:, i] = rest / (z - self.phi[i, i])
         return w
 
     def drive(self, z: ComplexArray, U: ComplexArray) -> ComplexArray:
