@@ -242,10 +242,10 @@ class Reading:
         )
         lifted = bool(at_input) and plane is None and not self.delayed
         s = spectra(record, self.band, lifted=lifted)
-        # of a constant that was taken off nothing is left to see at zero but free motions
-        taken = 0 if self.offset else trends_taken(record)
+        taken = trends_taken(record)
         noise, every = self.noise, s.Y.shape[-1]
-        if self.skip_zero or taken:
+        # of a constant that was taken off nothing is left to see at zero but free motions
+        if self.skip_zero or (taken and not self.offset):
             s = s.without_zero()
             if isinstance(noise, GivenWeights):
                 noise = noise.without_first(s.Y.shape[-1], every)

@@ -1,5 +1,7 @@
 """Records whose means or trends were taken off, not at rest: right numbers, trusted."""
 
+import tracemalloc
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -94,3 +96,21 @@ def test_the_same_in_time(order, name):
     est = fq.fit(model, record, domain="time")
     assert np.all(np.abs(est.values - true) < 4 * np.sqrt(np.diag(est.covariance_matrix)))
     assert est.verdict.grade != "do not use"
+
+
+def test_looking_for_trends_takes_no_memory():
+    """It had held four more arrays as long as a record."""
+    record = fq.Record(*np.random.default_rng(0).standard_normal((2, 1_000_000)), 1e-3)
+    tracemalloc.start()
+    try:
+        assert trends_taken(record) == 0
+        assert tracemalloc.get_traced_memory()[1] < 1e5
+    finally:
+        tracemalloc.stop()
+
+
+def test_an_offset_is_found_beside_a_line_that_was_taken_off():
+    record = moving(lag(), 400, 3, slope=1.0).detrend(1)
+    est = fq.fit(lag(), record, offset="estimate")
+    assert est.verdict.trusted
+    assert np.allclose(est.values, fq.fit(lag(), record).values, rtol=1e-3)
