@@ -18,7 +18,7 @@ from freqid.fitting.data_notes import notes_of
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fed_back import FED_BACK, could_go, fed_back, pulled_by_noise
 from freqid.fitting.fit_options import check_words
-from freqid.fitting.fitters import Near, SearchOptions, fitter_of
+from freqid.fitting.fitters import Near, SearchOptions, fitted, fitter_of
 from freqid.fitting.noise_models import Weights, as_noise_model, in_one_unit, noise_models_of
 from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
@@ -263,7 +263,7 @@ def _fitted(
         own = options if near is None else again(near, options)
         if any(r.noise.to_be_learnt for r in some):
             return noise_weighted(model, some, own, explained)
-        est = fitter_of(model)(model, some, own)
+        est, some = fitted(model, some, own)
         if any(r.logarithmic and not r.noise.plain for r in some):
             some = [relative_to_model(est, r) for r in some]
             est = fitter_of(model)(model, some, again(est, own))

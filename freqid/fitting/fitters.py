@@ -6,9 +6,29 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from freqid.checks import InputError
+import numpy as np
+
+from freqid.checks import ComplexArray, InputError
+from freqid.data import Record
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
+
+# a sampled pole this near to one is an integrator's to rounding
+_ON_LINE = 1e-10
+
+
+class OnLineError(InputError):
+    """A pole of a black box lies on a line, where a model that keeps it is infinite."""
+
+
+def refuse_on_line(poles: ComplexArray, readings: Sequence[Reading]) -> None:
+    """OnLineError where one of the sampled poles is an integrator's, and the line at zero read."""
+    if len(poles) and np.abs(poles - 1).min() < _ON_LINE and not _apart_from_zero(readings):
+        raise OnLineError(f"of the poles {poles} one lies on the line at zero")
+
+
+def _apart_from_zero(readings: Sequence[Reading]) -> bool:
+    return all(r.skip_zero or not isinstance(r.data, Record) for r in readings)
 
 
 class Near(dict[str, float]):
@@ -80,3 +100,21 @@ def fitter_of(model: object) -> Fitter:
             f"model={type(model).__name__} is not a model{call}; expected one of {names}"
         )
     return FITTERS[type(model)]
+
+
+def fitted(
+    model: object, readings: Sequence[Reading], options: SearchOptions
+) -> tuple[Estimate, Sequence[Reading]]:
+    """The estimate, and the readings that it is of.
+
+    A black box that finds an integrator without noise has a pole on the line at zero, which then
+    says nothing of the plant and is left out, as where a grey box is known to integrate.
+    """
+    fit = fitter_of(model)
+    try:
+        return fit(model, readings, options), readings
+    except (OnLineError, np.linalg.LinAlgError):
+        if _apart_from_zero(readings):
+            raise
+    less = [r.with_(skip_zero=True) for r in readings]
+    return fit(model, less, options), less

@@ -65,6 +65,10 @@ class NoiseModel(ABC):
         """The model after a fit that left these errors (outputs, lines) of so many samples."""
         return self
 
+    def without_first(self, kept: int, every: int) -> NoiseModel:
+        """That of the kept lines, where all were told and these are all but the first."""
+        return self
+
 
 class BiasIntegral(NoiseModel):
     """None at all: ones (the bias integral, paper eq. 2), for a response its input spectrum."""
@@ -92,9 +96,7 @@ class GivenWeights(NoiseModel):
         return array
 
     def without_first(self, kept: int, every: int) -> GivenWeights:
-        """Those of the kept lines, where all were given and these are all but the first."""
-        longer = kept < every == self.given.shape[-1]
-        return GivenWeights(self.given[..., 1:]) if longer else self
+        return GivenWeights(_without_first(self.given, kept, every))
 
 
 class ResponseNoise(NoiseModel):
@@ -171,6 +173,14 @@ class MeasuredNoise(NoiseModel):
 
     def learnt(self, error: ComplexArray, n_samples: int) -> NoiseModel:
         return MeasuredNoise(noise_weights(error, n_samples))
+
+    def without_first(self, kept: int, every: int) -> NoiseModel:
+        found = self.found
+        return self if found is None else MeasuredNoise(_without_first(found, kept, every))
+
+
+def _without_first(weights: FloatArray, kept: int, every: int) -> FloatArray:
+    return weights[..., 1:] if kept < every == weights.shape[-1] else weights
 
 
 # an argument ``weights``: none, a name, or an array

@@ -12,7 +12,7 @@ from freqid.data import FrequencyResponse, Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.fitters import SearchOptions, fitted, fitter_of
 from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
@@ -68,8 +68,8 @@ def _in_turn(
     model: object, readings: Sequence[Reading], options: SearchOptions
 ) -> tuple[Estimate, Estimate, Sequence[Reading]]:
     """The first estimate, the one that stands, and the readings by whose noise it was found."""
-    fit = fitter_of(model)
-    first = est = whole = fit(model, readings, options)
+    est, readings = fitted(model, readings, options)
+    first = whole = est
     for i in range(_NOISE_ROUNDS):
         if est.message == INTERRUPTED:
             return first, est, readings
@@ -77,13 +77,14 @@ def _in_turn(
         before, anew = est, again(est, options)
         # a black box begins by itself where noise is first told, and walks from there
         walks = anew.start is None and i > 0
-        est = fit(model, readings, dataclasses.replace(anew, before=before) if walks else anew)
+        own = dataclasses.replace(anew, before=before) if walks else anew
+        est, readings = fitted(model, readings, own)
         whole = whole if walks else est
         if _stands(est, before):
             break
     if not _stands(est, whole):
         # what is noise has changed on the way, and with it perhaps which minimum is the least
-        other = fit(model, readings, anew)
+        other = fitter_of(model)(model, readings, anew)
         est = other if other.cost < est.cost * (1 - _DEEPER) else est
     return first, est, readings
 

@@ -247,8 +247,7 @@ class Reading:
         # of a constant that was taken off nothing is left to see at zero but free motions
         if self.skip_zero or (taken and not self.offset):
             s = s.without_zero()
-            if isinstance(noise, GivenWeights):
-                noise = noise.without_first(s.Y.shape[-1], every)
+            noise = noise.without_first(s.Y.shape[-1], every)
         weights = noise.weights(record, s.Y.shape)
         free = self.initial_state != "steady"
         other = like if isinstance(like, SpectralExperiment) else None

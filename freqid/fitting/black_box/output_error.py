@@ -18,11 +18,11 @@ from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fits
+from freqid.fitting.fitters import OnLineError, SearchOptions, fits, refuse_on_line
 from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import read_for
-from freqid.fitting.search.descent import polish
+from freqid.fitting.search.descent import UncomputableError, polish
 from freqid.fitting.sight import out_of_sight
 from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.sufficiency import enough_rows, moving, told_apart
@@ -36,7 +36,7 @@ _STEPS = 80
 # a motion that grows e-fold this often within the data is no integrator's, whose pole noise moved
 _STILL = 3.0
 # and by how much rounding makes an integrator's grow there
-_ROUNDED = 1e-8
+_ROUNDED = 1e-6
 
 
 @fits(OutputError, black_box=True)
@@ -61,7 +61,13 @@ def fit_output_error(
     if options is not None and options.before is not None:
         chart, solution, objective = _next_to(options.before, spec, lines, plane)
     else:
-        chart, solution, objective = Orders(lines, plane, dt, more, seed, count).least(spec)
+        try:
+            chart, solution, objective = Orders(lines, plane, dt, more, seed, count).least(spec)
+        except (UncomputableError, ArithmeticError) as error:
+            raise OnLineError(str(error)) from error
+    if not spec.stable:
+        # those that are held at the edge of the circle lie next to the line, too
+        refuse_on_line(np.linalg.eigvals(chart.in_z(solution.x).A), readings)
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())

@@ -24,7 +24,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
-from freqid.fitting.fitters import SearchOptions, fits
+from freqid.fitting.fitters import OnLineError, SearchOptions, fits
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import read_for
 from freqid.fitting.search.descent import Solution, polish
@@ -175,8 +175,7 @@ def _delays(
             # longer ones leave even less
             break
         tried.append((point, delay))
-    # a single one is that of no delay, which every record can be put in step with
-    if len(tried) > 1:
+    if len(tried) > 1:  # a single one is that of no delay, with which all can be put in step
         # the best one, its neighbours, and every other valley
         costs = [np.inf, *(cost for cost, _ in tried), np.inf]
         valleys = [t for i, t in enumerate(tried, 1) if t[0] <= min(costs[i - 1], costs[i + 1])]
@@ -263,11 +262,13 @@ def _starting_poles(
         # a pole on the negative axis has no partner in s: half the Nyquist frequency, well damped
         lonely = (np.abs(z.imag) < 1e-9 * np.abs(z)) & (z.real < 0)
         starts.append(np.where(lonely, -np.abs(s), s))
+    except OnLineError:
+        raise
     except (InputError, np.linalg.LinAlgError):
         pass
     pairs = spec.poles // 2
     w = np.exp(np.interp(np.arange(pairs) + 0.5, [0, max(pairs, 1)], np.log(omega[[0, -1]])))
-    spread = np.concatenate([-0.05 * w + 1j * w, -0.05 * w - 1j * w])
+    spread = np.concatenate([(-0.05 + 1j) * w, (-0.05 - 1j) * w])
     if spec.poles % 2:
         spread = np.append(spread, -omega.mean())
     return [*starts, spread]

@@ -83,10 +83,15 @@ class Chart:
 
     def realise(self, x: FloatArray) -> Realisation:
         """The state space at x and its derivatives; ArithmeticError where it must be stable."""
-        at = self.matrices(x)
-        if self.stable and np.abs(np.linalg.eigvals(at.A)).max(initial=0) >= 1:
+        if self.refused(x):
             raise ArithmeticError("the model is unstable there")
-        return Realisation.of(Linearisation(at, self.derivative))
+        return Realisation.of(Linearisation(self.matrices(x), self.derivative))
+
+    def refused(self, x: FloatArray) -> bool:
+        """Whether the model at x has to be stable and is not."""
+        return self.stable and bool(
+            np.abs(np.linalg.eigvals(self.matrices(x).A)).max(initial=0) >= 1
+        )
 
     def linearised(self, x: FloatArray) -> Linearisation:
         """The state space at x and its derivatives, where a last step left the circle as well."""

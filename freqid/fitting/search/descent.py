@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective, Point, Structure
 from freqid.fitting.search.bounded import within_bounds
 from freqid.fitting.search.worth import Worth, WorthlessError
@@ -16,6 +17,10 @@ from freqid.lti import solved
 
 # what a search says that was ended from the keyboard
 INTERRUPTED = "interrupted: this is the best point so far"
+
+
+class UncomputableError(InputError):
+    """A model that cannot be computed where a search was to begin."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +59,11 @@ def minimise(
     """Least squares from one start: Levenberg-Marquardt, within bounds where there are any.
 
     ``limit`` is the most evaluations. A way that will end above ``worth`` is left.
-    Raises ValueError when the model cannot be computed at the start.
+    Raises UncomputableError when the model cannot be computed at the start.
     """
     first = objective.point(start)
     if first is None:
-        raise InputError(
+        raise UncomputableError(
             f"the model cannot be computed at {objective.structure.describe(start)}: "
             f"{objective.failure}; give another start"
         )
@@ -206,6 +211,9 @@ def _straight_down(
             break
         # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain
         if np.abs(step).max() <= last_step or float(c @ c) <= tolerance * point.cost:
+            structure = objective.structure
+            if isinstance(structure, Chart) and structure.refused(x + step):
+                break
             left = max(1 - float(c @ c) / max(point.cost, 1e-300), 0.0)
             triangle = point.triangle.copy()
             triangle[:P, P] = 0

@@ -1,0 +1,54 @@
+"""Black boxes of integrators without noise: a pole lies on the line at zero to rounding."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+DT = 0.01
+PLANTS = {
+    "integrator": ([1.0], [1.0, 0.0]),
+    "axis with friction": ([2.0], [0.5, 1.0, 0.0]),
+    "axis with a mode": ([40.0], [1.0, 2.0, 40.0, 0.0]),
+}
+
+
+def record(plant, n, seed):
+    """Random steps of ±1 into a plant, by scipy."""
+    u = np.where(np.random.default_rng(seed).random(n) < 0.5, -1.0, 1.0)
+    numerator, denominator, _ = scipy.signal.cont2discrete(PLANTS[plant], DT)
+    return fq.Record(u, scipy.signal.lfilter(numerator.ravel(), denominator, u), DT, hold="zoh")
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("n", [80, 150, 300])
+@pytest.mark.parametrize("weights", [None, "noise"])
+def test_integrators_without_noise_are_found(plant, n, weights):
+    _, denominator = PLANTS[plant]
+    order = len(denominator) - 1
+    for seed in range(2):
+        data = record(plant, n, seed)
+        est = fq.fit(fq.OutputError(order), data, weights=weights)
+        sampled = np.sort_complex(np.exp(np.roots(denominator).astype(complex) * DT))
+        assert np.allclose(np.sort_complex(est.model.poles.astype(complex)), sampled, atol=1e-6)
+        assert est.verdict.grade == "trust", est.verdict
+        rational = fq.fit(fq.TransferFunction(0, order), data, weights=weights)
+        gain = PLANTS[plant][0][0] / denominator[0]
+        assert rational["b0"] == pytest.approx(gain, rel=1e-5)
+        assert rational.fit_percent == pytest.approx(100, abs=1e-6)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_more_poles_than_an_integrator_has_do_no_harm(plant):
+    order = len(PLANTS[plant][1])
+    for seed in range(4):
+        est = fq.fit(fq.OutputError(order), record(plant, 150, seed))
+        assert est.fit_percent == pytest.approx(100, abs=1e-2)
+
+
+def test_stable_ones_next_to_an_integrator_are_fitted_or_say_why():
+    for seed in range(4):
+        est = fq.fit(fq.OutputError(2, stable=True), record("axis with friction", 150, seed))
+        assert np.abs(est.model.poles).max() <= 1 + 1e-12
+        assert est.fit_percent == pytest.approx(100, abs=1e-2)
