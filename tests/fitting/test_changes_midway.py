@@ -94,3 +94,18 @@ def test_a_drift_that_made_friction_negative_is_named_before_it():
         assert est["fm"] < 0
         assert "drift" in said[:2], said
         assert said[-1] == "not physical", said
+
+
+def test_a_half_without_input_shows_no_change():
+    """After a blow a parameter would have to be another by a factor of hundreds to be seen."""
+    plant = fq.GreyBox(
+        lambda T, g: ([[-1 / T]], [[g / T]], [[1]], [[0]]),
+        [fq.Parameter("T", 0.2, "s"), fq.Parameter("g", 1.0)],
+    )
+    u = np.zeros(400)
+    u[5:10] = 1.0
+    for seed in range(8):
+        noise = scipy.signal.lfilter([1], [1, -0.9], np.random.default_rng(seed).normal(size=400))
+        y = np.ravel(fq.simulate(plant, u, 0.01).y)
+        record = fq.Record(u, y + 0.05 * y.std() * noise / noise.std(), 0.01)
+        assert "unsteady" not in [w.kind for w in fq.fit(plant, record).warnings]
