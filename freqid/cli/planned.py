@@ -56,6 +56,8 @@ def bias(
     assumed = [None if name == "remembered" else name for name in names]
     factors = [whole("--factor", f) for f in factor]
     plant = asked.grey_box()
+    if parameter is not None:
+        choice("--parameter", parameter, [p.name for p in plant.free_parameters])
     low, high = chirp
     below_nyquist(high, base_dt)
     swept = f"{low:g}-{high:g}"

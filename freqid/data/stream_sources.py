@@ -61,7 +61,8 @@ def open(
     True
     """
     size = whole("block", block)
-    both = None if inputs is None or outputs is None else [*_listed(inputs), *_listed(outputs)]
+    u, y = _listed("inputs", inputs), _listed("outputs", outputs)
+    both = None if u is None or y is None else [*u, *y]
     if files := files_of(source):
         asked = Asked(size, dt, columns, group, both)
         found = chained([_of_file(file, asked) for file in files], both, hold is not None)
@@ -85,10 +86,10 @@ def open(
     if step is None:
         raise InputError(f"dt=None and {found.origin} says no sample time; give dt in s")
     try:
-        u_names, y_names = _chosen(found.names, inputs, outputs)
+        u_names, y_names = _chosen(found.names, u, y)
     except InputError as error:
         raise InputError(f"{found.origin}: {error}") from None
-    if found.lost and (inputs is None or outputs is None):
+    if found.lost and both is None:
         raise InputError(
             f"{found.origin} keeps {found.lost}, which a stream has not: read() it, or name inputs "
             "and outputs to leave that out"
@@ -170,8 +171,17 @@ def _alike(blocks: Iterable[Source], names: Sequence[str]) -> Iterator[Array]:
         yield rows
 
 
-def _listed(given: Sequence[str] | str) -> list[str]:
-    return [given] if isinstance(given, str) else list(given)
+def _listed(argument: str, given: Sequence[str] | str | None) -> list[str] | None:
+    """Names of channels as a list; ValueError for anything else."""
+    if given is None:
+        return None
+    names = [given] if isinstance(given, (str, int)) else listed(argument, given)
+    if any(not isinstance(n, str) for n in names):
+        raise InputError(
+            f"{argument}={given!r:.80}: channels of a stream go by name; columns= names those of "
+            "arrays and blocks"
+        )
+    return names  # type: ignore[return-value]
 
 
 def _factors(
@@ -199,22 +209,12 @@ def _factors(
 
 
 def _chosen(
-    names: list[str], inputs: Sequence[str] | str | None, outputs: Sequence[str] | str | None
+    names: list[str], u: list[str] | None, y: list[str] | None
 ) -> tuple[list[str], list[str]]:
-    picked: list[list[str] | None] = []
-    for argument, given in (("inputs", inputs), ("outputs", outputs)):
-        some = (
-            None
-            if given is None
-            else [given]
-            if isinstance(given, str)
-            else listed(argument, given)
-        )
+    for argument, some in (("inputs", u), ("outputs", y)):
         for name in some or []:
             if name not in names:
                 raise InputError(unknown(argument, name, names))
-        picked.append(some)
-    u, y = picked
     if both := set(u or []) & set(y or []):
         raise InputError(f"inputs and outputs share {', '.join(sorted(both))}; a channel is one")
     rest = [n for n in names if n not in (u or []) + (y or [])]

@@ -144,6 +144,11 @@ def test_bias_for_one_parameter_to_a_table(folder, capsys):
     assert code == 0, capsys.readouterr().err
     assert set(pd.read_csv("bias.csv")["parameter"]) == {"a", "b"}
     assert Path("bias.png").stat().st_size > 1000
+    code = run("bias", "--model", "first-order", "--chirp", "5", "20", "--factor", "2",
+               "--parameter", "zz", "--out", "none.csv")  # fmt: skip
+    assert code == 2
+    assert "--parameter='zz' is not one of 'b', 'a'" in capsys.readouterr().err
+    assert not Path("none.csv").exists()
 
 
 def test_what_is_to_be_done_is_said_as_it_is_typed(folder, capsys):

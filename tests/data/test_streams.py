@@ -163,6 +163,9 @@ def test_what_is_refused(tmp_path):
         fq.open(ROWS)
     with pytest.raises(ValueError, match="inputs='v'"):
         fq.open(ROWS, inputs="v", dt=DT)
+    for numbers in ({"inputs": 0}, {"inputs": [0], "outputs": [1]}):
+        with pytest.raises(ValueError, match="by name"):
+            fq.open(ROWS, dt=DT, **numbers)
     with pytest.raises(FileNotFoundError):
         fq.open(tmp_path / "none.npy")
     with pytest.raises(ValueError, match="shape"):

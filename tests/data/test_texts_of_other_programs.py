@@ -102,3 +102,18 @@ def test_samples_that_a_measurement_file_marks_as_invalid_are_none(tmp_path):
     assert len(record.y_logged) in (48, 49)
     assert not np.isclose(record.y_logged, np.cos(3)).any()
     assert any("1 samples of 'y' are marked as invalid" in note for note in record.notes)
+
+
+@pytest.mark.parametrize("separator", [",", " ", ";"])
+def test_double_precision_of_fortran_is_read(tmp_path, separator):
+    values = np.random.default_rng(0).normal(size=(200, 2))
+    values[3] = 0.0
+    path = tmp_path / "run.dat"
+    rows = [
+        separator.join([f"{0.01 * i:.4f}", *(f"{v:.8E}".replace("E", "D") for v in pair)])
+        for i, pair in enumerate(values)
+    ]
+    path.write_text("\n".join([separator.join(["time", "u", "D1"]), *rows]) + "\n")
+    record = fq.read(path, inputs="u", outputs="D1")
+    np.testing.assert_allclose(record.u, values[:, 0], rtol=1e-8)
+    np.testing.assert_allclose(record.y, values[:, 1], rtol=1e-8)

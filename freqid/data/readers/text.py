@@ -37,6 +37,8 @@ def unzipped(path: Path, mode: str) -> IO[bytes]:
 
 # part of a text that may be no plain characters
 _ODD = 0.2
+# 1.5D-03
+_DOUBLE = re.compile(r"(?<![\w.])([+-]?(?:\d+[.,]\d*|\.\d+))[Dd]([+-]\d{1,3})(?!\w)")
 # characters in which names stand, and of one of them
 _HEAD, _NAME = 4000, 100
 _TWICE = 4
@@ -87,10 +89,11 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
 
 
 def _plain(text: str) -> str:
-    """The text with names in one line, and infinite or undefined numbers as words that are known.
+    """The text with names in one line, infinite or undefined numbers as words that are known, and
+    powers of ten as C writes them.
 
     Excel breaks lines within quoted names; old programs of Microsoft's print ``-1.#IND``, whose
-    end would be a comment.
+    end would be a comment; Fortran has a D for the E of double precision.
     """
     head, rest = text[:_HEAD], text[_HEAD:]
     parts = head.split('"')
@@ -100,6 +103,8 @@ def _plain(text: str) -> str:
     if re.search(r"1[.,]#", text):
         text = re.sub(r"(?<![\w.])([+-]?)1[.,]#INF\w*(\+\d+)?", r"\1inf", text)
         text = re.sub(r"(?<![\w.])[+-]?1[.,]#(IND|QNAN|SNAN)\w*(\+\d+)?", "nan", text)
+    if re.search(_DOUBLE, text[:_HEAD]):
+        text = re.sub(_DOUBLE, r"\1E\2", text)
     return text
 
 
