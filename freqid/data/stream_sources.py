@@ -181,7 +181,7 @@ def _listed(argument: str, given: Sequence[str] | str | None) -> list[str] | Non
             f"{argument}={given!r:.80}: channels of a stream go by name; columns= names those of "
             "arrays and blocks"
         )
-    return names  # type: ignore[return-value]
+    return names
 
 
 def _factors(
