@@ -11,7 +11,7 @@ import numpy as np
 from freqid.checks import InputError
 from freqid.data.averaged_response import AveragedResponse
 from freqid.data.frequency_response import FrequencyResponse
-from freqid.data.local_response import LineNoise, LocalResponse
+from freqid.data.local_response import LocalResponse
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.record import Record
 
@@ -73,8 +73,7 @@ def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> Frequ
     if isinstance(frf, AveragedResponse):
         kept = {"memory": frf.memory}
     elif isinstance(frf, LocalResponse) and frf.line_noise is not None:
-        own = frf.line_noise
-        kept = {"line_noise": LineNoise(own.first, own.rows[:, y][:, :, u], own.power[y])}
+        kept = {"line_noise": frf.line_noise.of(y, u)}
     elif isinstance(frf, PeriodicResponse):
         # outputs come first in the noise
         both = np.array([*y, *(len(y) + i for i in u)])

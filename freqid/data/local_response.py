@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
+from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError, IntArray
 from freqid.data.band import Band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# the column of a table that holds how the noise of lines gets into each
+NOISE = "line noise"
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +41,11 @@ class LineNoise:
     def some(self, kept: BoolArray) -> LineNoise:
         """The same of some lines of the response."""
         return LineNoise(self.first[kept], self.rows[kept], self.power)
+
+    def of(self, outputs: Sequence[int], inputs: Sequence[int]) -> LineNoise:
+        """The same of some channels, in this order."""
+        outputs, inputs = list(outputs), list(inputs)
+        return LineNoise(self.first, self.rows[:, outputs][:, :, inputs], self.power[outputs])
 
     @property
     def variance(self) -> FloatArray:
@@ -58,6 +72,37 @@ class LineNoise:
             total += (met * np.tile(self.power[output], E) @ met.conj().T).real / 2
         return total
 
+    def as_texts(self, variance: FloatArray) -> list[str]:
+        """What each line of a response of a variance (outputs, inputs, K) has of it, as a column of
+        a table holds it: three digits of the rows in standard errors, in base 64.
+        """
+        K, p, m, E, w = self.rows.shape
+        at = self.first[:, None] + np.arange(w)
+        size = np.sqrt(np.where(variance > 0, variance, np.inf))
+        rows = np.einsum("kpmew,pkw,pmk->pmkew", self.rows, np.sqrt(self.power[:, at]), 1 / size)
+        parts = np.stack([rows.real, rows.imag], axis=-1).reshape(p * m * K, -1)
+        head = np.stack([np.tile(self.first, p * m), np.full(p * m * K, E)], axis=1)
+        texts = np.concatenate(
+            [head.astype("<i4").view(np.uint8), parts.astype("<f2").view(np.uint8)], axis=1
+        )
+        return [base64.urlsafe_b64encode(row.tobytes()).decode() for row in texts]
+
+    @classmethod
+    def of_texts(cls, texts: Array, variance: FloatArray) -> LineNoise:
+        """From such a column (outputs, inputs, K); ValueError where it is damaged."""
+        try:
+            raw = [base64.urlsafe_b64decode(text) for text in texts.ravel()]
+            whole = np.frombuffer(b"".join(raw), np.uint8).reshape(len(raw), -1)
+            first, count = np.ascontiguousarray(whole[:, :8]).view("<i4").T
+            parts = np.ascontiguousarray(whole[:, 8:]).view("<f2").astype(float)
+            rows = parts.view(complex).reshape(*variance.shape, count[0], -1)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"column {NOISE!r} is damaged: {error}; leave it out") from None
+        p, _, K = variance.shape
+        first = first.reshape(-1, K)[0].astype(int) - first.min()
+        rows = np.moveaxis(rows * np.sqrt(variance)[..., None, None], 2, 0)
+        return cls(first, rows, np.ones((p, int(first.max()) + rows.shape[-1])))
+
 
 @dataclass(frozen=True, eq=False)
 class OwnNoise:
@@ -71,7 +116,10 @@ class OwnNoise:
         return np.asarray((each.conj() @ each.T).real / 2)
 
 
-def noise_that_is_told(frf: FrequencyResponse) -> LineNoise | OwnNoise | None:
+ToldNoise = LineNoise | OwnNoise
+
+
+def noise_that_is_told(frf: FrequencyResponse) -> ToldNoise | None:
     """What a response tells of the noise of its lines; None where its lines share it unknown how,
     and where it tells nothing.
     """
@@ -114,3 +162,10 @@ class LocalResponse(FrequencyResponse):
         at = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
         noise = None if self.line_noise is None else self.line_noise.some(at)
         return LocalResponse(**{**kept.__dict__, "line_noise": noise})
+
+    def to_frame(self) -> pd.DataFrame:
+        """As of any response, with a column of the noise that lines share, for ``from_frame``."""
+        frame = super().to_frame()
+        if self.line_noise is not None and self.variance is not None:
+            frame[NOISE] = self.line_noise.as_texts(self.variance)
+        return frame

@@ -30,6 +30,7 @@ from freqid.data.averaged_response import MEMORY, SEGMENT, AveragedResponse, rem
 from freqid.data.column_names import without_units
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
+from freqid.data.local_response import NOISE, LineNoise, LocalResponse
 from freqid.data.readers.table import named
 from freqid.data.remembered import kept_of_response
 from freqid.data.sources import that_reads
@@ -185,6 +186,8 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
         n: numbers_of(frame, n) for n in ("variance", "coherence") if n in frame.columns
     }
     columns["response"] = joined(numbers_of(frame, "real"), numbers_of(frame, "imag"))
+    if NOISE in frame.columns:
+        columns[NOISE] = frame[NOISE].to_numpy(dtype=object)
     for name, values in columns.items():
         whole = np.empty((len(outputs), len(inputs), len(f)), values.dtype)
         for i, y in enumerate(outputs):
@@ -194,6 +197,7 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
                     raise InputError(f"{y} from {u} has {len(some)} rows and others {len(f)}")
                 whole[i, j] = some
         fields[name] = whole
+    shared = fields.pop(NOISE, None)
     if "input_spectrum" in frame.columns:
         rows = frame[frame["output"] == outputs[0]]
         spectra = [numbers_of(rows[rows["input"] == u], "input_spectrum") for u in inputs]
@@ -209,6 +213,9 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
     names = {"input_names": inputs, "output_names": outputs, "units": units}
     kept = kept_of_response(frame, [str(n) for n in inputs])
     found = FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
+    if shared is not None and found.variance is not None:
+        noise = LineNoise.of_texts(shared, found.variance)
+        return LocalResponse(**found.__dict__, line_noise=noise)
     if len(f) < 2 or not {MEMORY, SEGMENT} <= set(frame.columns):
         return found
     count = round(float(numbers_of(first, SEGMENT)[0]))
@@ -235,6 +242,9 @@ def picked(
             raise InputError(f"{name}={given!r} is not one of {', '.join(names)}")
         chosen.append(slice(at, at + 1))
     o, i = chosen
+    p, m = (range(len(names)) for names in (frf.output_names, frf.input_names))
+    own = frf.line_noise if isinstance(frf, LocalResponse) else None
+    kept: dict[str, Any] = {} if own is None else {"line_noise": own.of(p[o], m[i])}
     left = (*frf.output_names[o], *frf.input_names[i])
     return dataclasses.replace(
         frf, units={n: u for n, u in frf.units.items() if n in left},
@@ -243,6 +253,5 @@ def picked(
         variance=None if frf.variance is None else frf.variance[o, i],
         coherence=None if frf.coherence is None else frf.coherence[o, i],
         input_spectrum=None if frf.input_spectrum is None else frf.input_spectrum[i],
-        hold=frf.hold.of(range(len(frf.input_names))[i])
-        if isinstance(frf.hold, InputHolds) else frf.hold,
+        hold=frf.hold.of(m[i]) if isinstance(frf.hold, InputHolds) else frf.hold, **kept,
     )  # fmt: skip

@@ -82,3 +82,52 @@ def test_a_sharp_resonance_keeps_its_height_in_noise():
         frf = fq.local_rational(noisy(seed, level=0.2)[1])
         found.append(fq.fit(model, frf, weights="noise")["z"] / 0.05 - 1)
     assert abs(np.mean(found)) < 3 * np.std(found) / np.sqrt(len(found))
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "xlsx", "frame"])
+def test_tables_keep_what_lines_share(kind, tmp_path):
+    """Error bars of a response that was written and read are those that it had."""
+    frf = fq.local_rational(noisy(4)[1], band=(2.0, 20.0))
+    frame, path = frf.to_frame(), tmp_path / f"frf.{kind}"
+    if kind == "csv":
+        frame.to_csv(path, index=False)
+    elif kind == "parquet":
+        frame.to_parquet(path)
+    elif kind == "xlsx":
+        frame.to_excel(path, index=False)
+    again = fq.FrequencyResponse.from_frame(frame) if kind == "frame" else fq.read_response(path)
+    fits = [fq.fit(resonance(), data, weights="noise") for data in (frf, again)]
+    std = [np.sqrt(np.diag(est.covariance_matrix)) for est in fits]
+    np.testing.assert_allclose(std[1], std[0], rtol=2e-3)
+    assert fits[0].verdict.grade == fits[1].verdict.grade
+    one, two = (data.select((4.0, 9.0)).line_noise for data in (frf, again))
+    at = np.random.default_rng(0).standard_normal((2, 1, 1, len(one.first), 2)) @ [1, 1j]
+    np.testing.assert_allclose(two.along(at), one.along(at), rtol=1e-2)
+
+
+def test_tables_of_several_channels_and_experiments_keep_it(tmp_path):
+    """Two inputs share the noise of an output; columns and rows may be some of them."""
+    rng, records = np.random.default_rng(0), []
+    for _ in range(2):
+        u, noise = rng.standard_normal((800, 2)), 0.3 * rng.standard_normal((800, 2))
+        y = np.cumsum(u @ [[0.3, 0.1], [-0.2, 0.4]], axis=0)
+        y = y - 0.2 * np.concatenate([[[0, 0]], y[:-1]])
+        records.append(fq.Record(u, y + noise, DT))
+    frf = fq.local_polynomial(records, band=(2.0, 30.0))
+    frf.to_frame().to_csv(tmp_path / "frf.csv", index=False)
+    again = fq.read_response(tmp_path / "frf.csv")
+    assert again.line_noise.rows.shape == frf.line_noise.rows.shape
+    at = rng.standard_normal((3, 2, 2, len(frf.frequency), 2)) @ [1, 1j]
+    np.testing.assert_allclose(again.line_noise.along(at), frf.line_noise.along(at), rtol=1e-2)
+    some = fq.read_response(tmp_path / "frf.csv", input="u2", output="y1")
+    np.testing.assert_allclose(
+        some.line_noise.along(at[:, :1, 1:]), frf.line_noise.of([0], [1]).along(at[:, :1, 1:]),
+        rtol=1e-2,
+    )  # fmt: skip
+
+
+def test_a_damaged_column_is_named():
+    frame = fq.local_polynomial(noisy(5)[1]).to_frame()
+    frame.loc[3, "line noise"] = "zz"
+    with pytest.raises(ValueError, match="'line noise' is damaged"):
+        fq.FrequencyResponse.from_frame(frame)

@@ -49,9 +49,7 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
             for r in book.get_sheet_by_name(name).to_python()
             if any(c not in ("", None) for c in r)
         ]
-        body = (
-            i for i, r in enumerate(rows) if sum(_is_number(c) for c in r) >= max(len(r) - 1, 1)
-        )
+        body = (i for i, r in enumerate(rows) if _is_row(r))
         first, second = next(body, None), next(body, None)
         if first is None or second is None:
             continue
@@ -79,6 +77,12 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
 
 def _are_samples(row: list[Any]) -> bool:
     return all(c in ("", None) or _is_number(c) or isinstance(c, _TIMES) for c in row)
+
+
+def _is_row(row: list[Any]) -> bool:
+    """Whether a row is one of numbers, beside one word, or some where there are many."""
+    words = sum(not _is_number(c) for c in row)
+    return words <= 1 < len(row) or words == 0 or 3 * words <= len(row)
 
 
 def _is_number(cell: Any) -> bool:

@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, IntArray
-from freqid.data import FrequencyResponse, LineNoise, OwnNoise, noise_that_is_told
+from freqid.data import FrequencyResponse, ToldNoise, noise_that_is_told
 from freqid.fitting.cost.evaluation import SpectralEvaluation, SumOfEvaluations
 from freqid.fitting.cost.lines import Lines, Points, Transient, runs
 from freqid.frf import Spectra
@@ -87,7 +87,7 @@ class SpectralExperiment:
     discrete: bool = False
     response: bool = False
     reach: int = 0
-    line_noise: LineNoise | OwnNoise | None = None
+    line_noise: ToldNoise | None = None
     added: FloatArray | None = None
     place: int = 0
 

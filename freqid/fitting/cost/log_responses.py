@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data import LineNoise, OwnNoise
+from freqid.data import ToldNoise
 from freqid.lti import Hold, Realisation, sampled_response
 
 # part of the measured response below which that of a model is none
@@ -34,7 +34,7 @@ class LogResponse:
         weight: FloatArray | float = 1.0,
         place: int = 0,
         reach: int = 0,
-        line_noise: LineNoise | OwnNoise | None = None,
+        line_noise: ToldNoise | None = None,
     ) -> None:
         self.omega, self.hold, self.reach, self.line_noise = omega, hold, reach, line_noise
         self.weight = np.broadcast_to(weight, response.shape)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data import LineNoise, OwnNoise
+from freqid.data import ToldNoise
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.objective import Objective
@@ -213,7 +213,7 @@ def _of_response(
     residual: FloatArray,
     scale: FloatArray,
     reach: int,
-    noise: LineNoise | OwnNoise | None,
+    noise: ToldNoise | None,
 ) -> FloatArray:
     """What the noise of a response makes of the gradient, (P, P); its errors (outputs, inputs, K)
     were multiplied by the ``scale``.
