@@ -79,13 +79,16 @@ def power_above(x: FloatArray, factor: int) -> float:
     """
     if factor == 1:
         return 0.0
-    flat = x.reshape(len(x), -1)
+    above, total = powers_above(x.reshape(len(x), -1), factor)
+    return float(np.max(above / np.where(total > 0, total, np.inf)))
+
+
+def powers_above(x: FloatArray, factor: int) -> tuple[FloatArray, FloatArray]:
+    """Power of each signal, (N, channels), above that limit, and all of it beside its mean."""
     # a window, so that a record's ends do not look like high frequencies
     window = scipy.signal.get_window("hann", len(x))[:, None]
-    power = np.abs(np.fft.rfft((flat - flat.mean(axis=0)) * window, axis=0)) ** 2
-    above = power[len(power) // factor + 1 :].sum(axis=0)
-    total = power.sum(axis=0)
-    return float(np.max(above / np.where(total > 0, total, np.inf)))
+    power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
+    return power[len(power) // factor + 1 :].sum(axis=0), power.sum(axis=0)
 
 
 def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:

@@ -55,6 +55,7 @@ class FrequencyResponse:
             models does, which share their windows.
         conditions: what was set for this experiment, numbers by name.
         units: unit of each channel by name.
+        aliased: part of the input's power that decimation had folded into lower frequencies.
 
     Raises ValueError for shapes that disagree, frequencies that do not increase, or values that
     are not finite.
@@ -76,6 +77,7 @@ class FrequencyResponse:
     reach: int
     conditions: Mapping[str, float]
     units: Mapping[str, str]
+    aliased: float
 
     # written by hand: fields hold what was checked, which is less than what may be given
     @in_either_order
@@ -93,6 +95,7 @@ class FrequencyResponse:
         reach: int = 0,
         conditions: Mapping[str, float] | None = None,
         units: Mapping[str, str] | None = None,
+        aliased: float = 0.0,
     ) -> None:
         f = numbers("frequency", frequency)
         if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
@@ -112,23 +115,20 @@ class FrequencyResponse:
         u_names = channel_names("input_names", input_names, m, "u")
         y_names = channel_names("output_names", output_names, p, "y")
         self.__dict__.update(
-            frequency=frozen(f),
-            response=frozen(G),
-            dt=dt,
+            frequency=frozen(f), response=frozen(G), dt=dt, aliased=finite("aliased", aliased),
             hold=None if hold is None else as_hold(hold, dt),
             variance=shaped("variance", variance, G.shape),
             coherence=shaped("coherence", coherence, G.shape, most=1.0),
             input_spectrum=shaped("input_spectrum", input_spectrum, (m, K)),
-            input_names=u_names,
-            output_names=y_names,
-            reach=whole("reach", reach, least=0),
-            conditions=as_conditions(conditions),
-            units=as_units(units, (*u_names, *y_names)),
-        )
+            input_names=u_names, output_names=y_names, reach=whole("reach", reach, least=0),
+            conditions=as_conditions(conditions), units=as_units(units, (*u_names, *y_names)),
+        )  # fmt: skip
 
     def __setstate__(self, state: State) -> None:
         """Restore; what version 0.1.0 wrote lacks what it did not know."""
-        self.__dict__.update({"reach": 0, "conditions": {}, "units": {}} | sealed(state))
+        self.__dict__.update(
+            {"reach": 0, "conditions": {}, "units": {}, "aliased": 0.0} | sealed(state)
+        )
 
     @property
     def omega(self) -> FloatArray:

@@ -58,6 +58,7 @@ class PeriodicResponse(FrequencyResponse):
         reach: int = 0,
         conditions: Any = None,
         units: Mapping[str, str] | None = None,
+        aliased: float = 0.0,
         inputs: Any = None,
         outputs: Any = None,
         noise: Any = None,
@@ -69,7 +70,7 @@ class PeriodicResponse(FrequencyResponse):
     ) -> None:
         super().__init__(
             frequency, response, variance, dt, hold, coherence, input_spectrum, input_names,
-            output_names, reach, conditions, units,
+            output_names, reach, conditions, units, aliased,
         )  # fmt: skip
         p, m, K = self.response.shape
         U, Y = numbers("inputs", inputs, complex), numbers("outputs", outputs, complex)

@@ -52,6 +52,8 @@ def response_columns(frf: FrequencyResponse) -> dict[str, float | bool]:
         kept |= _hold_columns(frf.hold, frf.input_names)
     if frf.reach:
         kept["reach"] = frf.reach
+    if frf.aliased > _ROUNDING:
+        kept[_ALIASED] = frf.aliased
     return kept | condition_columns(frf.conditions)
 
 
@@ -63,6 +65,7 @@ def kept_of_response(frame: pd.DataFrame, inputs: list[str]) -> dict[str, object
     numbers = {n: _one(frame, n) for n in ("dt", "reach") if n in frame.columns}
     if "reach" in numbers:
         numbers["reach"] = round(numbers["reach"])
+    numbers["aliased"] = kept_aliased(frame)
     return {**numbers, "hold": hold, "conditions": kept_conditions(frame)}
 
 

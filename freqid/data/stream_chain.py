@@ -73,6 +73,7 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None, held: bool) -> 
     return Found(
         blocks, names, sum(lengths), first.dt, origin, first.hold, first.conditions, units,
         lost=next((found.lost for found in each if found.lost), ""),
+        aliased=max(found.aliased for found in each),
         slow=frozenset().union(*(found.slow for found in each)),
         hollow={n: told for found in each for n, told in found.hollow.items()},
     )  # fmt: skip

@@ -14,7 +14,7 @@ from freqid.data.readers.kinds import damaged, existing, missing, refusing
 from freqid.data.readers.parquet import field_units
 from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
-from freqid.data.remembered import is_kept, kept_conditions, kept_hold, kept_of_record
+from freqid.data.remembered import is_kept, kept_aliased, kept_conditions, kept_hold, kept_of_record
 from freqid.data.stream_arrays import of_hdf5, of_zarr
 from freqid.data.stream_found import Asked, Found, Source, even, of_array, places
 from freqid.data.stream_views import from_the_first
@@ -146,7 +146,8 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     slow = frozenset(name for column, name in each if 2 * _blanks(file, column) >= count > 0)
     lost = kept_of_record(every)
     return Found(
-        blocks, names, count, dt, str(path), hold, conditions, units, clock, lost, slow
+        blocks, names, count, dt, str(path), hold, conditions, units, clock, lost,
+        0.0 if told is None else kept_aliased(told), slow,
     )  # fmt: skip
 
 

@@ -67,6 +67,8 @@ class Found:
     clock: Clock | None = None
     # what a record of the file has and a stream has not, in words, and channels of slower outputs
     lost: str = ""
+    # part of the input's power that had been folded when the file was written
+    aliased: float = 0.0
     slow: frozenset[str] = frozenset()
     # chunks that a folder does not hold, in words, by channel
     hollow: Mapping[str, str] = field(default_factory=dict)

@@ -119,6 +119,7 @@ def open(
         blocks, step, held, tuple(u_names), tuple(y_names), found.n_samples, found.origin,
         as_conditions(found.conditions),
         {n: found.units[n] for n in (*u_names, *y_names) if found.units.get(n)},
+        folded=found.aliased,
     )  # fmt: skip
 
 

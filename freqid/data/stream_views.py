@@ -11,13 +11,63 @@ import numpy as np
 import scipy
 
 from freqid.checks import Array, FloatArray
+from freqid.data.folding import powers_above
 
 # starts a pass at a sample: arrays (n, channels)
 Blocks = Callable[[int], Iterator[Array]]
 
+# samples over which power is looked at together: so many times, then each so-manieth time
+_LOOK, _ALL, _SOME = 8192, 64, 16
 # the filter's ripple and what it leaves above the new Nyquist frequency, in dB; where it begins to
 # fall, over that
 _RIPPLE, _PASSED = 100.0, 0.9
+
+
+class Folding:
+    """What every ``factor``-th sample folds of the power of inputs, the first ``count`` columns of
+    blocks, as they pass: all at the beginning, later a part.
+    """
+
+    def __init__(self, factor: int, count: int) -> None:
+        self.factor, self.count = factor, count
+        self._windows, self._have = 0, 0
+        self._rows: list[Array] = []
+        self._first: FloatArray | None = None
+        self._above, self._total = np.zeros(count), np.zeros(count)
+
+    def see(self, rows: Array) -> None:
+        """Samples that pass, or pass again."""
+        while len(rows):
+            some, rows = rows[: _LOOK - self._have], rows[_LOOK - self._have :]
+            self._have += len(some)
+            if self._windows < _ALL or self._windows % _SOME == 0:
+                # a source may fill the same memory once more
+                self._rows.append(np.array(some[:, : self.count], dtype=float))
+            if self._have == _LOOK:
+                self._look()
+                self._windows, self._have = self._windows + 1, 0
+
+    def _look(self) -> None:
+        if not self._rows:
+            return
+        x, self._rows = np.concatenate(self._rows), []
+        if len(x) <= self.factor or not np.isfinite(x).all():
+            return
+        if self._first is None:
+            self._first = x.mean(axis=0)
+        above, total = powers_above(x, self.factor)
+        times = 1 if self._windows < _ALL else _SOME
+        # what a window's own mean is to it is slow to all of them; a Hann window's power is 3/8
+        apart = (x.mean(axis=0) - self._first) ** 2 * 3 / 8 * len(x) * (len(x) // 2 + 1)
+        self._above += times * above
+        self._total += times * (total + apart)
+
+    @property
+    def part(self) -> float:
+        """The part that is folded, of the input of which it is the largest."""
+        if not self._windows:
+            self._look()
+        return float(np.max(self._above / np.where(self._total > 0, self._total, np.inf)))
 
 
 def from_the_first(blocks: Iterable[Array], first: int) -> Iterator[Array]:
@@ -52,12 +102,13 @@ def part_of(blocks: Blocks, first: int, last: int | None) -> Blocks:
     return pass_from
 
 
-def every_so_many(blocks: Blocks, factor: int) -> Blocks:
-    """Each ``factor``-th sample."""
+def every_so_many(blocks: Blocks, factor: int, folding: Folding) -> Blocks:
+    """Each ``factor``-th sample, and what that folds."""
 
     def pass_from(at: int) -> Iterator[Array]:
         skip = 0
         for rows in blocks(at * factor):
+            folding.see(rows)
             yield rows[skip::factor]
             skip = (skip - len(rows)) % factor
 

@@ -16,6 +16,7 @@ from freqid.data.sampling import samples_between
 from freqid.data.selection import as_holds, channels_of, flat, hold_of
 from freqid.data.stream_views import (
     Blocks,
+    Folding,
     every_so_many,
     filtered,
     low_pass_taps,
@@ -36,7 +37,9 @@ class Stream:
     read nothing. ``blocks(first)`` starts a pass at a sample: arrays (n, channels), inputs first.
     ``n_samples`` is None where only a pass tells it. ``band`` (Hz) is the one in which lines are
     taken where none is asked for. Of the source, it begins at sample ``begin`` and holds each
-    ``step``-th; ``ahead`` are its last samples, which what follows in the source would change.
+    ``step``-th; ``ahead`` are its last samples, which what follows in the source would change. The
+    part ``folded`` of the input's power was there already, and the ``foldings`` measure what its
+    own decimations fold while samples pass.
     """
 
     blocks: Blocks
@@ -52,10 +55,17 @@ class Stream:
     begin: int = 0
     step: int = 1
     ahead: int = 0
+    folded: float = 0.0
+    foldings: tuple[Folding, ...] = ()
 
     # what a record has, and a stream does not
     factor = 1
     reference = None
+
+    @property
+    def aliased(self) -> float:
+        """Part of the input's power that decimation has folded, by the samples that have passed."""
+        return max([self.folded, *(folding.part for folding in self.foldings)])
 
     @property
     def n_inputs(self) -> int:
@@ -114,9 +124,11 @@ class Stream:
         blocks, ahead = self.blocks, self.ahead
         if flag("antialias", antialias) and factor > 1:
             blocks, ahead = filtered(self.checked, factor), ahead + len(low_pass_taps(factor)) // 2
+        folding = Folding(factor, self.n_inputs)
         return replace(
-            self, blocks=every_so_many(blocks, factor), dt=self.dt * factor, n_samples=left,
-            step=self.step * factor, ahead=-(-ahead // factor),
+            self, blocks=every_so_many(blocks, factor, folding), dt=self.dt * factor,
+            n_samples=left, step=self.step * factor, ahead=-(-ahead // factor),
+            foldings=(*self.foldings, folding),
         )  # fmt: skip
 
     def select(
@@ -273,7 +285,7 @@ class Stream:
         return Record(
             flat(every[:, : self.n_inputs]), flat(every[:, self.n_inputs :]), self.dt, self.hold,
             input_names=self.input_names, output_names=self.output_names,
-            conditions=self.conditions, units=self.units,
+            conditions=self.conditions, units=self.units, aliased=self.aliased,
         )  # fmt: skip
 
     def __repr__(self) -> str:

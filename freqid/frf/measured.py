@@ -35,6 +35,7 @@ def measured(
         reach=reach,
         conditions=record.conditions,
         units=units_of(record),
+        aliased=record.aliased,
     )
 
 

@@ -131,6 +131,7 @@ def _stretch(
     record = Record(
         flat(u), flat(y), stream.dt, stream.hold, input_names=stream.input_names,
         output_names=stream.output_names, conditions=stream.conditions, units=stream.units,
+        aliased=stream.aliased,
     )  # fmt: skip
     return record if limits is None else _in_band(record, limits, every)
 

@@ -393,3 +393,47 @@ def test_a_column_of_a_matrix_and_a_channel_of_its_name(tmp_path):
         file["x"], file["x1"] = X[:, :2], X[:, 2]
     with pytest.raises(ValueError, match=r"log\.h5: \['x1'\] are the names of two channels"):
         fq.open(tmp_path / "log.h5", "x1", "x2", dt=DT)
+
+
+def rough(n=40000):
+    """A low-passed noise of which a quarter lies above an eighth of the sample rate."""
+    rng = np.random.default_rng(5)
+    u = scipy.signal.lfilter([0.3], [1, -0.7], rng.standard_normal(n))
+    y = scipy.signal.lfilter([0.1, 0.05], [1, -1.6, 0.8], u) + 0.1 * rng.standard_normal(n)
+    return fq.Record(u, y, 1e-3)
+
+
+@pytest.mark.parametrize("block", [700, 8192, 100000])
+def test_what_decimation_folds_is_remembered_as_a_record_does(block):
+    record = rough()
+    stream = fq.open(np.column_stack([record.u, record.y]), dt=1e-3, block=block).decimate(4)
+    kept = record.decimate(4)
+    assert stream.load().aliased == pytest.approx(kept.aliased, rel=0.05)
+    for made in (fq.h1(stream, 500), fq.h1(kept, 500), fq.etfe(kept), fq.local_polynomial(kept)):
+        assert made.aliased == pytest.approx(kept.aliased, rel=0.05)
+    for data in (stream, fq.h1(stream, 500)):
+        est = fq.fit(fq.first_order(), data, band=(2.0, 60.0))
+        assert "aliased" in [w.kind for w in est.warnings]
+    clean = fq.open(np.column_stack([record.u, record.y]), dt=1e-3).decimate(4, antialias=True)
+    assert clean.load().aliased < 1e-4
+    assert fq.open(np.column_stack([record.u, record.y]), dt=1e-3).load().aliased == 0
+
+
+def test_slow_drifts_hide_no_folding_and_make_none():
+    """Each window takes its own mean; a record's is that of all."""
+    t = np.arange(60000) * 1e-3
+    slow = np.sin(2 * np.pi * 0.02 * t)
+    record = fq.Record(slow + 0.01 * np.random.default_rng(0).standard_normal(len(t)), slow, 1e-3)
+    stream = fq.open(np.column_stack([record.u, record.y]), dt=1e-3).decimate(10).load()
+    assert stream.aliased == pytest.approx(record.decimate(10).aliased, rel=0.5)
+
+
+def test_files_remember_it_for_streams_and_responses(tmp_path):
+    kept = rough().decimate(4)
+    fq.write(kept, tmp_path / "a.parquet")
+    stream = fq.open(tmp_path / "a.parquet", "u", "y")
+    assert stream.aliased == kept.aliased == stream.load().aliased
+    frf = fq.h1(stream, 500)
+    frf.to_frame().to_csv(tmp_path / "frf.csv", index=False)
+    assert fq.read_response(tmp_path / "frf.csv").aliased == kept.aliased
+    assert frf.select((2.0, 60.0)).aliased == kept.aliased

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,7 +80,7 @@ def _are_samples(row: list[Any]) -> bool:
     return all(c in ("", None) or _is_number(c) or isinstance(c, _TIMES) for c in row)
 
 
-def _is_row(row: list[Any]) -> bool:
+def _is_row(row: Sequence[object]) -> bool:
     """Whether a row is one of numbers, beside one word, or some where there are many."""
     words = sum(not _is_number(c) for c in row)
     return words <= 1 < len(row) or words == 0 or 3 * words <= len(row)
