@@ -130,7 +130,11 @@ def asymptotic_fit(
             f"model={type(fitted).__name__} is not a model; expected one of "
             + ", ".join(kind.__name__ for kind in FITTERS)
         )
-    return dataclasses.replace(est, uncertainty=dataclasses.replace(est.scatter, given=covariance))
+    return dataclasses.replace(
+        est,
+        uncertainty=dataclasses.replace(est.scatter, given=covariance),
+        signs=[*est.signs, *conditions.folded_together()],
+    )
 
 
 def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Responses:

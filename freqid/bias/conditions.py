@@ -21,9 +21,10 @@ from freqid.bias.apparent import (
     weight_of,
 )
 from freqid.checks import Array, ComplexArray, FloatArray, InputError
-from freqid.data import FrequencyResponse, as_band
+from freqid.data import FrequencyResponse, as_band, merged_lines
 from freqid.excitation import InputSpectrum
 from freqid.fitting import GivenWeights, Reading
+from freqid.fitting.findings import FOLDED, Finding
 from freqid.lti import Hold, panel_nodes, resolved
 from freqid.models import ModelLike
 
@@ -76,6 +77,29 @@ class Conditions:
     band: tuple[float, float] | None = None
     prefilter: Any = None
     noise_model: Any = None
+
+    def folded_together(self) -> list[Finding]:
+        """What is said of lines that fold onto one another: a spectrum has no phases, and those of
+        such lines decide what a fit finds there.
+        """
+        s = self.sampling
+        f, power = self.spectrum.lines(s.base_dt)
+        if s.factor == 1 or not len(f):
+            return []
+        power = power * s.filter_power(f)
+        groups = merged_lines(f, s.base_dt, s.factor)[2]
+        largest = np.zeros(groups.max() + 1)
+        np.maximum.at(largest, groups, power)
+        share = 1 - float(largest.sum() / power.sum()) if power.sum() > 0 else 0.0
+        if share <= FOLDED:
+            return []
+        text = (
+            f"lines of the input fold onto one another, {100 * share:.3g} % of its power: their "
+            "powers were added, and their phases, which no spectrum has, decide what a fit finds; "
+            "simulate it, keep the input, or take a period whose number of samples has no divisor "
+            "in common with the factor"
+        )
+        return [Finding("folded lines", text, number=share)]
 
     def expected(self, held: Held, *responses: Responses) -> Expected:
         """The data of a plant's response through the hold, at nodes that resolve them and the

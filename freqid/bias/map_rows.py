@@ -75,6 +75,9 @@ def answer_chunk(model: GreyBox, rows: Sequence[Row], shared: Conditions) -> lis
             certain = Evidence(model.free_parameters, answers[i].values, np.zeros(count))
             notes = findings(certain)
             answers[i].message = "; ".join(notes)
+    for i in kept:
+        told = [answers[i].message, *rows[i].conditions(shared).folded_together()]
+        answers[i].message = "; ".join(filter(None, told))
     return answers
 
 

@@ -81,7 +81,9 @@ def periodic(
     signals = None
     if reference is not None and reference is not False:
         if any(isinstance(r, Stream) for r in sets):
-            raise InputError("reference: a stream has none; load() it")
+            raise InputError(
+                "reference: a stream has none; read() the file, or take a Record with reference="
+            )
         signals = references_of([r for r in sets if isinstance(r, Record)], reference)
     n = samples_of_a_period(sets, signals, period)
     for i, each in enumerate(sets):

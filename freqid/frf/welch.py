@@ -114,7 +114,9 @@ def spectral(
     signals = None
     if reference is not None and reference is not False:
         if isinstance(records, Stream):
-            raise InputError("reference: a stream has none; load() it")
+            raise InputError(
+                "reference: a stream has none; read() the file, or take a Record with reference="
+            )
         signals = references_of([r for r in sets if isinstance(r, Record)], reference)
     pairs = ["uu", "yu", "yy"] + (["yr", "ur", "rr"] if signals is not None else [])
     sums = RunningSums(pairs)

@@ -182,6 +182,14 @@ def simulate(
         raise InputError(f"dt={dt:g} s, but the model is discrete with dt={plant.dt:g} s")
     # a sampled model has its hold inside
     between = as_holds(hold, dt, plant.own_hold or ZeroOrderHold(dt), names)
+    inside = plant.own_hold
+    if inside is not None and [type(h) for h in InputHolds.each(between, 1)] != [
+        type(h) for h in InputHolds.each(inside, 1)
+    ]:
+        raise InputError(
+            f"hold={hold!r}: this model is of samples under {inside!r}, and knows no other; leave "
+            "the hold out, or fit a TransferFunction or a GreyBox"
+        )
     for each in InputHolds.each(between, 1):
         if isinstance(each, PeriodicHold) and abs(each.period - dt) > 1e-9 * dt:
             raise InputError(

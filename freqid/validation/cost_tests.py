@@ -16,9 +16,15 @@ def cost_test(est: Estimate) -> dict[str, float]:
     and Schoukens, 2012, section 11.4.3). Returns cost, expected, ratio and p_value: a small p says
     that the model is too simple, one next to 1 that the variances are too large. Covariances that
     are estimates themselves, those of ``periodic``, raise what is expected and its scatter: each
-    term is then F-distributed, and those of lines whose scatter was pooled vary together.
+    term is then F-distributed, and those of lines whose scatter was pooled vary together. Raises
+    ValueError for a fit that was not weighted.
     """
     an("est", est, Estimate)
+    if not _noise_is_told(est):
+        raise InputError(
+            "est was fitted without weights, and its cost has a unit: fit with weights='noise', or "
+            "1/variance, or to means over periods"
+        )
     share = max(est.n_rows - len(est.names), 1) / max(est.n_rows, 1)
     told = [_of_means(est, d) for d in est.data if isinstance(d, PeriodicResponse)]
     rows = est.n_rows - sum(n for n, _, _ in told)
@@ -33,6 +39,15 @@ def cost_test(est: Estimate) -> dict[str, float]:
         # a chi-square, or where covariances are estimates nearly one, with these moments
         "p_value": float(scipy.stats.gamma.sf(est.cost / scale, expected / scale)),
     }
+
+
+def _noise_is_told(est: Estimate) -> bool:
+    """Whether its cost counts errors in standard deviations."""
+    if est.weights is not None:
+        return True
+    if "error='log'" in est.call:
+        return all(getattr(d, "variance", None) is not None for d in est.data)
+    return any(isinstance(d, PeriodicResponse) for d in est.data)
 
 
 def _of_means(est: Estimate, data: DataSet) -> tuple[int, float, float]:

@@ -223,3 +223,30 @@ def test_parameters_that_a_spectrum_does_not_determine_are_named(plant):
     three = fq.LineSpectrum([12, 12.00001, 12.00002], [1, 1, 1])
     est = fq.asymptotic_fit(plant, three, 5e-3, None, TRUE)
     assert any("not identifiable" in w for w in est.warnings)
+
+
+def test_lines_that_fold_onto_one_another_are_named():
+    """A PRBS of 510 samples, every third kept: three fits to long records, by which are kept."""
+    plant, dt = fq.first_order().with_values(a=30.0, b=12.0), 4e-3
+    held = fq.ZeroOrderHold(dt)
+    u = np.tile(fq.prbs(8, dt, clock=2), 20)
+    found = []
+    for shift in range(3):
+        record = fq.simulate(plant, u[shift : shift + 510 * 18], dt).slice(510 * 6 * dt)
+        found.append(fq.fit(plant, record.decimate(3), initial_state="steady")["a"])
+    assert max(found) > 1.5 * min(found)
+    est = fq.asymptotic_fit(plant, fq.PRBSSpectrum(8, 2), 3 * dt, true_hold=held)
+    assert "folded lines" in [w.kind for w in est.warnings]
+    assert est.verdict.grade == "doubt"
+    table = fq.bias_map(plant, {"prbs": fq.PRBSSpectrum(8, 2)}, [3, 7], [None], base_dt=dt)
+    told = table.groupby("factor")["message"].first()
+    assert "fold onto one another" in told[3]
+    # with no divisor in common each line has a place of its own
+    assert "fold onto one another" not in told[7]
+
+
+@pytest.mark.parametrize("spectrum", [fq.ChirpSpectrum(1, 40), fq.MultisineSpectrum((1, 40), 4.1)])
+def test_lines_apart_and_densities_are_not(spectrum):
+    plant, dt = fq.first_order().with_values(a=30.0, b=12.0), 4e-3
+    est = fq.asymptotic_fit(plant, spectrum, 4 * dt, true_hold=fq.ZeroOrderHold(dt))
+    assert "folded lines" not in [w.kind for w in est.warnings]

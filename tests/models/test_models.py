@@ -147,3 +147,13 @@ def test_a_simulation_has_the_names_that_a_model_was_given():
     # ready-made plants, and labels that control makes up
     for model in (fq.two_mass(), fq.drivetrain(3), control.tf([1], [1, 1])):
         assert fq.simulate(model, u, 0.01).input_names == ("u",)
+
+
+@pytest.mark.parametrize("hold", ["foh", "bl"])
+def test_a_sampled_black_box_is_simulated_under_its_own_hold(hold):
+    u = fq.white_noise(300)
+    est = fq.fit(fq.OutputError(1), fq.simulate(fq.first_order(), u, 1e-3))
+    with pytest.raises(ValueError, match="knows no other"):
+        fq.simulate(est, u, 1e-3, hold=hold)
+    own = fq.simulate(est, u, 1e-3, hold="zoh")
+    np.testing.assert_array_equal(own.y, fq.simulate(est, u, 1e-3).y)

@@ -369,3 +369,12 @@ def test_the_cost_of_means_over_periods_is_tested_at_its_level(periods, outputs)
     # three standard errors of 150 runs; without what lines share it would be 1.4 and 1.1
     assert 0.83 < np.std(scipy.stats.norm.isf(p)) < 1.17
     assert scipy.stats.kstest(p, "uniform").pvalue > 1e-3
+
+
+def test_costs_without_weights_are_not_tested():
+    record = fq.simulate(fq.first_order(), fq.white_noise(500), 1e-3).with_noise(0.01)
+    for data in (record, fq.local_polynomial(record)):
+        with pytest.raises(ValueError, match="without weights"):
+            fq.cost_test(fq.fit(fq.first_order(), data))
+    weighted = fq.fit(fq.first_order(), fq.local_polynomial(record), weights="noise")
+    assert 0.5 < fq.cost_test(weighted)["ratio"] < 2
