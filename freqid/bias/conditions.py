@@ -23,8 +23,7 @@ from freqid.bias.apparent import (
 from freqid.checks import Array, ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, as_band, merged_lines
 from freqid.excitation import InputSpectrum
-from freqid.fitting import GivenWeights, Reading
-from freqid.fitting.findings import FOLDED, Finding
+from freqid.fitting import FOLDED, Finding, GivenWeights, Reading
 from freqid.lti import Hold, panel_nodes, resolved
 from freqid.models import ModelLike
 

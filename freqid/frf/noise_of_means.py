@@ -80,12 +80,16 @@ def means(sets: Sequence[PeriodMeans], p: int) -> tuple[ComplexArray, ComplexArr
     """Means (E, channels, K) of experiments of as many periods, their covariance (E, K, channels,
     channels) and of how many lines each is; the first ``p`` channels are outputs.
 
-    With few periods lines beside one lend it their noise. What the outputs do beside the plant's
-    answer to the inputs, Y − G U, is as smooth as they are; in a loop the noise of Y and of U alone
-    is as peaked as the plant, and cancels only where both are of one line.
+    With few periods lines beside one lend it their noise, as what is smooth: in a loop the noise of
+    Y and of U alone is as peaked as the plant, and what the outputs do beside the plant's answer to
+    the inputs, Y − G U, is not. Noise of a sensor at the input does not go through the plant: it
+    and that of the outputs are smooth, and Y − G U is peaked. What is likelier of both is taken.
     """
     P, (channels, K) = sets[0].count, sets[0].mean.shape
     mean, C = np.stack([s.mean for s in sets]), np.stack([s.covariance for s in sets])
+    # what does not scatter at all is still rounded
+    rounding = (np.finfo(float).eps * np.abs(mean).max(axis=-1)) ** 2  # (E, channels)
+    rounded = rounding[:, None, :, None] * np.eye(channels)
     width = min(-(-(FREEDOM + p - 1) // (P - 1)), K) | 1
     width = min(width, K if K % 2 else K - 1)
     if width > 1:
@@ -95,11 +99,21 @@ def means(sets: Sequence[PeriodMeans], p: int) -> tuple[ComplexArray, ComplexArr
         away = back.copy()
         away[:, :p, p:] = -G
         beside = away @ C @ away.conj().swapaxes(-1, -2)
-        C = back @ _smooth(beside, width) @ back.conj().swapaxes(-1, -2)
-    # what does not scatter at all is still rounded
-    rounding = (np.finfo(float).eps * np.abs(mean).max(axis=-1)) ** 2  # (E, channels)
-    C = C + rounding[:, None, :, None] * np.eye(channels)
+        ways = [back @ _smooth(beside, width) @ back.conj().swapaxes(-1, -2), _smooth(C, width)]
+        C = min((way + rounded for way in ways), key=lambda way: _unlikely(C, way))
+    else:
+        C = C + rounded
     return mean, C, width
+
+
+def _unlikely(C: ComplexArray, smooth: ComplexArray) -> float:
+    """How unlikely covariances (E, K, c, c) are where they scatter about smooth ones: less twice
+    the logarithm of Wishart's density, over their freedom, up to a constant.
+    """
+    size = np.sqrt(np.einsum("ekaa->eka", smooth).real)
+    each = size[..., :, None] * size[..., None, :]
+    left = np.linalg.solve(smooth / each, C / each)
+    return float(np.sum(np.linalg.slogdet(smooth)[1]) + np.einsum("ekaa->", left).real)
 
 
 def _ratio(mean: ComplexArray, p: int) -> ComplexArray:

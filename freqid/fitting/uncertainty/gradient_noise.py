@@ -127,8 +127,8 @@ def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
 
     Their covariances are estimates, and take in that of neighbours: what they leave of the errors
     says how far off they are. That of each line follows a peak of the noise, and scatters where few
-    lines tell a parameter; that of some lines together does neither. What is larger counts, along
-    each combination of parameters. None where lines are too few to tell.
+    lines tell a parameter; that of some together does neither. What is larger counts, along each
+    combination of parameters; of a line that a parameter has all but to itself some tell.
     """
     periodic = [e for e in objective.experiments if isinstance(e, PeriodicExperiment)]
     if sum(e.n_means for e in periodic) < _MEANS * len(x):
@@ -145,13 +145,15 @@ def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
         p, n = len(e.data.response), part.residual.size // 2
         # how the errors of a line are turned into independent ones depends on the outputs' order
         rest = 1 - taken[at : at + n].reshape(-1, p).mean(axis=1)
-        error = part.residual.view(complex).reshape(-1, p) / rest[:, None]
+        error = part.residual.view(complex).reshape(-1, p)
         seen = J[:, 2 * at : 2 * (at + n)].copy().view(complex).reshape(len(x), -1, p)
-        score = (seen.conj() * error).sum(axis=-1)
-        one += (score @ score.conj().T).real / 2
         left = (np.abs(error) ** 2).mean(axis=1)
-        level = _around(left.reshape(e.data.outputs.shape[1], -1), p)
-        weighed = seen * np.tile(level, len(left) // len(level))[:, None]
+        level = _around(left, e, p) / _around(rest, e, p)
+        weighed = seen * level[:, None]
+        alone = rest < 1 - _ALONE
+        score = (seen.conj() * (error / rest[:, None])).sum(axis=-1)[:, ~alone]
+        one += (score @ score.conj().T).real / 2
+        one += np.einsum("ikp,jkp->ij", weighed[:, alone], seen[:, alone].conj()).real / 2
         some += e.inflation * np.einsum("ikp,jkp->ij", weighed, seen.conj()).real / 2
         at += n
     if not (np.isfinite(one).all() and np.isfinite(some).all()):
@@ -170,14 +172,12 @@ def _larger(one: FloatArray, other: FloatArray, H: FloatArray) -> FloatArray:
     return np.asarray(other + (turned * np.maximum(more, 0)) @ turned.T)
 
 
-def _around(left: FloatArray, p: int) -> FloatArray:
-    """Mean over the neighbours of each line and over experiments, (K,), of the errors' squares
-    (experiments, K), each of ``p`` outputs.
-    """
-    count, K = left.shape
-    width = min(-(-_VALUES // (count * p)) | 1, K)
-    mean: FloatArray = scipy.ndimage.uniform_filter1d(left.mean(axis=0), width, mode="reflect")
-    return mean
+def _around(each: FloatArray, e: PeriodicExperiment, p: int) -> FloatArray:
+    """Mean over the neighbours of each line and over experiments, of lines of ``p`` outputs."""
+    count = e.data.outputs.shape[1]
+    lines = each.reshape(count, -1).mean(axis=0)
+    width = min(-(-_VALUES // (count * p)) | 1, len(lines))
+    return np.tile(scipy.ndimage.uniform_filter1d(lines, width, mode="reflect"), count)
 
 
 def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
