@@ -12,6 +12,7 @@ from freqid.checks import ComplexArray, InputError
 from freqid.data import Record
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
+from freqid.models import GreyBox
 
 # a sampled pole this near to one is an integrator's to rounding
 _ON_LINE = 1e-10
@@ -114,7 +115,7 @@ def fitted(
     try:
         return fit(model, readings, options), readings
     except (OnLineError, np.linalg.LinAlgError):
-        if _apart_from_zero(readings):
+        if isinstance(model, GreyBox) or _apart_from_zero(readings):
             raise
     less = [r.with_(skip_zero=True) for r in readings]
     return fit(model, less, options), less

@@ -110,9 +110,13 @@ def _unlikely(C: ComplexArray, smooth: ComplexArray) -> float:
     """How unlikely covariances (E, K, c, c) are where they scatter about smooth ones: less twice
     the logarithm of Wishart's density, over their freedom, up to a constant.
     """
-    size = np.sqrt(np.einsum("ekaa->eka", smooth).real)
+    size = np.sqrt(np.maximum(np.einsum("ekaa->eka", smooth).real, 1e-300))
     each = size[..., :, None] * size[..., None, :]
-    left = np.linalg.solve(smooth / each, C / each)
+    try:
+        left = np.linalg.solve(smooth / each, C / each)
+    except np.linalg.LinAlgError:
+        # channels that scatter alike at so few lines
+        return np.inf
     return float(np.sum(np.linalg.slogdet(smooth)[1]) + np.einsum("ekaa->", left).real)
 
 

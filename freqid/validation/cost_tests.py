@@ -43,7 +43,7 @@ def cost_test(est: Estimate) -> dict[str, float]:
 
 def _noise_is_told(est: Estimate) -> bool:
     """Whether its cost counts errors in standard deviations."""
-    if est.weights is not None:
+    if est.weights is not None or "weights=" in est.call:
         return True
     if "error='log'" in est.call:
         return all(getattr(d, "variance", None) is not None for d in est.data)

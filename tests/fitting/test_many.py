@@ -339,3 +339,17 @@ def test_on_the_command_line(tmp_path, monkeypatch, capsys):
             commands.main([*again, "--jobs", "1", "--no-verdicts"])
         assert end.value.code == 0
     assert len(pd.read_parquet("est.parquet")) == 2
+
+
+def test_files_of_responses_are_rows_like_others(tmp_path):
+    plant = fq.first_order()
+    record = fq.simulate(plant, fq.white_noise(2000), 1e-3).with_noise(0.01)
+    frf = fq.h1(record, 200)
+    frf.to_frame().to_csv(tmp_path / "frf.csv", index=False)
+    fq.write(record, tmp_path / "log.csv")
+    table = fq.fit_many(plant, [tmp_path / "frf.csv", tmp_path / "log.csv"]).set_index("name")
+    assert (table["error"] == "").all(), table["error"].tolist()
+    one = fq.fit(plant, fq.read_response(tmp_path / "frf.csv"))
+    assert table["a"].iloc[0] == pytest.approx(one["a"], rel=1e-9)
+    told = fq.fit_many(plant, [tmp_path / "frf.csv"], reading={"resample": True})["error"][0]
+    assert "holds a response; resample" in told

@@ -70,7 +70,7 @@ def fit_many(
             ``joblib.parallel_config`` says (``backend="dask"`` for a cluster); needs the extra
             ``parallel``.
         verdicts: False leaves out witness, warnings and verdict, which take longer than the fit.
-        reading: arguments of ``read`` for paths, ``{"inputs": "torque"}``.
+        reading: arguments of ``read``, or ``read_response``, for paths, ``{"inputs": "torque"}``.
         chunk: records that are kept, or lost, as one; None takes 8, or without verdicts 128 paths,
             and of records as many as are 16 MB, 8 to 128.
         progress: None shows a bar on a terminal, True also lines in a log, False nothing.

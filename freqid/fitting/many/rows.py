@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import DataSet, alone, read
+from freqid.data import DataSet, ResponseFile, alone, read, read_response
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import Near
 from freqid.fitting.many.together import Done, minima
@@ -43,6 +43,9 @@ _PASSING = (
 Source = DataSet | str | Path
 Row = dict[str, Any]
 
+# arguments of ``read`` that ``read_response`` has, too
+_OF_RESPONSES = {"sep", "decimal", "columns", "units"}
+
 
 @dataclass(frozen=True)
 class Task:
@@ -65,7 +68,7 @@ def rows_of(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
         row: Row = {"name": name}
         try:
             from_file = isinstance(source, (str, Path))
-            records.append(read(source, **task.reading) if from_file else source)  # type: ignore[arg-type]
+            records.append(_from_file(Path(source), task.reading) if from_file else source)  # type: ignore[arg-type]
         except Exception as error:
             row["error"] = _told(name, error)
             records.append(None)
@@ -81,6 +84,18 @@ def rows_of(task: Task, job: Sequence[tuple[str, Source]]) -> list[Row]:
             row |= _fitted(task, str(row["name"]), data, done)
         row["seconds"] = reading + time.perf_counter() - begin + (each if done else 0.0)
     return rows
+
+
+def _from_file(path: Path, reading: Mapping[str, object]) -> DataSet:
+    """The record of a file, or the response that it holds."""
+    try:
+        return read(path, **reading)  # type: ignore[arg-type]
+    except ResponseFile:
+        if other := sorted(set(reading) - _OF_RESPONSES):
+            raise InputError(
+                f"{path} holds a response; {', '.join(other)} in reading= is for records"
+            ) from None
+        return read_response(path, **reading)  # type: ignore[arg-type]
 
 
 def may_pass(error: str) -> bool:
