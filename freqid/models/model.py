@@ -143,7 +143,14 @@ class Model(ABC):
                 f"hold={hold!r} is not a hold; a model has no sample time of its own, so give "
                 "ZeroOrderHold(period), FirstOrderHold(period), BandLimited() or None"
             )
-        G = self.responses_at(at, hold)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            G = self.responses_at(at, hold)
+        on = at[~np.isfinite(G).all(axis=(0, 1))]
+        if len(on):
+            raise InputError(
+                f"omega={on[0]:g} rad/s lies on a pole of the model, where its response is not "
+                "finite, as that of an integrator at zero; leave it out"
+            )
         if not self.dt:
             warn_of_rounding(self.state_space(), hold or BandLimited(), at)
         hold = self.own_hold or hold

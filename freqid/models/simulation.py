@@ -212,7 +212,14 @@ def simulate(
         own = np.zeros_like(inputs)
         own[:, members] = inputs[:, members]
         begin = x0 if number == 0 else np.zeros(n)
-        y += _outputs(plant, own, dt, each, begin, initial_state is not None)
+        with np.errstate(over="ignore", invalid="ignore"):
+            y += _outputs(plant, own, dt, each, begin, initial_state is not None)
+    wrong = ~np.isfinite(y).all(axis=1)
+    if wrong.any() and np.isfinite(inputs).all():
+        raise InputError(
+            f"the model's outputs leave the range of numbers after {dt * np.argmax(wrong):g} s: it "
+            "is unstable there; simulate less, or change its parameters"
+        )
     return Record(
         u,
         y[:, 0] if y.shape[1] == 1 and u.ndim == 1 else y,

@@ -157,3 +157,18 @@ def test_a_sampled_black_box_is_simulated_under_its_own_hold(hold):
         fq.simulate(est, u, 1e-3, hold=hold)
     own = fq.simulate(est, u, 1e-3, hold="zoh")
     np.testing.assert_array_equal(own.y, fq.simulate(est, u, 1e-3).y)
+
+
+def test_a_plant_that_grows_beyond_numbers_is_named():
+    plant = fq.first_order().with_values(a=-100.0)
+    with pytest.raises(ValueError, match=r"unstable there; simulate less"):
+        fq.simulate(plant, np.ones(20000), 1e-3)
+    assert np.isfinite(fq.simulate(plant, np.ones(200), 1e-3).y).all()
+
+
+@pytest.mark.parametrize("hold", [None, fq.ZeroOrderHold(0.01)])
+def test_a_frequency_on_a_pole_is_named_without_warnings(hold):
+    """All warnings are errors here."""
+    integrator = fq.GreyBox(lambda k: ([[0]], [[k]], [[1]], None), [fq.Parameter("k", 2.0)])
+    with pytest.raises(ValueError, match="omega=0 rad/s lies on a pole"):
+        integrator.frequency_response([0.0, 1.0], hold)
