@@ -25,6 +25,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 T1, T2 = 0.5e-3, 5e-3
 BAND = (10, 80)
+LONG = ("test_examples.py", "test_docs_pages.py", "test_readme.py", "test_explorer.py")
 
 
 def pytest_addoption(parser):
@@ -35,7 +36,11 @@ def pytest_addoption(parser):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Of a study the first of several cases runs, unless all were asked for, or it by its name."""
+    """Of a study the first of several cases runs, unless all were asked for, or it by its name.
+
+    Examples and pages, each a minute or less, come first: at the end one process would wait.
+    """
+    items.sort(key=lambda item: item.path.name not in LONG)
     if config.getoption("--studies") or any("::" in arg for arg in config.args):
         return
     seen, kept, left = set(), [], []
