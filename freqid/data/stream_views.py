@@ -17,7 +17,7 @@ from freqid.data.folding import powers_above
 Blocks = Callable[[int], Iterator[Array]]
 
 # samples over which power is looked at together: so many times, then each so-manieth time
-_LOOK, _ALL, _SOME = 8192, 64, 16
+_LOOK, _ALL, _SOME = 8192, 32, 64
 # the filter's ripple and what it leaves above the new Nyquist frequency, in dB; where it begins to
 # fall, over that
 _RIPPLE, _PASSED = 100.0, 0.9
