@@ -271,7 +271,7 @@ def _fitted(
 
     if loss == "linear":
         return work(readings, None)
-    return robust_fit(lambda some, near: work(some, near)[0], readings)
+    return robust_fit(work, readings)
 
 
 def _logarithmic(reading: Reading, model: object) -> Reading:

@@ -20,7 +20,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fits
 from freqid.fitting.grey_search import search_grey
 from freqid.fitting.reading import Reading
-from freqid.fitting.reading_sets import read_for
+from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.stopping import Found
 from freqid.fitting.sight import gone_with, hold_that_changes, out_of_sight
@@ -242,7 +242,7 @@ def _estimate(
         len(values),
         out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
         gone=gone_with(model, poles, structure.parameters, output_dt(reading.data)),
-        aliased=max(getattr(r.data, "aliased", 0.0) for r in readings),
+        aliased=aliased_part(readings),
         rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
         units=dict.fromkeys(
             each

@@ -27,3 +27,8 @@ def read_for(
         with of_data(i, len(readings)):
             made.append(r.experiment(plane, made[-1] if made else None))
     return made
+
+
+def aliased_part(readings: Sequence[Reading]) -> float:
+    """The part of the input's power that decimation had folded, where it is largest."""
+    return max(getattr(r.data, "aliased", 0.0) for r in readings)

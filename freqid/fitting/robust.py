@@ -27,7 +27,7 @@ _STEPS, _STANDS = 30, 0.01
 # the median of |e| in standard deviations of a normal variable
 _MEDIAN = 0.6744897501960817
 
-Work = Callable[[Sequence[Reading], Estimate | None], Estimate]
+Work = Callable[[Sequence[Reading], Estimate | None], tuple[Estimate, Sequence[Reading]]]
 
 
 def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Sequence[Reading]]:
@@ -41,11 +41,13 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
         )
     if any(r.band is not None for r in readings):
         raise InputError("loss='huber' needs all lines: a band spreads a spike over the record")
-    est = work(readings, None)
+    est, seen = work(readings, None)
+    # a black box that integrates leaves out the line at zero
+    readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
     cut, inside, count = list(readings), 1.0, 0
     for _ in range(_STEPS):
         cut, inside, count = _cut(est, readings)
-        before, est = est, work(cut, est)
+        before, est = est, work(cut, est)[0]
         std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break

@@ -52,3 +52,24 @@ def test_stable_ones_next_to_an_integrator_are_fitted_or_say_why():
         est = fq.fit(fq.OutputError(2, stable=True), record("axis with friction", 150, seed))
         assert np.abs(est.model.poles).max() <= 1 + 1e-12
         assert est.fit_percent == pytest.approx(100, abs=1e-2)
+
+
+@pytest.mark.parametrize("n", [80, 150])
+def test_samples_are_cut_beside_a_pole_on_the_line(n):
+    """The line at zero was left out of the fit, and not of what Huber's loss cuts."""
+    data = record("integrator", n, 0)
+    for spec in (fq.OutputError(1), fq.TransferFunction(0, 1)):
+        assert fq.fit(spec, data, loss="huber").fit_percent == pytest.approx(100, abs=1e-6)
+
+
+def test_responses_of_what_was_folded_have_verdicts():
+    """Black boxes of the faster samples' period, and poles on lines of what is asked."""
+    rng = np.random.default_rng(0)
+    u = scipy.signal.lfilter([0.3], [1, -0.7], rng.standard_normal(8000))
+    y = scipy.signal.lfilter([0.1, 0.05], [1, -1.6, 0.8], u) + 0.05 * rng.standard_normal(8000)
+    slow = fq.Record(u, y, 1e-3).decimate(4)
+    for data in (fq.h1(slow, 500), fq.etfe([slow, slow]), slow):
+        for spec in (fq.OutputError(2), fq.TransferFunction(1, 2)):
+            est = fq.fit(spec, data)
+            assert est.verdict.grade == "doubt"
+            assert "aliased" in [w.kind for w in est.warnings]

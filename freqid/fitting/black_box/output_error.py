@@ -21,7 +21,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import OnLineError, SearchOptions, fits, refuse_on_line
 from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading
-from freqid.fitting.reading_sets import read_for
+from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import UncomputableError, polish
 from freqid.fitting.sight import out_of_sight
 from freqid.fitting.signs import Evidence, findings
@@ -88,6 +88,7 @@ def fit_output_error(
         Minimum(objective, solution),
         first.hold,
         dt,
+        aliased_part(readings),
     )
     if edge is not None:
         est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution)])
@@ -154,6 +155,7 @@ def coefficient_estimate(
     minimum: Minimum,
     hold: Hold,
     dt: float,
+    aliased: float,
 ) -> Estimate:
     """An Estimate whose parameters are coefficients: smooth functions of the unknowns x.
 
@@ -172,6 +174,7 @@ def coefficient_estimate(
         none,
         none,
         failure,
+        aliased=aliased,
         n_rows=rows,
         n_unknowns=len(values),
         growing=growing.tolist(),

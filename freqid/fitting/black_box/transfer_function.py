@@ -26,11 +26,11 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import OnLineError, SearchOptions, fits
 from freqid.fitting.reading import Reading
-from freqid.fitting.reading_sets import read_for
+from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.sufficiency import enough_rows, told_apart
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti import Hold, PeriodicHold
+from freqid.lti import PeriodicHold
 from freqid.models import (
     ContinuousModel,
     GreyBox,
@@ -119,9 +119,8 @@ def fit_transfer_function(
     solution, objective, _ = min(ends, key=left)
     open_end = _OPEN * solution.cost / objective.n_rows if estimated else 0.0
     agreed = sum(_alike(end[0], solution, open_end) for end in ends)
-    est = _estimate(
-        spec, Minimum(objective, polish(objective, solution.x, limit=_LAST)), first.hold, unit
-    )
+    last = polish(objective, solution.x, limit=_LAST)
+    est = _estimate(spec, Minimum(objective, last), readings, unit)
     return dataclasses.replace(est, n_starts=len(ends), n_agreed=agreed)
 
 
@@ -155,7 +154,7 @@ def _delays(
         return [float(spec.delay)]
     shape, tried = channel_counts(readings[0].data), []
     responses = all(isinstance(r.data, FrequencyResponse) and unheld(r) for r in readings)
-    # a response tells delays of up to a turn between two of its lines
+    # a response tells delays of up to a turn between its lines
     gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
     step = np.pi / 4 / omega[-1]
     if responses:
@@ -193,7 +192,9 @@ def _in_step_cost(order: int, readings: Sequence[Reading], shifts: Sequence[int]
     return np.inf if point is None else description_length(point.cost, seen, readings, shifts)
 
 
-def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float) -> Estimate:
+def _estimate(
+    spec: TransferFunction, minimum: Minimum, readings: Sequence[Reading], unit: float
+) -> Estimate:
     structure = cast(GreyStructure, minimum.structure)
 
     def at(x: FloatArray) -> ContinuousModel:
@@ -208,9 +209,9 @@ def _estimate(spec: TransferFunction, minimum: Minimum, hold: Hold, unit: float)
 
     found = at(minimum.x)
     named = [*coefficients(found)[0], *(nuisance.name for nuisance in structure.unknown)]
-    est = coefficient_estimate(found, named, described, minimum, hold, unit)
+    told = minimum, readings[0].hold, unit, aliased_part(readings)
+    est = coefficient_estimate(found, named, described, *told)
     if structure.unknown and _delay_is_open(minimum, structure.count):
-        # a zero next to infinity is, to first order, one more delay
         sentence = (
             "the delay; next to this minimum the coefficients do what it does, as a numerator's "
             "highest power near zero can; fit with one zero less, or give the delay"

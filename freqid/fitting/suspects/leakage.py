@@ -65,13 +65,16 @@ def _lost(s: Seen, model: Model) -> FloatArray:
         asked = own.responses_at(s.omega_input, None if own.dt else between)
         return s.answered(np.fft.rfft(answer * data.memory)[..., at] - asked)
 
-    if own.dt or (isinstance(hold, PeriodicHold) and abs(hold.period / data.dt - 1) < _SAME):
+    period = own.dt or (hold.period if isinstance(hold, PeriodicHold) else np.inf)
+    if abs(period / data.dt - 1) < _SAME:
         return held(hold)
     padded = np.zeros(_ROOM * length)
     padded[:length] = data.memory
     every = 2 * np.pi / (_ROOM * length * data.dt) * np.arange(_ROOM * length // 2 + 1)
     with np.errstate(all="ignore"):
         G: ComplexArray = own.responses_at(every, hold)
+    if not np.isfinite(G).all() and own.dt:
+        return np.zeros(len(s.left))
     if not np.isfinite(G).all():
         # an integrator's answer has no end, and a hold of one sample changes little of it
         return held(ZeroOrderHold(data.dt))
