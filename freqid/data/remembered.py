@@ -42,6 +42,8 @@ def kept_columns(record: Record) -> dict[str, float | bool]:
     """Columns of one value each, of what is not as usual."""
     usual = record.hold == ZeroOrderHold(record.input_dt)
     kept = {} if usual else _hold_columns(record.hold, record.input_names)
+    if record.aliased > _ROUNDING:
+        kept[_ALIASED] = record.aliased
     return kept | condition_columns(record.conditions)
 
 
@@ -86,8 +88,6 @@ def kept_in_files(record: Record) -> dict[str, float | bool]:
     kept: dict[str, float | bool] = {}
     if record.n_inputs + record.n_outputs > 2:
         kept[_INPUTS] = record.n_inputs
-    if record.aliased > _ROUNDING:
-        kept[_ALIASED] = record.aliased
     if record.reference is not None:
         kept[_LOOP] = 1.0
     if record.clocks_apart is not None:

@@ -30,43 +30,47 @@ class Folding:
 
     def __init__(self, factor: int, count: int) -> None:
         self.factor, self.count = factor, count
-        self._windows, self._have = 0, 0
-        self._rows: list[Array] = []
-        self._first: FloatArray | None = None
         self._above, self._total = np.zeros(count), np.zeros(count)
 
-    def see(self, rows: Array) -> None:
-        """Samples that pass, or pass again."""
-        while len(rows):
-            some, rows = rows[: _LOOK - self._have], rows[_LOOK - self._have :]
-            self._have += len(some)
-            if self._windows < _ALL or self._windows % _SOME == 0:
-                # a source may fill the same memory once more
-                self._rows.append(np.array(some[:, : self.count], dtype=float))
-            if self._have == _LOOK:
-                self._look()
-                self._windows, self._have = self._windows + 1, 0
+    def watched(self, blocks: Iterator[Array]) -> Iterator[Array]:
+        """The blocks of a pass, looked at before they go on."""
+        window: list[FloatArray] = []
+        first: FloatArray | None = None
+        number = have = 0
+        for rows in blocks:
+            at = 0
+            while at < len(rows):
+                some = rows[at : at + _LOOK - have, : self.count]
+                at, have = at + len(some), have + len(some)
+                if number < _ALL or number % _SOME == 0:
+                    # a source may fill the same memory once more
+                    window.append(np.array(some, dtype=float))
+                if have == _LOOK:
+                    first = self._look(window, first, 1 if number < _ALL else _SOME)
+                    window, have, number = [], 0, number + 1
+            yield rows
+        if not number:
+            self._look(window, first, 1)
 
-    def _look(self) -> None:
-        if not self._rows:
-            return
-        x, self._rows = np.concatenate(self._rows), []
+    def _look(
+        self, window: Sequence[FloatArray], first: FloatArray | None, times: int
+    ) -> FloatArray | None:
+        """Count a window so many ``times``; the mean of the ``first``, or of this one."""
+        x = np.concatenate(window) if window else np.zeros((0, self.count))
         if len(x) <= self.factor or not np.isfinite(x).all():
-            return
-        if self._first is None:
-            self._first = x.mean(axis=0)
+            return first
+        mean = x.mean(axis=0)
+        first = mean if first is None else first
         above, total = powers_above(x, self.factor)
-        times = 1 if self._windows < _ALL else _SOME
         # what a window's own mean is to it is slow to all of them; a Hann window's power is 3/8
-        apart = (x.mean(axis=0) - self._first) ** 2 * 3 / 8 * len(x) * (len(x) // 2 + 1)
+        apart = (mean - first) ** 2 * 3 / 8 * len(x) * (len(x) // 2 + 1)
         self._above += times * above
         self._total += times * (total + apart)
+        return first
 
     @property
     def part(self) -> float:
         """The part that is folded, of the input of which it is the largest."""
-        if not self._windows:
-            self._look()
         return float(np.max(self._above / np.where(self._total > 0, self._total, np.inf)))
 
 
@@ -107,8 +111,7 @@ def every_so_many(blocks: Blocks, factor: int, folding: Folding) -> Blocks:
 
     def pass_from(at: int) -> Iterator[Array]:
         skip = 0
-        for rows in blocks(at * factor):
-            folding.see(rows)
+        for rows in folding.watched(blocks(at * factor)):
             yield rows[skip::factor]
             skip = (skip - len(rows)) % factor
 

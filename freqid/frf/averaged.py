@@ -194,5 +194,5 @@ def _packed(
     coherence = np.clip(explained / np.where(output > 0, output, 1), 0, 1)
     shown = np.broadcast_to(coherence[:, :, None], G.shape)
     power = powers(s.uu).T
-    frf = measured(s.first, s.frequency, G, variance, shown, power, reach=s.reach)
+    frf = measured(s.first, s.frequency, G, variance, shown, power, s.reach, s.aliased)
     return AveragedResponse(**frf.__dict__, memory=s.memory)

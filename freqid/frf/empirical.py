@@ -8,7 +8,7 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data import AveragedResponse, FrequencyResponse, Record, as_records, that_estimates
-from freqid.frf.measured import measured
+from freqid.frf.measured import aliased_of, measured
 from freqid.frf.segments import memory
 from freqid.frf.spectra import spectra
 
@@ -73,7 +73,9 @@ def etfe(
             noise = (np.abs(Y - G @ U) ** 2).sum(axis=-1) / (count - first.n_inputs)
             spread = np.einsum("kmm->km", inverse).real
             variance = noise[:, :, None] * spread[:, None, :]
-    frf = measured(first, s.frequency[keep], G, variance, None, power[keep].T)
+    frf = measured(
+        first, s.frequency[keep], G, variance, None, power[keep].T, aliased=aliased_of(sets)
+    )
     if count == first.n_inputs:
         return frf
     # a mean over experiments lacks what each cuts off, as one over segments does

@@ -27,7 +27,7 @@ from freqid.data import (
     that_estimates,
 )
 from freqid.frf.local_windows import Form, Lines, Local, inflation, local_models
-from freqid.frf.measured import measured
+from freqid.frf.measured import aliased_of, measured
 from freqid.frf.spectra import spectra
 from freqid.lti import tuned
 
@@ -124,7 +124,12 @@ def _estimate(
     else:
         local = _through(local, sets[0].n_inputs)
     frf = measured(
-        sets[0], lines.frequency[lines.wanted], *local[:3], spectrum, reach=form.width - 1
+        sets[0],
+        lines.frequency[lines.wanted],
+        *local[:3],
+        spectrum,
+        form.width - 1,
+        aliased_of(sets),
     )
     return LocalResponse(**frf.__dict__, line_noise=local.noise)
 

@@ -21,7 +21,7 @@ from freqid.data import (
     that_estimates,
 )
 from freqid.frf.driven_lines import driven_lines, folded_lines
-from freqid.frf.measured import units_of
+from freqid.frf.measured import aliased_of, units_of
 from freqid.frf.noise_of_means import PeriodMeans, means
 from freqid.frf.periods import PERIODS_SHOWN, check_period, samples_of_a_period
 from freqid.frf.settling import settled
@@ -135,7 +135,7 @@ def periodic(
     told = [c for each in at_lines if (c := settled(each, first.n_outputs)) is not None]
     chance = min(min(told) * len(told), 1.0) if told else None
     change = np.stack([each.change for each in at_lines], axis=1)
-    return _packed(first, f[excited], mean, noise, P, pooled, chance, change, n * first.dt)
+    return _packed(sets, f[excited], mean, noise, P, pooled, chance, change, n * first.dt)
 
 
 def _experiments(
@@ -198,7 +198,7 @@ def _amplitudes(x: FloatArray, n: int, skip: int, periods: int) -> ComplexArray:
 
 
 def _packed(
-    first: Record | Stream,
+    sets: Sequence[Record | Stream],
     f: FloatArray,
     mean: ComplexArray,
     C: ComplexArray,
@@ -208,6 +208,7 @@ def _packed(
     change: ComplexArray,
     period: float,
 ) -> PeriodicResponse:
+    first = sets[0]
     p = first.n_outputs
     Y, U = np.moveaxis(mean[:, :p], 0, 1), np.moveaxis(mean[:, p:], 0, 1)  # (channels, E, K)
     Uk, Yk = np.moveaxis(U, -1, 0), np.moveaxis(Y, -1, 0)
@@ -231,5 +232,5 @@ def _packed(
         input_names=first.input_names, output_names=first.output_names,
         inputs=U, outputs=Y, noise=C, freedom=(periods - 1) * pooled, pooled=pooled,
         conditions=first.conditions, units=units_of(first), settled=chance,
-        change=change, period=period,
+        change=change, period=period, aliased=aliased_of(sets),
     )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
@@ -16,11 +18,12 @@ def measured(
     coherence: FloatArray | None,
     input_spectrum: FloatArray | None,
     reach: int = 0,
+    aliased: float | None = None,
 ) -> FrequencyResponse:
     """A response of ``record``'s plant; it and what is known of it are (K, outputs, inputs).
 
     ``frequency`` is in Hz, (K,); ``input_spectrum`` is (inputs, K); ``reach`` as in
-    FrequencyResponse.
+    FrequencyResponse, and ``aliased`` where other records than that one had more folded.
     """
     return FrequencyResponse(
         frequency,
@@ -35,8 +38,13 @@ def measured(
         reach=reach,
         conditions=record.conditions,
         units=units_of(record),
-        aliased=record.aliased,
+        aliased=record.aliased if aliased is None else aliased,
     )
+
+
+def aliased_of(sets: Sequence[Record | Stream]) -> float:
+    """What decimation had folded of the input's power, in the record of which it is the most."""
+    return max(record.aliased for record in sets)
 
 
 def units_of(record: Record | Stream) -> dict[str, str]:

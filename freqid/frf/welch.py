@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError, flag, path_of
 from freqid.data import Bar, Record, Reference, Stream, as_band, as_records, chosen, references_of
+from freqid.frf.measured import aliased_of
 from freqid.frf.running_sums import RunningSums
 from freqid.frf.segments import (
     Averaging,
@@ -94,6 +95,7 @@ class Spectral:
     first: Record | Stream
     reach: int
     memory: FloatArray | None
+    aliased: float
     reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
 
 
@@ -164,7 +166,16 @@ def spectral(
     inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
     told = memory(averaging.window, length, step, inputs)
     return Spectral(
-        f[keep], mean["uu"], mean["yu"], mean["yy"], averages, first, reach, told, joint
+        f[keep],
+        mean["uu"],
+        mean["yu"],
+        mean["yy"],
+        averages,
+        first,
+        reach,
+        told,
+        aliased_of(sets),
+        joint,
     )
 
 

@@ -1,5 +1,6 @@
 """Views of streams, and what a source may do to the numbers: beside the record in memory."""
 
+import dataclasses
 import os
 
 import numpy as np
@@ -426,6 +427,26 @@ def test_slow_drifts_hide_no_folding_and_make_none():
     record = fq.Record(slow + 0.01 * np.random.default_rng(0).standard_normal(len(t)), slow, 1e-3)
     stream = fq.open(np.column_stack([record.u, record.y]), dt=1e-3).decimate(10).load()
     assert stream.aliased == pytest.approx(record.decimate(10).aliased, rel=0.5)
+
+
+def test_a_second_pass_begins_where_no_sample_came_before():
+    """The end of a ramp before its beginning is a jump, which no window may hold."""
+    t = np.arange(10000) * 1e-3
+    ramp = fq.open(np.column_stack([t, t]), dt=1e-3).decimate(4)
+    assert [ramp.load().aliased < 1e-12 for _ in range(4)] == [True] * 4
+
+
+def test_of_several_records_and_of_periods_it_is_the_most():
+    slow = rough().decimate(4)
+    clean = fq.Record(slow.u, slow.y, slow.dt, hold=slow.hold)
+    assert clean.aliased == 0
+    for made in (fq.h1([clean, slow], 500), fq.etfe([clean, slow]),
+                 fq.local_polynomial([clean, slow])):  # fmt: skip
+        assert made.aliased == slow.aliased
+    repeated = fq.Record(np.tile(slow.u[:1000], 4), np.tile(slow.y[:1000], 4), slow.dt)
+    periods = fq.periodic([repeated, dataclasses.replace(repeated, aliased=0.3)], 1000 * slow.dt)
+    assert periods.aliased == 0.3
+    assert fq.Record.from_frame(slow.to_frame()).aliased == slow.aliased
 
 
 def test_files_remember_it_for_streams_and_responses(tmp_path):
