@@ -99,7 +99,11 @@ class LineNoise:
         except (TypeError, ValueError) as error:
             raise InputError(f"column {NOISE!r} is damaged: {error}; leave it out") from None
         p, _, K = variance.shape
-        first = first.reshape(-1, K)[0].astype(int) - first.min()
+        # lines that lie farther apart than a window share nothing, however far
+        step = np.diff(first.reshape(-1, K)[0].astype(int), prepend=first[0])
+        if (step < 0).any():
+            raise InputError(f"column {NOISE!r} is damaged: its lines do not follow one another")
+        first = np.cumsum(np.minimum(step, rows.shape[-1]))
         rows = np.moveaxis(rows * np.sqrt(variance)[..., None, None], 2, 0)
         return cls(first, rows, np.ones((p, int(first.max()) + rows.shape[-1])))
 

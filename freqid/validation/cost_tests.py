@@ -43,9 +43,11 @@ def cost_test(est: Estimate) -> dict[str, float]:
 
 def _noise_is_told(est: Estimate) -> bool:
     """Whether its cost counts errors in standard deviations."""
-    if est.weights is not None or "weights=" in est.call:
+    # what follows the call's own line tells of the model
+    call = est.call.partition("\n")[0]
+    if est.weights is not None or "weights=" in call:
         return True
-    if "error='log'" in est.call:
+    if "error='log'" in call:
         return all(getattr(d, "variance", None) is not None for d in est.data)
     return any(isinstance(d, PeriodicResponse) for d in est.data)
 
