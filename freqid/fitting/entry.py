@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import Any, Literal
 
 from freqid.checks import InputError, had_elsewhere, listed, named_values, of_data, whole
-from freqid.data import DataSet, FrequencyResponse, Record, Stream, as_data_sets, as_holds
+from freqid.data import DataSet, Record, Stream, as_data_sets, as_holds
 from freqid.fitting import black_box, grey_box
 from freqid.fitting.channel_order import in_order_of
 from freqid.fitting.clock_offset import clock_notes, with_clock_offset
@@ -19,8 +19,8 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fed_back import FED_BACK, could_go, fed_back, pulled_by_noise
 from freqid.fitting.fit_options import check_words
 from freqid.fitting.fitters import Near, SearchOptions, fitted, fitter_of
-from freqid.fitting.noise_models import Weights, as_noise_model, in_one_unit, noise_models_of
-from freqid.fitting.noise_rounds import again, noise_weighted, relative_to_model
+from freqid.fitting.noise_models import Weights, in_one_unit, noise_models_of
+from freqid.fitting.noise_rounds import again, in_logarithms, noise_weighted, relative_to_model
 from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.printed import call_of
 from freqid.fitting.reading import Domain, InitialState, Reading
@@ -178,7 +178,7 @@ def fit(
         read.append(r)
     readings: Sequence[Reading] = read
     if error == "log":
-        readings = [_logarithmic(r, model) for r in readings]
+        readings = [in_logarithms(r, model) for r in readings]
     if offset is not None:
         readings = [with_offset(r) for r in readings]
     options = SearchOptions(count, seed, start, estimated, own, near, meant)
@@ -272,17 +272,6 @@ def _fitted(
     if loss == "linear":
         return work(readings, None)
     return robust_fit(work, readings)
-
-
-def _logarithmic(reading: Reading, model: object) -> Reading:
-    if not isinstance(reading.data, FrequencyResponse) or not isinstance(model, GreyBox):
-        raise InputError(
-            "error='log' needs a GreyBox and responses: estimate those of records first, with "
-            "h1, local_rational or periodic"
-        )
-    known = reading.data.variance is not None and reading.noise.plain
-    noise = as_noise_model("noise", reading.data) if known else reading.noise
-    return reading.with_(logarithmic=True, noise=noise)
 
 
 @contextmanager

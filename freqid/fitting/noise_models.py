@@ -28,6 +28,11 @@ from freqid.fitting.uncertainty.noise_spectrum import noise_weights, settled
 _NEAR = 2
 
 
+def tells_variance(frf: FrequencyResponse) -> bool:
+    """Whether a response has variances to be weighed by: one of zero would be all that counts."""
+    return frf.variance is not None and bool((frf.variance > 0).all())
+
+
 class NoiseModel(ABC):
     """Weights of the squared errors of one data set.
 
@@ -150,6 +155,13 @@ class MeasuredNoise(NoiseModel):
                 known = "; of n averages it is abs(G)**2 (1 - coherence) / (n coherence)"
             raise InputError(
                 f"weights='noise' needs frf.variance, and this response has none{known}"
+            )
+        if not tells_variance(data):
+            nothing = data.variance == 0
+            raise InputError(
+                f"weights='noise' needs variances above zero, and frf.variance is 0 at "
+                f"{nothing.sum()} of {nothing.size} values, as of records that are alike to the "
+                "last digit; give weights=None, or the response with a variance that it can have"
             )
         return ResponseNoise()
 

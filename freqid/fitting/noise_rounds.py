@@ -15,6 +15,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitted, fitter_of
 from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
+from freqid.fitting.noise_models import as_noise_model, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import INTERRUPTED
@@ -159,6 +160,18 @@ def again(est: Estimate, options: SearchOptions) -> SearchOptions:
     structure = None if est.problem is None else est.problem.structure
     meant = structure.meant if isinstance(structure, GreyStructure) else None
     return dataclasses.replace(options, n_starts=1, start=near or None, refit=True, meant=meant)
+
+
+def in_logarithms(reading: Reading, model: object) -> Reading:
+    """A response read in logarithms, by its variance where it tells one."""
+    if not isinstance(reading.data, FrequencyResponse) or not isinstance(model, GreyBox):
+        raise InputError(
+            "error='log' needs a GreyBox and responses: estimate those of records first, with "
+            "h1, local_rational or periodic"
+        )
+    known = reading.noise.plain and tells_variance(reading.data)
+    noise = as_noise_model("noise", reading.data) if known else reading.noise
+    return reading.with_(logarithmic=True, noise=noise)
 
 
 def relative_to_model(est: Estimate, reading: Reading) -> Reading:

@@ -26,7 +26,7 @@ from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.noise_models import MeasuredNoise
+from freqid.fitting.noise_models import MeasuredNoise, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import Solution, polish
@@ -236,8 +236,8 @@ def weighted_by(
             r = readings[i]
             if not r.noise.plain or r.both_ends:
                 continue
-            known = r.data.variance if isinstance(r.data, FrequencyResponse) else None
-            if known is not None and (every or _uneven(known)):
+            told = isinstance(r.data, FrequencyResponse) and tells_variance(r.data)
+            if told and (every or _uneven(r.data.variance)):  # type: ignore[union-attr,arg-type]
                 weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
             left = errors_of(model, r) if isinstance(r.data, Record) else None
             # weights that are not needed would add their own scatter
@@ -251,7 +251,7 @@ def _uneven(variance: FloatArray) -> bool:
     which shows from line to line: those of a few averages are no weights.
     """
     low, high = np.quantile(variance, [_FEW, 1 - _FEW])
-    if not (variance > 0).all() or high <= _UNEVEN * low:
+    if high <= _UNEVEN * low:
         return False
     return bool(np.median(np.abs(np.diff(np.log(variance)))) < _SMOOTH)
 

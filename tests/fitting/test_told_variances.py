@@ -1,7 +1,10 @@
 """Responses that tell the variance of their lines: few of them may tell a resonance."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+import scipy
 
 import freqid as fq
 from freqid.fitting.noise_models import ResponseNoise
@@ -125,3 +128,19 @@ def test_lines_that_tell_nothing(options):
     est = fq.fit(begun(), fq.FrequencyResponse(f, exact(f), variance=variance), **options)
     assert est.values == pytest.approx([W, Z, GAIN], rel=1e-6)
     assert np.isfinite(est.parameters["std"]).all()
+
+
+def test_variances_of_zero_are_no_weights(rng):
+    """Records that are alike to the last digit: 1/0 in weights and in the verdict's comparisons."""
+    u = rng.standard_normal(2000)
+    y = scipy.signal.lfilter([0.1, 0.05], [1, -1.6, 0.8], u) + 0.05 * rng.standard_normal(2000)
+    record = fq.Record(u, y, 1e-3)
+    twice = fq.etfe([record, record])
+    assert (twice.variance == 0).any()
+    alone = dataclasses.replace(twice, variance=None)
+    for spec in (fq.OutputError(2), fq.TransferFunction(1, 2)):
+        est, expected = fq.fit(spec, twice), fq.fit(spec, alone)
+        np.testing.assert_allclose(est.values, expected.values, rtol=1e-6)
+        assert est.verdict.grade == expected.verdict.grade
+        with pytest.raises(ValueError, match=r"variance is 0 at \d+ of 1000 values"):
+            fq.fit(spec, twice, weights="noise")

@@ -10,12 +10,11 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import FrequencyResponse, Record, channel_counts, common_names, input_dt
-from freqid.fitting.black_box.folded_subspace import identify
-from freqid.fitting.black_box.lag_scan import around, far_lags
 from freqid.fitting.black_box.late import description_length, in_step
+from freqid.fitting.black_box.likely_delays import likely_delays
 from freqid.fitting.black_box.output_error import coefficient_estimate, fit_output_error
 from freqid.fitting.black_box.refinement import first_model
-from freqid.fitting.black_box.response_poles import folded, poles_of_responses, unheld
+from freqid.fitting.black_box.response_poles import poles_of_responses, unheld
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment
@@ -46,12 +45,9 @@ from freqid.models import (
 _SPREAD = 20
 # evaluations from one start, and of the last descent from the best
 _DESCENT, _LAST = 100, 1000
-# samples of delay that are tried beside the likely ones, and how many delays are followed
-_LONGEST, _FOLLOWED = 24, 6
-# eighths of a turn at the top of a response that are tried
-_TURNS = 160
-# combinations of unknowns of which the data show this part of others leave no errors to tell; a
-# delay is open where it is such a part of one
+# a combination of unknowns is loose where the data show no more than this part of the best seen
+# one: a numerator's power next to zero puts a zero next to infinity, which is, to first order, one
+# more delay. The delay is open where it has this part in a loose one.
 _PARALLEL, _PART = 1e-4, 0.1
 # costs that differ by no more than this part are of one minimum
 _SAME = 1e-6
@@ -97,7 +93,7 @@ def fit_transfer_function(
     if before is not None:
         near = Objective(before.minimum.structure, experiments)
         ends.append((polish(near, before.minimum.x, limit=_DESCENT), near, 0.0))
-    for delay in [] if before is not None else _delays(spec, readings, omega, unit):
+    for delay in [] if before is not None else likely_delays(spec, readings, omega, unit):
         for poles in _starting_poles(spec, readings, omega, delay):
             descend(poles, delay)
     if not ends:
@@ -141,55 +137,6 @@ def _by_chance(count: int, omega: FloatArray, rng: np.random.Generator) -> Compl
     damping = np.exp(rng.uniform(np.log(3e-3), 0, pairs))
     one = size[:pairs] * (-damping + 1j * np.sqrt(1 - damping**2))
     return np.concatenate([one, one.conj(), -size[pairs:]])
-
-
-def _delays(
-    spec: TransferFunction, readings: Sequence[Reading], omega: FloatArray, unit: float
-) -> list[float]:
-    """Delays to begin from (s): the known one, or those at which black boxes explain most.
-
-    Where no record can be put in step, delays that are half a turn apart at the top of the band.
-    """
-    if spec.delay != "estimate":
-        return [float(spec.delay)]
-    shape, tried = channel_counts(readings[0].data), []
-    responses = all(isinstance(r.data, FrequencyResponse) and unheld(r) for r in readings)
-    # a response tells delays of up to a turn between its lines
-    gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
-    step = np.pi / 4 / omega[-1]
-    if responses:
-        lags = [*range(min(int(np.pi / gap / step), _TURNS))]
-    else:
-        far = far_lags(readings[0], spec.poles, _LONGEST)
-        lags = sorted({*range(_LONGEST), *(q for q in around(far) if q >= 0)})
-    for q in lags:
-        try:
-            if responses:
-                delay = q * step
-                point = folded(spec.poles, readings, omega, delay)[2]
-            else:
-                delay = max(q - 0.5, 0.0) * unit
-                point = _in_step_cost(spec.poles, readings, (q,) * shape[1])
-        except (InputError, np.linalg.LinAlgError):
-            # longer ones leave even less
-            break
-        tried.append((point, delay))
-    if len(tried) > 1:  # a single one is that of no delay, with which all can be put in step
-        # the best one, its neighbours, and every other valley
-        costs = [np.inf, *(cost for cost, _ in tried), np.inf]
-        valleys = [t for i, t in enumerate(tried, 1) if t[0] <= min(costs[i - 1], costs[i + 1])]
-        chosen = sorted(tried)[:_FOLLOWED] + sorted(valleys)[1:_FOLLOWED]
-        return list(dict.fromkeys(delay for _, delay in chosen))
-    apart = min(max(np.pi / omega[-1], unit), 20 * unit)
-    return (apart * np.arange(8)).tolist()
-
-
-def _in_step_cost(order: int, readings: Sequence[Reading], shifts: Sequence[int]) -> float:
-    """What a sampled black box leaves of data in step, and these leave out."""
-    seen, plane = lines_in_plane([in_step(r, shifts) for r in readings])
-    chart = Chart(identify(seen, order, True), True, plane, readings[0].sample_time)
-    point = Objective(chart, seen).point(np.zeros(chart.size))
-    return np.inf if point is None else description_length(point.cost, seen, readings, shifts)
 
 
 def _estimate(

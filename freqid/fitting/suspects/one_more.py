@@ -20,7 +20,7 @@ from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
-from freqid.fitting.search.descent import UncomputableError, polish
+from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.behind_delay import InStep, without_delay
 from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved, poles_of
@@ -59,11 +59,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         return []
     weighted = weighted_by([model], [range(len(readings))], readings, every=not scene.even)
     comparison = _Comparison(inquiry, scene, model, readings, weighted)
-    try:
-        told = comparison.told(weighted)
-    except UncomputableError:
-        # a pole on a line of what is asked
-        return []
+    told = comparison.told(weighted)
     doubted = told is None or told.p_value > _RARE
     if doubted and not comparison.plain and not isinstance(inquiry.model, GreyBox):
         # a lag that the model lacks hides in weights by what it leaves: then all lines alike

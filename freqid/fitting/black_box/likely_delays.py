@@ -1,0 +1,73 @@
+"""Delays from which a transfer function whose delay is to be found sets out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError
+from freqid.data import FrequencyResponse, channel_counts
+from freqid.fitting.black_box.folded_subspace import identify
+from freqid.fitting.black_box.lag_scan import around, far_lags
+from freqid.fitting.black_box.late import description_length, in_step
+from freqid.fitting.black_box.response_poles import folded, unheld
+from freqid.fitting.black_box.sampled_lines import lines_in_plane
+from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.reading import Reading
+from freqid.models import TransferFunction
+
+# samples of delay that are tried beside the likely ones, and how many delays are followed
+_LONGEST, _FOLLOWED = 24, 6
+# eighths of a turn at the top of a response that are tried
+_TURNS = 160
+
+
+def likely_delays(
+    spec: TransferFunction, readings: Sequence[Reading], omega: FloatArray, unit: float
+) -> list[float]:
+    """Delays to begin from (s): the known one, or those at which black boxes explain most.
+
+    Where no record can be put in step, delays that are half a turn apart at the top of the band.
+    """
+    if spec.delay != "estimate":
+        return [float(spec.delay)]
+    shape, tried = channel_counts(readings[0].data), []
+    responses = all(isinstance(r.data, FrequencyResponse) and unheld(r) for r in readings)
+    # a response tells delays of up to a turn between its lines
+    gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
+    step = np.pi / 4 / omega[-1]
+    if responses:
+        lags = [*range(min(int(np.pi / gap / step), _TURNS))]
+    else:
+        far = far_lags(readings[0], spec.poles, _LONGEST)
+        lags = sorted({*range(_LONGEST), *(q for q in around(far) if q >= 0)})
+    for q in lags:
+        try:
+            if responses:
+                delay = q * step
+                point = folded(spec.poles, readings, omega, delay)[2]
+            else:
+                delay = max(q - 0.5, 0.0) * unit
+                point = _in_step_cost(spec.poles, readings, (q,) * shape[1])
+        except (InputError, np.linalg.LinAlgError):
+            # longer ones leave even fewer samples
+            break
+        tried.append((point, delay))
+    if len(tried) > 1:  # a single one is that of no delay, with which all can be put in step
+        # the best one, its neighbours, and every other valley
+        costs = [np.inf, *(cost for cost, _ in tried), np.inf]
+        valleys = [t for i, t in enumerate(tried, 1) if t[0] <= min(costs[i - 1], costs[i + 1])]
+        chosen = sorted(tried)[:_FOLLOWED] + sorted(valleys)[1:_FOLLOWED]
+        return list(dict.fromkeys(delay for _, delay in chosen))
+    apart = min(max(np.pi / omega[-1], unit), 20 * unit)
+    return (apart * np.arange(8)).tolist()
+
+
+def _in_step_cost(order: int, readings: Sequence[Reading], shifts: Sequence[int]) -> float:
+    """What a sampled black box leaves of data in step, and these leave out."""
+    seen, plane = lines_in_plane([in_step(r, shifts) for r in readings])
+    chart = Chart(identify(seen, order, True), True, plane, readings[0].sample_time)
+    point = Objective(chart, seen).point(np.zeros(chart.size))
+    return np.inf if point is None else description_length(point.cost, seen, readings, shifts)
