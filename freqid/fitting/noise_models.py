@@ -186,6 +186,17 @@ class MeasuredNoise(NoiseModel):
     def learnt(self, error: ComplexArray, n_samples: int) -> NoiseModel:
         return MeasuredNoise(noise_weights(error, n_samples))
 
+    @classmethod
+    def of_response(cls, error: ComplexArray, scale: FloatArray) -> MeasuredNoise:
+        """By errors (outputs, inputs, K) of a response that tells no variance.
+
+        Times ``scale``, the root of the input's power there, they are those of the output, whose
+        noise is smooth.
+        """
+        each = (error * scale).reshape(-1, error.shape[-1])
+        # 1/variance of complex errors, of which each part has half
+        return cls(scale**2 * noise_weights(each, 2).reshape(error.shape))
+
     def without_first(self, kept: int, every: int) -> NoiseModel:
         found = self.found
         return self if found is None else MeasuredNoise(_without_first(found, kept, every))

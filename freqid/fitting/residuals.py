@@ -9,6 +9,8 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, StampedRecord, channel_counts
+from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
+from freqid.fitting.cost.lines import Lines
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import read_for
 from freqid.frf import lines_of
@@ -95,30 +97,42 @@ def errors_in_time(
 def _at_samples(model: Model, reading: Reading) -> FloatArray:
     """Errors ŷ − y in time, as the rows of an experiment, the initial state fitted."""
     (experiment,) = read_for((model.n_outputs, model.n_inputs), [reading])
-    evaluation = experiment.at(model.still())
-    rows = evaluation.residual
-    if evaluation.transient is not None:
-        Q, _ = eliminate(evaluation.transient, rows)
-        rows = rows - (Q @ rows) @ Q
-    return rows
+    return _without_transient(experiment.at(model.still()))
 
 
 def errors_of(model: Model, reading: Reading) -> LineErrors:
     """Errors of a model at the lines of a reading, its weights saying which tell the transient."""
     record = reading.data
     assert isinstance(record, Record)
-    plane = Plane() if model.dt else None
     steps("dt of the record", record.dt, model.dt or record.dt, least=1)
-    shape = model.n_outputs, model.n_inputs
-    (experiment,) = read_for(shape, [reading.at_lines()], plane)
-    lines = experiment.lines  # type: ignore[attr-defined]
-    evaluation = experiment.at(model.still())
-    rows = evaluation.residual
-    if evaluation.transient is not None:
-        Q, _ = eliminate(evaluation.transient, rows)
-        rows = rows - (Q @ rows) @ Q
+    lines, rows = _left(model, reading.at_lines())
     error = rows.view(complex).reshape(channel_counts(record)[0], -1) / lines.scale[:, 0]
     N, dt = lines_of(record)
     number = np.round(lines.omega * N * dt / (2 * np.pi))
     multiplicity = np.where((number == 0) | (2 * number == N), 1.0, 2.0)
     return LineErrors(lines.omega, error, multiplicity, N, dt, len(record.u) // record.factor)
+
+
+def errors_of_response(model: Model, reading: Reading) -> tuple[ComplexArray, FloatArray]:
+    """Errors of a model at the lines of a response and the roots of their weights, each (outputs,
+    inputs, K).
+    """
+    lines, rows = _left(model, reading.at_lines())
+    error = rows.view(complex).reshape(lines.scale.shape)
+    return np.asarray(error / np.where(lines.scale > 0, lines.scale, 1)), lines.scale
+
+
+def _left(model: Model, reading: Reading) -> tuple[Lines, FloatArray]:
+    """Lines of a reading, and the rows that a model leaves there without their transient."""
+    shape, plane = (model.n_outputs, model.n_inputs), Plane() if model.dt else None
+    (experiment,) = read_for(shape, [reading], plane)
+    assert isinstance(experiment, SpectralExperiment)
+    return experiment.lines, _without_transient(experiment.at(model.still()))
+
+
+def _without_transient(evaluation: Evaluation) -> FloatArray:
+    rows = evaluation.residual
+    if evaluation.transient is None:
+        return rows
+    Q, _ = eliminate(evaluation.transient, rows)
+    return np.asarray(rows - (Q @ rows) @ Q)

@@ -20,15 +20,15 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import FrequencyResponse, Record, StampedRecord
+from freqid.data import FrequencyResponse, StampedRecord
 from freqid.fitting.black_box.late import plant_in_step
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.noise_models import MeasuredNoise, tells_variance
+from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_variance
 from freqid.fitting.reading import Reading
-from freqid.fitting.residuals import errors_of
+from freqid.fitting.residuals import errors_of, errors_of_response
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import RARE, Verdict, Witness
 from freqid.fitting.uncertainty.evenness import evenly_spread
@@ -236,14 +236,29 @@ def weighted_by(
             r = readings[i]
             if not r.noise.plain or r.both_ends:
                 continue
-            told = isinstance(r.data, FrequencyResponse) and tells_variance(r.data)
-            if told and (every or _uneven(r.data.variance)):  # type: ignore[union-attr,arg-type]
-                weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
-            left = errors_of(model, r) if isinstance(r.data, Record) else None
-            # weights that are not needed would add their own scatter
-            if left is not None and (every or not evenly_spread(left.error, together=True)):
-                weighted[i] = r.with_(noise=MeasuredNoise().learnt(left.error, left.n_samples))
+            if not isinstance(r.data, FrequencyResponse):
+                weighted[i] = _by_what_is_left(model, r, every)
+            elif tells_variance(r.data):
+                if every or _uneven(r.data.variance):  # type: ignore[arg-type]
+                    weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
+            # of an analyser's, whose errors may be a share of it, they would hide that
+            elif r.data.input_spectrum is not None:
+                weighted[i] = _by_what_is_left(model, r, every)
     return weighted
+
+
+def _by_what_is_left(model: Model, reading: Reading, every: bool) -> Reading:
+    """A reading weighted by what a model leaves, where that is uneven, or in any case."""
+    if isinstance(reading.data, FrequencyResponse):
+        error, scale = errors_of_response(model, reading)
+        noise: NoiseModel = MeasuredNoise.of_response(error, scale)
+        error = (error * scale).reshape(-1, error.shape[-1])
+    else:
+        left = errors_of(model, reading)
+        error, noise = left.error, MeasuredNoise().learnt(left.error, left.n_samples)
+    # weights that are not needed would add their own scatter
+    even = evenly_spread(error, together=True)
+    return reading if even and not every else reading.with_(noise=noise)
 
 
 def _uneven(variance: FloatArray) -> bool:

@@ -144,3 +144,28 @@ def test_variances_of_zero_are_no_weights(rng):
         assert est.verdict.grade == expected.verdict.grade
         with pytest.raises(ValueError, match=r"variance is 0 at \d+ of 1000 values"):
             fq.fit(spec, twice, weights="noise")
+
+
+@pytest.mark.parametrize("spec", [None, fq.OutputError(2)])
+@pytest.mark.parametrize(
+    ("pole", "seeds"),
+    [(0.95, 4), *(pytest.param(p, 40, marks=pytest.mark.study) for p in (0.95, -0.8))],
+)
+def test_coloured_noise_on_an_empirical_response_is_no_mode(pole, seeds, spec):
+    """The ratio Y/U of a chirp tells no variance: all right fits had been told "another mode"."""
+    plant, dt, n = begun(1.0), 2e-3, 3000
+    u = np.concatenate([fq.chirp(1, 80, (n - 500) * dt, dt), np.zeros(500)])
+    clean = fq.simulate(plant, u, dt)
+
+    def judged(model, more, seed):
+        e = np.random.default_rng(seed).standard_normal(n + 500)
+        e = scipy.signal.lfilter([1], [1, -pole], e)[500:]
+        y = clean.y + more + 0.1 * clean.y.std() / e.std() * e
+        return fq.fit(model, fq.etfe(fq.Record(u, y, dt), band=(1, 80)))
+
+    right = [judged(spec or plant, 0, seed) for seed in range(seeds)]
+    assert sum(est.verdict.grade != "trust" for est in right) <= 0.1 * seeds
+    assert sum("another mode" in [w.kind for w in est.warnings] for est in right) <= 0.1 * seeds
+    mode = fq.simulate(plant.with_values(w=260.0, z=0.02, g=0.06), u, dt).y
+    lacking = judged(spec or plant, mode, 0)
+    assert "another mode" in [w.kind for w in lacking.warnings]

@@ -11,14 +11,14 @@ import numpy as np
 import scipy
 
 from freqid.checks import InputError
-from freqid.data import Record
+from freqid.data import FrequencyResponse, StampedRecord
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.noise_models import MeasuredNoise
+from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
@@ -216,13 +216,18 @@ def _weighed_again(
     B = directions(np.concatenate([J for *_, J in parts], axis=1), LOOSE)[2]
     ends = np.cumsum([len(left) for _, left, _, _ in parts])[:-1]
     for i, ((e, left, Q, _), own) in enumerate(zip(parts, np.split(B, ends, axis=1), strict=True)):
-        record = weighted[i].data
-        if weighted[i] is readings[i] or not isinstance(record, Record):
+        data = weighted[i].data
+        told = isinstance(data, FrequencyResponse) and tells_variance(data)
+        if weighted[i] is readings[i] or told or isinstance(data, StampedRecord):
             continue
         kept = 1 - (Q**2).sum(axis=0) - (own**2).sum(axis=0)
-        each = (left / np.sqrt(np.maximum(kept, _KEPT))).view(complex).reshape(-1, e.n_lines)
-        N = len(record.u) // record.factor
-        again[i] = weighted[i].with_(noise=MeasuredNoise().learnt(each / e.lines.scale[:, 0], N))
+        each = (left / np.sqrt(np.maximum(kept, _KEPT))).view(complex).reshape(e.lines.scale.shape)
+        error = each / np.where(e.lines.scale > 0, e.lines.scale, 1)
+        if isinstance(data, FrequencyResponse):
+            noise: NoiseModel = MeasuredNoise.of_response(error, readings[i].lines().lines.scale)
+        else:
+            noise = MeasuredNoise().learnt(error[:, 0], len(data.u) // data.factor)
+        again[i] = weighted[i].with_(noise=noise)
     return again
 
 
