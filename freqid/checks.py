@@ -212,6 +212,21 @@ def choice(name: str, value: object, allowed: Sequence[str]) -> str:
     raise InputError(unknown(name, value, allowed))
 
 
+def increasing(name: str, value: FloatArray, unit: str) -> FloatArray:
+    """Frequencies (K,) that are finite, not negative and increasing; ValueError for others."""
+    if value.ndim != 1 or not len(value):
+        raise InputError(f"{name} has shape {value.shape}; expected frequencies in {unit}, (K,)")
+    wrong = ~np.isfinite(value) | (value < 0)
+    wrong[1:] |= np.diff(value) <= 0
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            f"{name}[{k}]={value[k]:g} {unit}: expected finite frequencies, none negative, each "
+            "above the one before"
+        )
+    return value
+
+
 def unknown(name: str, value: object, allowed: Iterable[str]) -> str:
     """Sentence for a name that is not among ``allowed``, with the nearest one as a hint."""
     names = [str(a) for a in allowed]

@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from freqid.bias.apparent import Held, Sampling, held_response
+from freqid.bias.beside_truth import biased
 from freqid.bias.conditions import Conditions, Expected, Responses
 from freqid.checks import Array, FloatArray, InputError, finite, named_values, positive, whole
 from freqid.excitation import InputSpectrum
@@ -88,7 +89,8 @@ def asymptotic_fit(
             ``duration`` these are zero.
         start, n_starts, seed: as in ``fit``.
 
-    Returns an Estimate; its cost is the mean square of the (filtered) error. Raises ValueError
+    Returns an Estimate; its cost is the mean square of the (filtered) error, and "biased" among its
+    warnings says how far it is from the plant. Raises ValueError
     where the rates do not fit, the spectrum has no energy below Nyquist, or has fewer lines than
     the parameters need.
 
@@ -123,18 +125,17 @@ def asymptotic_fit(
         structure = cast(GreyStructure, est.minimum.structure)
         covariance = error_covariance(est.minimum.x, structure, expected, est.hold, noise_std, N)
     elif type(fitted) in FITTERS:
-        est = _black(fitted, plant, at, conditions, as_hold(hold, sampling.dt, sampling.hold))
+        assumed = as_hold(hold, sampling.dt, sampling.hold)
+        est, expected = _black(fitted, plant, at, conditions, assumed)
         covariance = np.zeros((len(est.minimum.x),) * 2)
     else:
         raise InputError(
             f"model={type(fitted).__name__} is not a model; expected one of "
             + ", ".join(kind.__name__ for kind in FITTERS)
         )
-    return dataclasses.replace(
-        est,
-        uncertainty=dataclasses.replace(est.scatter, given=covariance),
-        signs=[*est.signs, *conditions.folded_together()],
-    )
+    est = dataclasses.replace(est, uncertainty=dataclasses.replace(est.scatter, given=covariance))
+    more = [*conditions.folded_together(), *biased(plant, est, expected)]
+    return dataclasses.replace(est, signs=[*est.signs, *more])
 
 
 def model_responses(structure: GreyStructure, x: FloatArray, hold: Hold) -> Responses:
@@ -210,7 +211,7 @@ def _black(
     at: Held,
     conditions: Conditions,
     hold: Hold,
-) -> Estimate:
+) -> tuple[Estimate, Expected]:
     def seen(est: Estimate | None) -> list[Responses]:
         return [] if est is None else [_responses_of(est.model, hold)]
 
@@ -218,7 +219,7 @@ def _black(
         reading = expected.as_reading(conditions.sampling, plant, hold)
         return fitter_of(spec)(spec, [reading], SearchOptions())
 
-    return _refined(conditions, at, seen, solve)[1]
+    return _refined(conditions, at, seen, solve)[1:]
 
 
 def _refined(

@@ -151,7 +151,7 @@ def _asked(
         if not isinstance(spectrum, InputSpectrum):
             raise InputError(f"spectra[{name!r}] is a {type(spectrum).__name__}, not a spectrum")
     counts = [whole("factors", f) for f in listed("factors", factors)]
-    assumed = listed("holds", holds)
+    assumed = [holds] if isinstance(holds, (str, Hold)) else listed("holds", holds)
     for what, given in (("plant", plants), ("spectra", spectra)):
         if not given:
             raise InputError(f"{what} is empty; give at least one")

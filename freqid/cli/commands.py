@@ -17,20 +17,19 @@ from freqid.cli.estimates import USUAL_READING, fit, fit_many, new_model
 from freqid.cli.options import Band, Between, Force, Reading, in_words, part_of
 from freqid.cli.planned import bias
 from freqid.cli.plants import in_python, model_of
+from freqid.cli.shown import channels, show_file
 from freqid.cli.terminal import (
     PICTURES,
     TABLES,
     folder,
     may_write,
+    plain_warnings,
     progress,
     show,
     write_picture,
     write_table,
 )
 from freqid.cli.words import typed
-
-# kinds of files whose channels are found as they are read
-TEXTS = (".csv", ".txt", ".dat", ".tsv", ".asc")
 
 
 def reproduce(out: Path = Path("out"), *, force: Force = False) -> None:
@@ -138,63 +137,6 @@ def frf(
         print(repr(response)[1:-1])
 
 
-def show_file(
-    file: Path,
-    *,
-    reading: Reading = USUAL_READING,
-    between: Between = None,
-    plot: Path | None = None,
-    force: Force = False,
-) -> None:
-    """What would be read of a file: channels, rate, what was taken for the time; and a picture.
-
-    Parameters
-    ----------
-    file
-        any file that freqid reads.
-    plot
-        picture of the record, or of the response.
-    """
-    may_write(plot, [file], force, PICTURES)
-    record = part_of(reading.data(file), between)
-    if isinstance(record, fq.FrequencyResponse):
-        print(repr(record).strip("<>"))
-        if plot is not None:
-            write_picture(plot, fq.bode(record, labels=[file.name], unit="Hz"))
-        return
-    if reading == USUAL_READING or file.suffix.lower() not in TEXTS:
-        _print_channels(file)
-    print(repr(record).strip("<>"))
-    for note in record.notes:
-        print(f"note: {typed(note)}")
-    found = fq.check_record(record)
-    for row in found[found["finding"] != "note"].itertuples(index=False):
-        print(f"{row.channel}: {row.finding} {row.value:g}")
-    if plot is not None:
-        write_picture(plot, fq.plot_record(record))
-
-
-def channels(log: Path) -> None:
-    """The channels of a file or log: rate, jitter, length and unit of each.
-
-    Parameters
-    ----------
-    log
-        any file that freqid reads; of logs that need an extra the message names it.
-    """
-    _print_channels(log)
-
-
-def _print_channels(file: Path) -> None:
-    found = fq.channels(file)
-    # below that a clock is exact
-    exact = found["jitter"].abs() * found["rate"].abs() < 1e-9
-    found["jitter"] = found["jitter"].mask(exact, 0.0)
-    units = {"rate": "rate / Hz", "jitter": "jitter / s", "length": "length / s"}
-    shown = found.rename(columns=units)
-    print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}", na_rep=""))
-
-
 def explore(
     data: Path | None = None,
     *,
@@ -256,7 +198,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point: 0 done, 1 the fit did not converge, 2 bad arguments or bad input."""
     _end_tidily_when_told_to()
     try:
-        status = app(arguments, exit_on_error=False, print_error=False)
+        with plain_warnings():
+            status = app(arguments, exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except cyclopts.CycloptsError as error:
         _fail(str(error))

@@ -15,7 +15,7 @@ from freqid.cli.plants import TEMPLATE, pairs
 from freqid.cli.terminal import PICTURES, may_write, progress, show, write_picture
 from freqid.cli.words import typed
 from freqid.data import whole_file
-from freqid.fitting import in_digits, made_by_a_store
+from freqid.fitting import Verdict, in_digits, made_by_a_store
 
 USUAL_READING, USUAL_SEARCH = Reading(), Search()
 Texts = Annotated[list[str] | None, Option(consume_multiple=True)]
@@ -107,7 +107,18 @@ def fit(
     if plot is not None:
         beside = fq.compare(estimate, record, band=band)
         write_picture(plot, beside.plot(zoom=isinstance(record, fq.Record)))
-    show(f"{model}, {estimate.hold!r}", in_digits(estimate.parameters).reset_index())
+    print_estimate(estimate, model, found)
+    if compared is not None and validate is not None:
+        shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)
+        told = "which was fitted, too" if validate.samefile(data) else "which was not fitted"
+        print(f"{validate.name}, {told}: {shares} explained")
+    return 0 if estimate.converged else 1
+
+
+def print_estimate(estimate: fq.Estimate, title: str, verdict: Verdict | None = None) -> None:
+    """Parameters, fit, verdict (its own, or the one given), witness, warnings and notes."""
+    found = estimate.verdict if verdict is None else verdict
+    show(f"{title}, {estimate.hold!r}", in_digits(estimate.parameters).reset_index())
     print(
         f"fit {estimate.fit_percent:.3f} %, cost {estimate.cost:.6g}, "
         f"{estimate.n_agreed} of {estimate.n_starts} starts agree"
@@ -118,11 +129,6 @@ def fit(
         print(f"warning: {typed(str(warning))}")
     for note in estimate.notes:
         print(f"note: {typed(note)}")
-    if compared is not None and validate is not None:
-        shares = ", ".join(f"{x:.2f} %" for x in compared.fit_percent)
-        told = "which was fitted, too" if validate.samefile(data) else "which was not fitted"
-        print(f"{validate.name}, {told}: {shares} explained")
-    return 0 if estimate.converged else 1
 
 
 def fit_many(

@@ -48,8 +48,6 @@ def bias(
     plot
         heat map over upper frequency and factor, one panel a hold.
     """
-    may_write(out, [], force, TABLES)
-    may_write(plot, [], force, PICTURES)
     names = ["zoh", "foh", "remembered"] if hold is None else hold
     for name in names:
         choice("--hold", name, (*holds.Hold.named, "remembered"))
@@ -60,6 +58,8 @@ def bias(
         choice("--parameter", parameter, [p.name for p in plant.free_parameters])
     low, high = chirp
     below_nyquist(high, base_dt)
+    may_write(out, [], force, TABLES)
+    may_write(plot, [], force, PICTURES)
     swept = f"{low:g}-{high:g}"
     table = fq.bias_map(plant, {swept: fq.ChirpSpectrum(low, high)}, factors, assumed, base_dt)
     if out is not None:

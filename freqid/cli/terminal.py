@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +14,7 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from freqid.checks import InputError
+from freqid.cli.words import typed
 from freqid.data import whole_file
 from freqid.plots import Panels
 
@@ -84,3 +88,15 @@ def show(title: str, frame: pd.DataFrame) -> None:
     """A table whose columns are as wide as they need, for screens, pipes and papers alike."""
     shown = frame.map(lambda v: f"{v:.5g}" if isinstance(v, float) else str(v))
     print(f"{title}\n{shown.replace('nan', '').to_string(index=False)}\n")
+
+
+@contextmanager
+def plain_warnings() -> Iterator[None]:
+    """Warnings as lines of the terminal, without the place in the source that they come from."""
+
+    def told(message: Warning | str, *place: object) -> None:
+        print(f"freqid: warning: {typed(' '.join(str(message).split()))}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = told  # type: ignore[assignment]
+        yield

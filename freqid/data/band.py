@@ -38,7 +38,8 @@ class Band(NamedTuple):
         Raises ValueError unless 0 <= low < high <= ``nyquist`` (Hz).
         """
         try:
-            low, high = (float(v) for v in value)
+            # the characters of a text are numbers, too
+            low, high = (float(v) for v in (() if isinstance(value, str) else value))
         except (TypeError, ValueError):
             raise InputError(
                 f"{name}={value!r} must be two frequencies in Hz, (low, high)"

@@ -201,6 +201,8 @@ def write(record: Record, path: str | Path, overwrite: bool = False) -> None:
     _check_names(record, path)
     check_replacing(path, flag("overwrite", overwrite))
     frame = record.to_frame().assign(**kept_in_files(record))
+    # files keep these in columns
+    frame.attrs = {}
     frame.columns = [named_with(str(c), record.units.get(str(c), "")) for c in frame.columns]
     with whole_file(path) as beside:
         WRITERS[kind](frame, beside)

@@ -37,7 +37,8 @@ def as_pandas(frame: object) -> Table:
     import pandas as pd
 
     if isinstance(frame, pd.DataFrame):
-        return Table(_with_dates(frame), {})
+        told = frame.attrs.get("units")
+        return Table(_with_dates(frame), dict(told) if isinstance(told, dict) else {})
     # no library is imported for the question whether an object is one of its own
     home = type(frame).__module__.partition(".")[0]
     if home == "xarray":

@@ -53,6 +53,9 @@ def record_of(
 ) -> Record:
     """The record of that kind that a frame holds: columns to channels, time to periods."""
     frame, own_units, own_step, own_inputs = as_pandas(frame)
+    loop = frame.attrs.get("reference")
+    if reference is None and loop in frame.columns:
+        reference = loop
     if units is None:
         frame, units = without_units(frame, own_units)
         inputs, outputs = known(inputs, frame, "inputs"), known(outputs, frame, "outputs")
@@ -156,7 +159,11 @@ def samples_frame(record: Record) -> pd.DataFrame:
         columns[name] = np.full(len(record.u), np.nan)
         columns[name][:: record.factor] = values
     columns |= kept_columns(record)
-    return pd.DataFrame(columns, index=pd.Index(_on_paper(record), name="time"))
+    frame = pd.DataFrame(columns, index=pd.Index(_on_paper(record), name="time"))
+    # what columns of samples do not say goes with the frame for as long as it is one
+    frame.attrs |= {"units": dict(record.units)} if record.units else {}
+    frame.attrs |= {} if record.reference is None else {"reference": "reference"}
+    return frame
 
 
 def _on_paper(record: Record) -> FloatArray:

@@ -18,6 +18,7 @@ from freqid.checks import (
     State,
     channel_names,
     finite,
+    increasing,
     numbers,
     sealed,
     whole,
@@ -97,9 +98,7 @@ class FrequencyResponse:
         units: Mapping[str, str] | None = None,
         aliased: float = 0.0,
     ) -> None:
-        f = numbers("frequency", frequency)
-        if f.ndim != 1 or len(f) == 0 or not np.isfinite(f).all() or (np.diff(f) <= 0).any():
-            raise InputError("frequency must be finite and increasing, (K,), in Hz")
+        f = increasing("frequency", numbers("frequency", frequency), "Hz")
         G = numbers("response", response, complex)
         G = G.reshape(1, 1, -1) if G.ndim == 1 else G
         if not np.isfinite(G).all():

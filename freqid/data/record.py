@@ -214,7 +214,8 @@ class Record(Signals):
 
         An output slower than the input has NaN between its samples. A hold that is not the usual
         one is kept in a column more, ``zoh_period``, ``foh_period`` or ``band_limited``, one for
-        each input where they differ, and each condition in a column ``condition q``.
+        each input where they differ, and each condition in a column ``condition q``; units and the
+        reference's column are in ``attrs``.
 
         >>> Record([0.0, 1.0], [0.0, 0.5], dt=0.1).to_frame().columns.tolist()
         ['u', 'y']

@@ -9,7 +9,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.digits import in_digits, of_error, rounded
 from freqid.fitting.entry import fit
 from freqid.fitting.estimate import Z95, Estimate
-from freqid.fitting.findings import FOLDED, Finding
+from freqid.fitting.findings import FOLDED, Finding, Severity
 from freqid.fitting.fit_options import check_options, known_options
 from freqid.fitting.fitters import FITTERS, Near, SearchOptions, fitter_of
 from freqid.fitting.grades import Verdict

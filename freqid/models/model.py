@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, numbers, whole
+from freqid.checks import ComplexArray, FloatArray, InputError, increasing, numbers, whole
 from freqid.data import FrequencyResponse
 from freqid.lti import (
     BandLimited,
@@ -123,19 +123,15 @@ class Model(ABC):
         """Frequency response at ``omega`` (rad/s); of the continuous plant, or through a hold.
 
         That of a sampled model is taken at exp(jω·dt): it has its hold inside. Returns a
-        FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega that is not
-        finite or a hold that is not one. Warns (RuntimeWarning) where rounding of the matrices is
-        visible in nine digits.
+        FrequencyResponse, (outputs, inputs, frequencies). Raises ValueError for omega that is
+        negative, not finite or not increasing, or a hold that is not one. Warns (RuntimeWarning)
+        where rounding of the matrices is visible in nine digits.
 
         >>> import freqid as fq
         >>> abs(fq.first_order().frequency_response([100.0]).response[0, 0, 0]).round(4)
         np.float64(0.7071)
         """
-        at = np.atleast_1d(numbers("omega", omega))
-        if at.ndim != 1 or not np.isfinite(at).all():
-            raise InputError(
-                f"omega has shape {at.shape}; expected finite frequencies (rad/s), (K,)"
-            )
+        at = increasing("omega", np.atleast_1d(numbers("omega", omega)), "rad/s")
         if isinstance(hold, str) and hold == "bl":
             hold = BandLimited()
         if hold is not None and not isinstance(hold, Hold):

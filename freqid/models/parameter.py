@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from numbers import Real
 
-from freqid.checks import InputError, finite
+from freqid.checks import InputError, finite, flag
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,9 @@ class Parameter:
         if not isinstance(self.name, str) or not self.name:
             raise InputError(f"name={self.name!r} must be a non-empty string")
         object.__setattr__(self, "value", finite(f"parameter {self.name}", self.value))
+        object.__setattr__(self, "fixed", flag(f"parameter {self.name}: fixed", self.fixed))
+        if not isinstance(self.unit, str):
+            raise InputError(f"parameter {self.name}: unit={self.unit!r} must be text, as 'N m'")
         for side in ("lower", "upper"):
             limit = getattr(self, side)
             if not isinstance(limit, Real) or (limit not in (-math.inf, math.inf)):

@@ -250,3 +250,38 @@ def test_lines_apart_and_densities_are_not(spectrum):
     plant, dt = fq.first_order().with_values(a=30.0, b=12.0), 4e-3
     est = fq.asymptotic_fit(plant, spectrum, 4 * dt, true_hold=fq.ZeroOrderHold(dt))
     assert "folded lines" not in [w.kind for w in est.warnings]
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [(None, "a=189.48 where the plant has 100"), (fq.TransferFunction(0, 1), "off by 32.")],
+)
+def test_what_is_known_to_be_biased_is_not_trusted(model, words):
+    """A pole 89 % off had been trusted, its interval of no width."""
+    plant, spectrum = fq.first_order(), fq.ChirpSpectrum(10, 80)
+    wrong = fq.asymptotic_fit(plant, spectrum, 5e-3, "zoh", TRUE, model=model)
+    assert wrong.verdict.grade == "doubt"
+    assert [w for w in wrong.warnings if w.kind == "biased" and words in w], wrong.warnings
+    right = fq.asymptotic_fit(plant, spectrum, 5e-3, None, TRUE, model=model)
+    assert right.verdict.grade == "trust"
+    assert not right.warnings
+
+
+def test_a_bias_inside_of_the_error_bars_is_no_doubt():
+    """A first-order hold at factor two makes the pole 7 % less; the bar of one second is 6 %."""
+    plant, spectrum = fq.first_order(), fq.ChirpSpectrum(10, 80)
+    for duration, severity in ((1.0, "minor"), (1e7, "serious")):
+        est = fq.asymptotic_fit(
+            plant, spectrum, 1e-3, "foh", TRUE, noise_std=0.3, duration=duration
+        )
+        (found,) = (w for w in est.warnings if w.kind == "biased")
+        assert "-6.79 %" in found
+        assert found.severity == severity
+
+
+def test_a_hold_that_runs_out_of_reach_is_named_in_the_estimate(plant):
+    est = fq.asymptotic_fit(
+        plant, fq.ChirpSpectrum(10, 80), 5e-3, "estimate", fq.FirstOrderHold(T1)
+    )
+    assert est.verdict.grade == "do not use"
+    assert "no hold" in [w.kind for w in est.warnings]

@@ -62,3 +62,26 @@ def test_a_hold_by_its_name_is_one_at_dt():
     for wrong in ({"hold": "zoh"}, {"hold": "xyz", "dt": 0.1}, {"hold": 5}):
         with pytest.raises(ValueError, match="hold="):
             fq.FrequencyResponse(f, G, **wrong)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "words"),
+    [
+        ([-1, 2, 30], r"frequency\[0\]=-1 Hz"), ([1, 3, 2], r"frequency\[2\]=2 Hz"),
+        ([1, np.nan, 2], r"frequency\[1\]=nan Hz"), ([], "frequency has shape"),
+    ],
+)  # fmt: skip
+def test_frequencies_that_are_none_are_named(frequency, words):
+    with pytest.raises(ValueError, match=words):
+        fq.FrequencyResponse(frequency, np.ones(len(frequency)))
+    with pytest.raises(
+        ValueError, match=words.replace("frequency", "omega").replace("Hz", "rad/s")
+    ):
+        fq.first_order().frequency_response(frequency)
+
+
+def test_a_text_is_no_band():
+    """Its two characters had been taken for 1 and 8 Hz."""
+    record = fq.Record(fq.white_noise(500), fq.white_noise(500, seed=1), 0.01)
+    with pytest.raises(ValueError, match=r"band='18' must be two frequencies"):
+        fq.etfe(record, band="18")

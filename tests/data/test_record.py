@@ -302,3 +302,17 @@ def test_noise_by_ratio_for_each_output():
     np.testing.assert_allclose(noise, [0.01, 1.0], rtol=0.05)
     with pytest.raises(ValueError, match="snr"):
         record.with_noise(snr=[1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize("named", [{}, {"inputs": "u", "outputs": "y"}, {"inputs": "u"}])
+def test_a_frame_in_memory_keeps_reference_and_units(named):
+    """The next fit of the loop would be a direct one, and biased."""
+    u, y, r = (fq.white_noise(50, seed=k) for k in range(3))
+    record = fq.Record(u, y, 0.01, reference=r, units={"y": "rad"})
+    again = fq.Record.from_frame(record.to_frame(), **named)
+    np.testing.assert_array_equal(again.reference, record.reference)
+    assert again.units == record.units
+    assert again.output_names == ("y",)
+    # the frame is cut, as a user does
+    part = fq.Record.from_frame(record.to_frame().iloc[10:], **named)
+    np.testing.assert_array_equal(part.reference, record.reference[10:])

@@ -172,3 +172,10 @@ def test_a_frequency_on_a_pole_is_named_without_warnings(hold):
     integrator = fq.GreyBox(lambda k: ([[0]], [[k]], [[1]], None), [fq.Parameter("k", 2.0)])
     with pytest.raises(ValueError, match="omega=0 rad/s lies on a pole"):
         integrator.frequency_response([0.0, 1.0], hold)
+
+
+def test_what_is_no_switch_and_no_unit_is_refused():
+    with pytest.raises(ValueError, match="x: fixed='no' must be True or False"):
+        fq.Parameter("x", 1.0, fixed="no")
+    with pytest.raises(ValueError, match="x: unit=5 must be text"):
+        fq.Parameter("x", 1.0, unit=5)

@@ -117,3 +117,14 @@ def test_an_experiment_that_knows_a_value_keeps_its_row():
     assert list(own.index) == [0, 1, 2]
     assert own["a"].isna().tolist() == [False, True, False]
     assert own["a"][2] == pytest.approx(140, rel=1e-5)
+
+
+def test_what_conditions_tell_of_every_record_is_nobodys_own():
+    plant = fq.first_order(b=40.0, a=40.0)
+    record = fq.simulate(plant, fq.white_noise(500), 2e-3).with_noise(0.01)
+    told = record.with_conditions(a=40.0)
+    with pytest.raises(ValueError, match="separate='a' is known for each data set"):
+        fq.fit(plant, [told, told], separate="a")
+    est = fq.fit(plant, [told, record], separate="a")
+    assert "a[1]" in est.names
+    assert not [n for n in est.notes if "a[0]" in n]

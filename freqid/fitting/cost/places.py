@@ -60,9 +60,16 @@ def places_of(
                 f"others; the model's own {model.conditions[n]:g} is taken there"
             )
     for n in separate:
+        own = [place.number for place in places if n not in place.known]
+        if not own:
+            raise InputError(
+                f"separate={n!r} is known for each data set by its condition {n!r}; leave out one "
+                "or the other"
+            )
+        first = "what its condition says" if own[0] else f"that of the first, {n}[0]"
         notes.append(
             f"{n} has a value for each experiment: est.model, and what is drawn or derived from it "
-            f"alone, has that of the first, {n}[0]; compare(est, record) takes the record's own"
+            f"alone, has {first}; compare(est, record) takes the record's own"
         )
     return places, notes
 

@@ -231,10 +231,13 @@ def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
 
     A cost that no longer falls in sixteen digits leaves half of them in x; the gradient has more.
     """
-    P, smallest = len(x), np.inf
+    P, smallest, before = len(x), np.inf, x
     for _ in range(limit):
         point = objective.point(x)
-        if point is None or len(point.triangle) <= P:
+        if point is None:
+            # the last step has left where the model can be computed
+            return before
+        if len(point.triangle) <= P:
             break
         step = _gauss_newton(point)
         if step is None:
@@ -243,10 +246,10 @@ def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
         moved = x + step
         if not size < smallest or _outside(objective.structure, moved):
             break
-        x, smallest = moved, size
+        x, smallest, before = moved, size, x
         if size < 1e-13:
             break
-    return x
+    return x if objective.point(x) is not None else before
 
 
 def _gauss_newton(point: Point) -> FloatArray | None:
