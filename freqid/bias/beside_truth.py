@@ -43,7 +43,8 @@ def _parameters(truth: GreyBox, est: Estimate) -> list[Finding]:
         np.where(true == 0, np.abs(est.values[at]), np.abs(true)), 1e-300
     )
     # rounding scatters, too
-    told = np.isfinite(std) & (std > _ROUNDED * np.abs(est.scatter.scale[at]))
+    size = np.linalg.norm(est.scatter.change.reshape(len(est.names), -1), axis=1)
+    told = np.isfinite(std) & (std > _ROUNDED * size[at])
     errors = np.where(told, np.abs(off) / np.where(told, std, 1), 0)
     seen = np.where(told, errors > _SEEN, part > _TOLD)
     if not seen.any():
