@@ -38,13 +38,11 @@ def _parameters(truth: GreyBox, est: Estimate) -> list[Finding]:
     true = np.array([truth.values[est.names[i]] for i in at])
     off = est.values[at] - true
     std = np.sqrt(np.diag(est.covariance_matrix)[at])
-    # what is zero has no parts: those of what was found
-    part = np.abs(off) / np.maximum(
-        np.where(true == 0, np.abs(est.values[at]), np.abs(true)), 1e-300
-    )
+    # of what is zero, parts of the unknown's own size
+    size = np.linalg.norm(est.scatter.change.reshape(len(est.names), -1), axis=1)[at]
+    part = np.abs(off) / np.where(true == 0, size, np.abs(true))
     # rounding scatters, too
-    size = np.linalg.norm(est.scatter.change.reshape(len(est.names), -1), axis=1)
-    told = np.isfinite(std) & (std > _ROUNDED * size[at])
+    told = np.isfinite(std) & (std > _ROUNDED * size)
     errors = np.where(told, np.abs(off) / np.where(told, std, 1), 0)
     seen = np.where(told, errors > _SEEN, part > _TOLD)
     if not seen.any():
@@ -52,7 +50,7 @@ def _parameters(truth: GreyBox, est: Estimate) -> list[Finding]:
     much = np.where(told, errors > _OUTSIDE, part > _MUCH)
     worst = int(np.argmax(np.where(seen, errors, 0) if told.all() else np.where(seen, part, 0)))
     name, found = est.names[at[worst]], est.values[at[worst]]
-    share = [f"{100 * off[worst] / true[worst]:+.3g} %"] if true[worst] else []
+    share = [f"{100 * off[worst] / (true[worst] or size[worst]):+.3g} %"]
     share += [f"{errors[worst]:.3g} standard errors"] if told[worst] else []
     text = (
         f"{name}={found:.5g} where the plant has {true[worst]:.5g} "
