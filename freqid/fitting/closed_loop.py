@@ -157,7 +157,7 @@ def _explained(records: Sequence[Record], order: int) -> tuple[list[Record], flo
     known = _FOUND.setdefault(first, {})
     key = (*map(ref, records[1:]), order)
     if key not in known:
-        known[key] = LoopBox.of([_loop(r, size) for r in records], order)
+        known[key] = LoopBox.of([_loop(r, size) for r in records], first.n_inputs, order)
     box = known[key]
     loops = [reading.data for reading in box.readings if isinstance(reading.data, Record)]
     model = box.model

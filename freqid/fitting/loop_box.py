@@ -22,6 +22,7 @@ from freqid.fitting.black_box.subspace import inputs_and_cost
 from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import thinned_to
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.loop_parts import closed_from_parts
 from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
@@ -48,14 +49,15 @@ class LoopBox:
     rows: int
 
     @classmethod
-    def of(cls, records: Sequence[Record], order: int) -> LoopBox:
-        """Of records from the reference to both ends, beside a plant of ``order``.
+    def of(cls, records: Sequence[Record], inputs: int, order: int) -> LoopBox:
+        """Of records from the reference to both ends, first the ``inputs`` of a plant of ``order``.
 
         Raises InputError where no black box can be fitted.
         """
         readings = [Reading.of(r) for r in records]
         orders = [max(order, 1) + more for more in _BEYOND]
-        tried = _least(readings, orders)
+        closed = _closed(readings, inputs, order)
+        tried = [*closed, *_least(readings, orders)]
         first = _shortest(tried)
         model = first.model
         errors = [errors_of(model, r) for r in readings]
@@ -67,7 +69,8 @@ class LoopBox:
         ]
         again = [_descended(box.chart.moved(box.found.x), weighted) for box in tried]
         known = [box for box in again if box is not None]
-        return _shortest(known + _least(weighted, orders))
+        # parts that fit have no better start beside them
+        return _shortest(known if first in closed else known + _least(weighted, orders))
 
     @property
     def order(self) -> int:
@@ -100,6 +103,19 @@ def _shortest(boxes: Sequence[LoopBox]) -> LoopBox:
             "reference=False to fit the record directly"
         )
     return min(boxes, key=lambda box: box.length)
+
+
+def _closed(readings: Sequence[Reading], inputs: int, order: int) -> list[LoopBox]:
+    """Those that begin with a plant and a controller, closed."""
+    records = [r.data for r in readings if isinstance(r.data, Record)]
+    loops = closed_from_parts(records, inputs, order)
+    plane = lines_in_plane(readings, _LINES)[1]
+    charts = [
+        Chart(to_plane(loop, plane), True, plane, readings[0].sample_time, stable=True)
+        for loop in loops
+    ]
+    boxes = [_descended(chart, readings) for chart in charts]
+    return [box for box in boxes if box is not None]
 
 
 def _least(readings: Sequence[Reading], orders: Sequence[int]) -> list[LoopBox]:
