@@ -245,6 +245,8 @@ def picked(
     p, m = (range(len(names)) for names in (frf.output_names, frf.input_names))
     own = frf.line_noise if isinstance(frf, LocalResponse) else None
     kept: dict[str, Any] = {} if own is None else {"line_noise": own.of(p[o], m[i])}
+    if isinstance(frf, AveragedResponse):
+        kept = {"memory": frf.memory}
     left = (*frf.output_names[o], *frf.input_names[i])
     return dataclasses.replace(
         frf, units={n: u for n, u in frf.units.items() if n in left},

@@ -121,6 +121,16 @@ class ResponseNoise(NoiseModel):
 
 
 @dataclass(frozen=True, eq=False)
+class ModelNoise(ResponseNoise):
+    """1/variance of a response, as large as it is beside a model's: |Ĝ|²/|G|² is the ``share``."""
+
+    share: FloatArray
+
+    def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
+        return super().weights(data, shape) / self.share
+
+
+@dataclass(frozen=True, eq=False)
 class RelativeNoise(NoiseModel):
     """Weights of relative errors, as those of errors: divided by |Ĝ|²."""
 

@@ -15,7 +15,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitted, fitter_of
 from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
-from freqid.fitting.noise_models import as_noise_model, tells_variance
+from freqid.fitting.noise_models import ModelNoise, as_noise_model, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import INTERRUPTED
@@ -180,14 +180,15 @@ def relative_to_model(est: Estimate, reading: Reading) -> Reading:
     Relative to the measured one a line that its noise has made larger would count for more, which
     shifts the gain by twice the relative variance.
     """
-    frf = reading.data
     if not reading.logarithmic or reading.noise.plain:
         return reading
+    frf = reading.data
     assert isinstance(frf, FrequencyResponse)
-    assert frf.variance is not None
+    if reading.band is not None:
+        frf = frf.select(reading.band)
     model = met_by(est, reading).frequency_response(frf.omega, reading.hold).response
     share = np.abs(frf.response) ** 2 / np.maximum(np.abs(model) ** 2, 1e-300)
-    return reading.with_(data=dataclasses.replace(frf, variance=frf.variance * share))
+    return reading.with_(data=frf, noise=ModelNoise(share))
 
 
 def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:

@@ -135,7 +135,9 @@ class Reading:
             regular = dataclasses.replace(self, data=self.data.regular())
             return regular.at_lines()
         if self.logarithmic:
-            noise = RelativeNoise(self.noise)
+            # errors of values, not of logarithms, are as large as the response says
+            told = isinstance(self.noise, ResponseNoise)
+            noise = RelativeNoise(ResponseNoise() if told else self.noise)
             data = self.data.plain() if isinstance(self.data, PeriodicResponse) else self.data
             return dataclasses.replace(self, data=data, noise=noise, logarithmic=False)
         if self.both_ends:
