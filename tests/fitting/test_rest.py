@@ -63,3 +63,29 @@ def test_a_plant_that_runs_away_is_asked_without_a_word_of_numpy():
         est = fq.fit(fq.first_order(100, 100), fq.Record(u[::-1], y + noise, 0.01))
         assert est.verdict.grade != "trust"
         assert np.isfinite(est.suspects["p_value"]).all()
+
+
+@pytest.mark.parametrize("spec", [None, fq.OutputError(1)])
+def test_a_record_that_is_not_steady_is_named(spec):
+    """It had been "drift", "offset", "unsteady" or a spike, and trusted in noise."""
+    u, model = fq.white_noise(1000, seed=4), LAG if spec is None else spec
+    clean = fq.simulate(LAG, u, 0.01, initial_state=[3.0])
+    for record in (clean, clean.with_noise(0.05, seed=1)):
+        est = fq.fit(model, record, initial_state="steady")
+        assert [w.kind for w in est.warnings] == ["not steady"], est.warnings
+        assert est.verdict.grade == "doubt"
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("pole", "seeds"), [(0.9, 5), (0.0, 30), (0.9, 30)])
+def test_whole_periods_are_steady(pole, seeds):
+    u = np.tile(fq.multisine((1, 30), 4.0, 0.01), 4)
+    clean, trusted = fq.simulate(LAG, u, 0.01).slice(8.0), 0
+    for seed in range(seeds):
+        e = np.random.default_rng(seed).standard_normal(len(clean.y) + 300)
+        noise = scipy.signal.lfilter([np.sqrt(1 - pole**2)], [1, -pole], e)[300:]
+        record = fq.Record(clean.u, clean.y + 0.1 * clean.y.std() * noise, 0.01)
+        est = fq.fit(LAG, record, initial_state="steady")
+        assert "not steady" not in [w.kind for w in est.warnings]
+        trusted += est.verdict.grade == "trust"
+    assert trusted >= 0.9 * seeds
