@@ -214,16 +214,14 @@ def choice(name: str, value: object, allowed: Sequence[str]) -> str:
 
 def increasing(name: str, value: FloatArray, unit: str) -> FloatArray:
     """Frequencies (K,) that are finite, not negative and increasing; ValueError for others."""
+    asked = f"{name} must be finite, not negative and increasing, (K,), in {unit}"
     if value.ndim != 1 or not len(value):
-        raise InputError(f"{name} has shape {value.shape}; expected frequencies in {unit}, (K,)")
+        raise InputError(f"{asked}; it has shape {value.shape}")
     wrong = ~np.isfinite(value) | (value < 0)
     wrong[1:] |= np.diff(value) <= 0
     if wrong.any():
         k = int(np.argmax(wrong))
-        raise InputError(
-            f"{name}[{k}]={value[k]:g} {unit}: expected finite frequencies, none negative, each "
-            "above the one before"
-        )
+        raise InputError(f"{asked}; {name}[{k}]={value[k]:g}")
     return value
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import freqid as fq
 from freqid.cli.estimates import USUAL_READING, print_estimate
 from freqid.cli.options import Between, Force, Reading, part_of
+from freqid.cli.plants import model_of
 from freqid.cli.terminal import PICTURES, may_write, write_picture
 from freqid.cli.words import typed
 
@@ -19,6 +20,7 @@ def show_file(
     *,
     reading: Reading = USUAL_READING,
     between: Between = None,
+    model: str | None = None,
     plot: Path | None = None,
     force: Force = False,
 ) -> None:
@@ -30,12 +32,15 @@ def show_file(
     ----------
     file
         any file that freqid reads.
+    model
+        plant of an estimate that cannot be found again, your_file.py:plant.
     plot
         picture of the record, or of the response.
     """
     may_write(plot, [file], force, PICTURES)
     if file.suffix.lower() == ".json" and file.is_file():
-        estimate = fq.load(file)
+        plant = None if model is None else model_of(model)
+        estimate = fq.load(file, plant if isinstance(plant, fq.GreyBox) else None)
         name = getattr(estimate.model, "name", "") or type(estimate.model).__name__
         print_estimate(estimate, f"{file.name}: {name}")
         if plot is not None:

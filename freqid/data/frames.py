@@ -54,7 +54,8 @@ def record_of(
     """The record of that kind that a frame holds: columns to channels, time to periods."""
     frame, own_units, own_step, own_inputs = as_pandas(frame)
     loop = frame.attrs.get("reference")
-    if reference is None and loop in frame.columns:
+    chosen = [c for own in (inputs, outputs) if own is not None for c in np.atleast_1d(own)]
+    if reference is None and isinstance(loop, str) and loop in frame and loop not in chosen:
         reference = loop
     if units is None:
         frame, units = without_units(frame, own_units)

@@ -35,6 +35,8 @@ from freqid.models import DiscreteModel
 _BEYOND = (0, 1, 2, 4)
 # places of a lag that is added to a smaller black box, and how many of them are followed
 _RATES, _FOLLOWED = 8, 2
+# part of both ends that parts may leave without other starts beside them
+_CLEAR = 0.02
 # lines on which the orders are compared, evaluations of each, and the gain that ends one
 _LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
 
@@ -57,7 +59,7 @@ class LoopBox:
         readings = [Reading.of(r) for r in records]
         orders = [max(order, 1) + more for more in _BEYOND]
         closed = _closed(readings, inputs, order)
-        tried = [*closed, *_least(readings, orders)]
+        tried = closed if _clear(closed) else [*closed, *_least(readings, orders)]
         first = _shortest(tried)
         model = first.model
         errors = [errors_of(model, r) for r in readings]
@@ -67,10 +69,11 @@ class LoopBox:
             r.with_(noise=MeasuredNoise().learnt(e.error, e.n_samples))
             for r, e in zip(readings, errors, strict=True)
         ]
-        again = [_descended(box.chart.moved(box.found.x), weighted) for box in tried]
-        known = [box for box in again if box is not None]
         # parts that fit have no better start beside them
-        return _shortest(known if first in closed else known + _least(weighted, orders))
+        good = closed if first in closed else tried
+        again = [_descended(box.chart.moved(box.found.x), weighted) for box in good]
+        known = [box for box in again if box is not None]
+        return _shortest(known if good is closed else known + _least(weighted, orders))
 
     @property
     def order(self) -> int:
@@ -105,10 +108,18 @@ def _shortest(boxes: Sequence[LoopBox]) -> LoopBox:
     return min(boxes, key=lambda box: box.length)
 
 
+def _clear(boxes: Sequence[LoopBox]) -> bool:
+    """Whether loops of all orders could be closed, and the best leaves next to nothing of both
+    ends, which are of size one each.
+    """
+    every = len(boxes) == len(_BEYOND)
+    return every and min(box.found.cost / box.rows for box in boxes) < _CLEAR
+
+
 def _closed(readings: Sequence[Reading], inputs: int, order: int) -> list[LoopBox]:
     """Those that begin with a plant and a controller, closed."""
     records = [r.data for r in readings if isinstance(r.data, Record)]
-    loops = closed_from_parts(records, inputs, order)
+    loops = closed_from_parts(records, inputs, order, _BEYOND)
     plane = lines_in_plane(readings, _LINES)[1]
     charts = [
         Chart(to_plane(loop, plane), True, plane, readings[0].sample_time, stable=True)

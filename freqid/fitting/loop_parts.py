@@ -1,8 +1,8 @@
 """A loop put together from its parts: a plant and a controller, each fitted to what it sees.
 
-From the reference to both ends a loop of order n has to be found within hundreds of times larger
-moves of the reference. Between its own ends a controller is known to rounding, where it adds no
-noise of its own, and a plant nearly so: closed, they are a start beside which the minimum lies.
+From a smooth reference to both ends a loop of order n has to be found in what a few large lines
+leave. Between its own ends a controller is known to rounding, where it adds no noise of its own,
+and a plant nearly so: closed, they are a start beside which the minimum lies.
 """
 
 from __future__ import annotations
@@ -20,22 +20,24 @@ from freqid.fitting.cost.charts import from_plane
 from freqid.fitting.reading import Reading
 from freqid.lti import StateSpace
 
-# states of controllers that are tried, and lines that the parts are fitted on
-_STATES, _LINES = (0, 1, 2, 4), 3000
+# lines that the parts are fitted on
+_LINES = 3000
 
 
-def closed_from_parts(records: Sequence[Record], inputs: int, order: int) -> list[StateSpace]:
+def closed_from_parts(
+    records: Sequence[Record], inputs: int, order: int, controllers: Sequence[int]
+) -> list[StateSpace]:
     """Sampled loops from the reference to both ends, as ``records`` have them: first the plant's
     ``inputs``, then its outputs.
 
-    One for each order of the controller beside a plant of ``order`` states; none where a part
+    One for each order of the ``controllers`` beside a plant of ``order`` states; none where a part
     cannot be fitted, or the loop is not stable.
     """
     plant = _fitted([_part(r, slice(0, inputs), slice(inputs, None)) for r in records], order)
     if plant is None:
         return []
     made = []
-    for states in _STATES:
+    for states in controllers:
         controller = _controller(records, inputs, states)
         if controller is not None:
             loop = _closed(plant, controller)

@@ -67,8 +67,8 @@ def test_a_hold_by_its_name_is_one_at_dt():
 @pytest.mark.parametrize(
     ("frequency", "words"),
     [
-        ([-1, 2, 30], r"frequency\[0\]=-1 Hz"), ([1, 3, 2], r"frequency\[2\]=2 Hz"),
-        ([1, np.nan, 2], r"frequency\[1\]=nan Hz"), ([], "frequency has shape"),
+        ([-1, 2, 30], r"in Hz; frequency\[0\]=-1"), ([1, 3, 2], r"in Hz; frequency\[2\]=2"),
+        ([1, np.nan, 2], r"in Hz; frequency\[1\]=nan"), ([], "in Hz; it has shape"),
     ],
 )  # fmt: skip
 def test_frequencies_that_are_none_are_named(frequency, words):

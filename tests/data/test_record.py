@@ -316,3 +316,12 @@ def test_a_frame_in_memory_keeps_reference_and_units(named):
     # the frame is cut, as a user does
     part = fq.Record.from_frame(record.to_frame().iloc[10:], **named)
     np.testing.assert_array_equal(part.reference, record.reference[10:])
+
+
+def test_a_column_that_is_a_channel_is_no_reference():
+    record = fq.Record(*(fq.white_noise(50, seed=k) for k in (0, 1)), 0.01)
+    frame = fq.Record(record.u, record.y, 0.01, reference=fq.white_noise(50, seed=2)).to_frame()
+    assert fq.Record.from_frame(frame, "u", "reference").reference is None
+    assert fq.Record.from_frame(frame, "reference", "y").reference is None
+    frame.attrs["reference"] = ["of", "others"]
+    assert fq.Record.from_frame(frame[["u", "y"]], "u", "y").reference is None

@@ -97,5 +97,5 @@ def test_frequencies_of_matlab_that_are_no_numbers_warn_of_nothing(tmp_path):
     odd = F.view("u8").copy()
     odd[3] = 0x7FF0000000000001
     scipy.io.savemat(tmp_path / "a.mat", {"w": odd.view(float), "H": G})
-    with pytest.raises(ValueError, match=r"a\.mat: frequency\[3\]=nan Hz"):
+    with pytest.raises(ValueError, match=r"a\.mat: frequency must be finite"):
         fq.read_response(tmp_path / "a.mat")
