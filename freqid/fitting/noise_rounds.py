@@ -15,7 +15,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, fitted, fitter_of
 from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
-from freqid.fitting.noise_models import ModelNoise, as_noise_model, tells_variance
+from freqid.fitting.noise_models import ModelNoise, ResponseNoise, as_noise_model, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.descent import INTERRUPTED
@@ -180,7 +180,8 @@ def relative_to_model(est: Estimate, reading: Reading) -> Reading:
     Relative to the measured one a line that its noise has made larger would count for more, which
     shifts the gain by twice the relative variance.
     """
-    if not reading.logarithmic or reading.noise.plain:
+    # weights that are given stay what they are
+    if not reading.logarithmic or not isinstance(reading.noise, ResponseNoise):
         return reading
     frf = reading.data
     assert isinstance(frf, FrequencyResponse)

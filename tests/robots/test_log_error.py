@@ -123,3 +123,18 @@ def test_part_of_an_averaged_response_in_a_file_keeps_what_its_segments_cut_off(
     part = fq.read_response(tmp_path / "frf.csv", input=0)
     assert part.memory is not None
     assert part.memory.shape == (500,)
+
+
+@pytest.mark.parametrize("variance", [False, True])
+def test_weights_that_are_given_stay_what_they_are(plant, variance):
+    """Without a variance they had ended in an AssertionError."""
+    frf = measured(plant, 0, 0.05, variance)
+    some = np.where(F < 30, 1.0, 0.0)
+    weighted = fq.fit(plant, frf, error="log", weights=some)
+    alone = fq.fit(
+        plant,
+        measured(plant, 0, 0.05).select((1, 30)),
+        error="log",
+        weights=np.ones((F < 30).sum()),
+    )
+    np.testing.assert_allclose(weighted.values, alone.values, rtol=1e-5)
