@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import freqid as fq
+from freqid.checks import InputError
 from freqid.cli.estimates import USUAL_READING, print_estimate
 from freqid.cli.options import Between, Force, Reading, part_of
 from freqid.cli.plants import model_of
@@ -46,6 +47,8 @@ def show_file(
         if plot is not None:
             write_picture(plot, estimate.bode())
         return
+    if model is not None:
+        raise InputError(f"--model={model}: {file} is no estimate, which alone has a plant")
     record = part_of(reading.data(file), between)
     if isinstance(record, fq.FrequencyResponse):
         print(repr(record).strip("<>"))

@@ -25,6 +25,10 @@ def test_an_estimate_in_a_file_is_shown_as_fit_showed_it(tmp_path, capsys):
     assert fitted.splitlines()[1:] == shown.splitlines()[1:]
     assert "verdict: trust" in shown
     assert (tmp_path / "bode.png").stat().st_size > 10_000
+    with pytest.raises(SystemExit) as end:
+        cli.main(["show", str(tmp_path / "run.csv"), "--model", "first-order"])
+    assert end.value.code == 2
+    assert "is no estimate" in capsys.readouterr().err
 
 
 def test_warnings_are_lines_of_the_terminal(tmp_path, capsys, recwarn):

@@ -223,14 +223,7 @@ def moves(n, dt, length):
 
 def driven(reference, seed, noise, speed, dt=1e-3):
     """A motor with a load under PD control of its position, as measured; by scipy."""
-    Jm, Ja, k, d, fm = AXIS.values()
-    A = [
-        [0, 1, -1, 0],
-        [-k / Jm, -(fm + d) / Jm, d / Jm, 0],
-        [k / Ja, d / Ja, -d / Ja, 0],
-        [0, 1, 0, 0],
-    ]
-    plant = np.array(A), np.array([[0], [1 / Jm], [0], [0]]), np.array([[0, 0, 0, 1.0]]), [[0.0]]
+    plant = [np.array(M, dtype=float) for M in axis(**AXIS)]
     A, B, C, *_ = scipy.signal.cont2discrete(plant, dt)
     e = noise * np.random.default_rng(seed).standard_normal(len(reference))
     x, last, u, y = np.zeros(4), 0.0, np.zeros(len(e)), np.zeros(len(e))
