@@ -22,7 +22,8 @@ from freqid.fitting.order_selection import select_order
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_at_stamps, errors_in_time, line_errors
 from freqid.fitting.search.batched import Answers, descend
-from freqid.fitting.search.descent import settled, uninterrupted
+from freqid.fitting.search.descent import settled
+from freqid.fitting.search.interrupted import uninterrupted
 from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.uncertainty.covariance import determined
 from freqid.fitting.uncertainty.minimum import Minimum, Spread

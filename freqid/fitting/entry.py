@@ -25,7 +25,7 @@ from freqid.fitting.offsets import offsets, with_offset
 from freqid.fitting.printed import call_of
 from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
-from freqid.fitting.search.descent import INTERRUPTED
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.stamped import check_stamped
 from freqid.fitting.suspects import Inquiry
 from freqid.frf import stretches

@@ -47,7 +47,8 @@ class SearchOptions:
     ``estimated_hold`` makes the period of a zero-order hold one more unknown, ``separate`` those
     parameters that each experiment has for itself. A ``refit`` begins
     next to its minimum: it walks there on the cost itself, and ``meant`` is where the user began;
-    a black box walks there from the estimate ``before``.
+    a black box walks there from the estimate ``before``. A ``rough`` one, which others follow, goes
+    a part of a long way.
     """
 
     n_starts: int | None = None
@@ -58,6 +59,7 @@ class SearchOptions:
     refit: bool = False
     meant: Mapping[str, float] | None = None
     before: Estimate | None = None
+    rough: bool = False
 
 
 Fitter = Callable[[Any, Sequence[Reading], SearchOptions], Estimate]

@@ -17,8 +17,9 @@ from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.reading import Reading
-from freqid.fitting.search.descent import Solution, best_so_far, minimise, polish
+from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.guide import Guide
+from freqid.fitting.search.interrupted import best_so_far
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.stages import Search
 from freqid.fitting.search.stopping import Found
@@ -31,8 +32,8 @@ _LINES, _NOISY = 600, 10
 _MORE = 8
 # part of the cost on all lines that a step from the minimum on few may gain
 _WON = 0.02
-# evaluations down to data's own rounding
-_DIRECT = 40
+# evaluations down to data's own rounding; those of a refit that others follow, for each unknown
+_DIRECT, _ROUGH = 40, 5
 # starts of experiments at many places beside which there are no black boxes
 _ALONE = 3
 # a start that costs so many times more on a part of the lines costs more on all
@@ -69,7 +70,8 @@ def _search(
     spectral = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
     in_time = len(spectral) < len(objective.experiments)
     if options.refit and not in_time:
-        return Found(polish(objective, structure.start))
+        most = _ROUGH * (structure.count + 1) if options.rough else None
+        return Found(polish(objective, structure.start, limit=most))
     if in_time:
         spectral = [r.lines() for r in at_lines]
     # long records have more lines than it takes: refine on all of them last

@@ -11,6 +11,7 @@ import scipy
 
 from freqid.checks import FloatArray
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.lti import in_doubles
 
 # nepers that a value has moved where another answer is looked for, and frequencies in a look
 _MOVED, _FREQUENCIES = np.log(5), 16
@@ -31,8 +32,9 @@ def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
     if not told.any():
         return None
     moved = np.log(values[told] / begin[told])
-    if np.sum(np.abs(moved) > _MOVED) < 2:
-        # an answer of other values has moved more than one
+    walked = np.log(np.abs(x[told] / structure.start[told]))
+    if min(np.sum(np.abs(way) > _MOVED) for way in (moved, walked)) < 2:
+        # an answer of other values has moved more than one, and a refit begins from a chosen one
         return None
 
     def at(logs: FloatArray) -> FloatArray:
@@ -50,9 +52,11 @@ def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
             found = _response(structure, at(logs) / structure.scale, omega) / wanted - 1
             return np.asarray(np.ascontiguousarray(found).view(float))
 
-        end = scipy.optimize.least_squares(
-            apart, np.zeros(len(moved)), method="lm", max_nfev=_LOOKS * (len(moved) + 1)
-        )
+        # a look: what it finds is polished with all digits
+        with in_doubles():
+            end = scipy.optimize.least_squares(
+                apart, np.zeros(len(moved)), method="lm", max_nfev=_LOOKS * (len(moved) + 1)
+            )
     except Exception:  # the user's function may raise anything at a point
         return None
     if not np.abs(end.fun).max() < _MATCHED or np.abs(end.x).sum() >= np.abs(moved).sum():

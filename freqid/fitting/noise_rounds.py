@@ -18,7 +18,7 @@ from freqid.fitting.met import met_by
 from freqid.fitting.noise_models import ModelNoise, ResponseNoise, as_noise_model, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
-from freqid.fitting.search.descent import INTERRUPTED
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.witness import Testimony, groups_of
 from freqid.models import GreyBox
@@ -70,7 +70,7 @@ def _in_turn(
 ) -> tuple[Estimate, Estimate, Sequence[Reading]]:
     """The first estimate, the one that stands, and the readings by whose noise it was found."""
     est, readings = fitted(model, readings, options)
-    first = whole = est
+    first, whole, rough = est, est, True
     for i in range(_NOISE_ROUNDS):
         if est.message == INTERRUPTED:
             return first, est, readings
@@ -78,11 +78,13 @@ def _in_turn(
         before, anew = est, again(est, options)
         # a black box begins by itself where noise is first told, and walks from there
         walks = anew.start is None and i > 0
-        own = dataclasses.replace(anew, before=before) if walks else anew
+        own = dataclasses.replace(anew, before=before if walks else None, rough=rough)
         est, readings = fitted(model, readings, own)
         whole = whole if walks else est
-        if _stands(est, before):
+        if _stands(est, before) and (est.converged or not rough):
             break
+        # a round that moves little is the last: it goes to its end
+        rough = i < _NOISE_ROUNDS - 2 and not _stands(est, before)
     if not _stands(est, whole):
         # what is noise has changed on the way, and with it perhaps which minimum is the least
         other = fitter_of(model)(model, readings, anew)

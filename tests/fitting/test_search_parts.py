@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from freqid.fitting.search.descent import INTERRUPTED, best_so_far
+from freqid.fitting.search.interrupted import INTERRUPTED, best_so_far
 from freqid.fitting.search.scatter import around, promising
 
 

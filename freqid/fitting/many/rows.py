@@ -17,7 +17,7 @@ from freqid.data import DataSet, ResponseFile, alone, read, read_response
 from freqid.fitting.entry import fit
 from freqid.fitting.fitters import Near
 from freqid.fitting.many.together import Done, minima
-from freqid.fitting.search.descent import uninterrupted
+from freqid.fitting.search.interrupted import uninterrupted
 from freqid.lti import keep_freed_memory
 from freqid.models import GreyBox
 

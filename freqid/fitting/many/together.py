@@ -22,7 +22,7 @@ from freqid.fitting.entry import fit
 from freqid.fitting.many.alike import Alike
 from freqid.fitting.many.left import Left, inverse_of
 from freqid.fitting.search.batched import descend
-from freqid.fitting.search.descent import uninterrupted
+from freqid.fitting.search.interrupted import uninterrupted
 from freqid.fitting.twins import nearest_order
 from freqid.lti import tuned
 from freqid.models import GreyBox

@@ -8,15 +8,54 @@ reach, and gain ever less there.
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
-from freqid.fitting.cost.objective import Objective, Point
+from freqid.fitting.cost.objective import Point
 
 End: TypeAlias = Literal["minimum", "edge", "limit"]
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Bounds (P,) of unknowns."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+
+class Bounds(Protocol):
+    """What has bounds."""
+
+    @property
+    def lower(self) -> FloatArray:
+        """The least values (P,)."""
+        ...
+
+    @property
+    def upper(self) -> FloatArray:
+        """The greatest values (P,)."""
+        ...
+
+
+class BoundedCost(Protocol):
+    """A cost, its derivatives and its bounds; below ``rounding`` it is nothing else."""
+
+    rounding: float
+
+    @property
+    def structure(self) -> Bounds:
+        """The bounds."""
+        ...
+
+    def point(self, x: FloatArray) -> Point | None:
+        """Everything at x; None where the model cannot be computed there."""
+        ...
+
 
 # a step of this relative size needs no second look, nor does one that gains this part of the cost
 _LAST_STEP, _LAST_GAIN = 1e-7, 1e-13
@@ -34,7 +73,7 @@ _IDLE, _COARSE = 3, 1e-7
 
 
 def within_bounds(
-    objective: Objective, x: FloatArray, limit: int, tolerance: float = 0.0
+    objective: BoundedCost, x: FloatArray, limit: int, tolerance: float = 0.0
 ) -> tuple[FloatArray, Point, End] | None:
     """Where damped steps from ``x`` end within the bounds, and how: at a minimum, at an edge beyond
     which nothing can be computed, or at the ``limit`` of evaluations.
@@ -95,7 +134,7 @@ def within_bounds(
 
 
 def _onto(
-    objective: Objective, x: FloatArray, point: Point, step: FloatArray
+    objective: BoundedCost, x: FloatArray, point: Point, step: FloatArray
 ) -> tuple[FloatArray, Point]:
     """The end of a search, on the bounds that a last step would reach."""
     lower, upper = objective.structure.lower, objective.structure.upper

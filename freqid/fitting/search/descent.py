@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +10,11 @@ import scipy
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective, Point, Structure
+from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.search.bounded import within_bounds
+from freqid.fitting.search.valleys import through
 from freqid.fitting.search.worth import Worth, WorthlessError
 from freqid.lti import solved
-
-# what a search says that was ended from the keyboard
-INTERRUPTED = "interrupted: this is the best point so far"
 
 
 class UncomputableError(InputError):
@@ -43,6 +41,8 @@ _BOUNDED = 1e-9
 # relative gain that ends its reflective steps, or so many of them for each unknown: they go round
 # valleys well, but gain ever less next to a bound, where exact ones take over
 _NEAR, _REFLECTED = 1e-4, 10
+# evaluations for each unknown after which a search may be in a valley that turns
+_TURNING = 10
 # a step that would gain this part of the cost shows that a search has not come to its end
 _EDGE = 1e-6
 # a trial point that cannot be computed costs this: any step to it is rejected and shortened
@@ -100,6 +100,9 @@ def _descended(
     bounded = bool(np.isfinite(lower).any() or np.isfinite(upper).any())
 
     most = limit or 100 * size
+    few, turned = _TURNING * size, isinstance(objective.structure, GreyStructure)
+    if not turned or 3 * few > most:
+        few = most
     asked = np.geterr()
 
     def searched(begin: FloatArray, gain: float, most: int) -> scipy.optimize.OptimizeResult:
@@ -121,7 +124,10 @@ def _descended(
     begin = start
     if bounded:
         near = searched(start, max(tolerance, _NEAR), min(most, _REFLECTED * size))
-        ended = within_bounds(objective, near.x, most, tolerance)
+        ended = within_bounds(objective, near.x, few, tolerance)
+        if ended is not None and ended[2] == "limit" and few < most:
+            x = through(objective, ended[0], few, tolerance)
+            ended = within_bounds(objective, x, most - 2 * few, tolerance) or ended
         if ended is not None:
             x, end, how = ended
             said = {
@@ -134,7 +140,10 @@ def _descended(
             return Solution(x, end, how == "minimum", said[how])
         # where no such step gains anything, next to what cannot be computed, reflective ones may
         begin, tolerance = near.x, max(tolerance, _BOUNDED)
-    result = searched(begin, tolerance, most)
+    result = searched(begin, tolerance, few)
+    if result.status == 0 and few < most:
+        x = through(objective, result.x, few, tolerance)
+        result = searched(x, tolerance, most - 2 * few)
     point = objective.point(result.x)
     if point is None:
         return Solution(start, first, False, "no step from the start could be computed")
@@ -270,20 +279,3 @@ def _padded(rows: FloatArray, size: int) -> FloatArray:
     if len(rows) == size:
         return rows
     return np.concatenate([rows, np.zeros((size - len(rows), *rows.shape[1:]))])
-
-
-def uninterrupted(message: str) -> None:
-    """KeyboardInterrupt where a fit says so: for what goes on after one, such as many fits."""
-    if message == INTERRUPTED:
-        raise KeyboardInterrupt
-
-
-def best_so_far(objectives: Sequence[Objective], start: FloatArray) -> Solution | None:
-    """What an interrupted search has found on the first of some costs, by the others, or its start.
-
-    None where the cost cannot be computed there.
-    """
-    known = [cost.least[0] for cost in objectives if cost.least is not None]
-    x = known[0] if known else start
-    point = objectives[0].point(x)
-    return None if point is None else Solution(x, point, False, INTERRUPTED)

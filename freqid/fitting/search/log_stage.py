@@ -49,17 +49,23 @@ class Logarithms:
         return np.where(self.log & (np.abs(xi) < _REACH), x, np.where(self.log, 0.0, 1.0))
 
 
+def log_bounds(inner: Structure, start: FloatArray) -> FloatArray:
+    """Lower and upper bounds (2, P) of logarithms beside a start."""
+    log = start != 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.array([inner.lower, inner.upper]) / np.where(log, start, 1)
+        ends = np.where(log, np.log(np.maximum(ends, 0)), ends)
+    ends.sort(axis=0)
+    return ends
+
+
 class LogStructure(Logarithms):
     """A structure with every unknown that is not zero at the start replaced by its logarithm."""
 
     def __init__(self, inner: Structure, start: FloatArray) -> None:
         super().__init__(start)
         self.inner = inner
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = np.array([inner.lower, inner.upper]) / np.where(self.log, start, 1)
-            ends = np.where(self.log, np.log(np.maximum(ends, 0)), ends)
-        ends.sort(axis=0)
-        self.lower, self.upper = ends
+        self.lower, self.upper = log_bounds(inner, start)
 
     def realise(self, xi: FloatArray) -> Realisation:
         """The plant and its derivatives by xi."""

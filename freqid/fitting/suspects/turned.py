@@ -22,7 +22,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
-from freqid.fitting.search.descent import INTERRUPTED
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.scene import Scene
