@@ -24,7 +24,13 @@ from freqid.checks import (
     whole,
 )
 from freqid.data import Band
-from freqid.excitation import ChirpSpectrum, InputSpectrum, LineSpectrum, multisine_lines
+from freqid.excitation import (
+    ChirpSpectrum,
+    InputSpectrum,
+    LineSpectrum,
+    least_crest,
+    multisine_lines,
+)
 from freqid.fitting import GreyStructure
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold, sampled_response
 from freqid.models import GreyBox
@@ -32,8 +38,6 @@ from freqid.models import GreyBox
 if TYPE_CHECKING:
     import pandas as pd
 
-# peak over rms that a multisine of low crest reaches; that of a sine is √2
-_CREST = 1.45
 # lines of a D-optimal design, and a share of the power below which one is left out
 _GRID_LINES = 4000
 _LEAST_SHARE = 1e-4
@@ -121,10 +125,8 @@ def experiment_design(
             limit = min(high, 0.45 / (base_dt * factor))
             if limit <= low:
                 continue
-            power = (amplitude / _CREST) ** 2
-            best = d_optimal_spectrum(
-                plant, (low, limit), duration, base_dt * factor, hold, power=power
-            )
+            best = d_optimal_spectrum(plant, (low, limit), duration, base_dt * factor, hold)
+            best = _within(amplitude, best, duration, base_dt)
             edges[name] = (best.frequencies[0], best.frequencies[-1])
             tables.append(([factor], {name: best}))
     rows = []
@@ -148,6 +150,16 @@ def experiment_design(
     table = pd.DataFrame(rows).sort_values("error", kind="stable", ignore_index=True)
     table.attrs["best"] = table.iloc[0].to_dict()
     return table
+
+
+def _within(amplitude: float, spectrum: LineSpectrum, period: float, dt: float) -> LineSpectrum:
+    """The spectrum with the power of the signal of it whose peak is an amplitude: a few lines of
+    very different powers have a peak of up to the sum of theirs.
+    """
+    k = np.round(np.array(spectrum.frequencies) * period).astype(int)
+    crest = least_crest(k, spectrum.powers, round(period / dt))
+    power = np.array(spectrum.powers) / np.sum(spectrum.powers) * (amplitude / crest) ** 2
+    return LineSpectrum(spectrum.frequencies, power.tolist())
 
 
 def _bias_and_scatter(

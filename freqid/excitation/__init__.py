@@ -13,7 +13,7 @@ from freqid.excitation.input_spectra import (
     WhiteSpectrum,
     below_nyquist,
 )
-from freqid.excitation.multisines import multisine
+from freqid.excitation.multisines import least_crest, multisine
 from freqid.excitation.signal_spectra import (
     MeasuredSpectrum,
     MultisineSpectrum,

@@ -116,6 +116,13 @@ def multisine(
     return u[0, :, 0] if count == 1 else u[0]
 
 
+def least_crest(k: IntArray, powers: ArrayLike, N: int, seed: int = 0) -> float:
+    """Peak over rms of harmonics ``k`` of N samples, with the phases that ``multisine`` finds."""
+    lines = _Lines(k, _amplitudes(powers, len(k)))
+    rng = np.random.default_rng(seed)
+    return float(np.abs(lines.signal(_phases(lines, N, "minimise", rng, True, 1), N)).max())
+
+
 def _logarithmic(k: IntArray) -> IntArray:
     """Odd lines spaced evenly along a logarithm, as many as there are before two fall together."""
     odd = k[k % 2 == 1]

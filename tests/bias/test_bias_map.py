@@ -245,3 +245,28 @@ def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
     )
     assert len(alone) == 2
     assert table["converged"].all()
+
+
+@pytest.mark.parametrize("plant", [fq.two_mass(), fq.first_order()], ids=["two-mass", "lag"])
+def test_a_d_optimal_multisine_keeps_within_the_amplitude(plant):
+    amplitude, duration, noise = 3.0, 4.0, 0.05
+    table = fq.experiment_design(
+        plant, 1e-3, noise_std=noise, amplitude=amplitude, duration=duration, factors=[1],
+        bands=[(5, 60)], d_optimal=True,
+    )  # fmt: skip
+    row = table[table["excitation"].str.startswith("D-optimal")].iloc[0]
+    best = fq.d_optimal_spectrum(plant, (5, 60), duration, 1e-3)
+    # the signal itself, as whoever runs the experiment makes it
+    share = np.zeros(round((best.frequencies[-1] - best.frequencies[0]) * duration) + 1)
+    lines = np.round((np.array(best.frequencies) - best.frequencies[0]) * duration).astype(int)
+    share[lines] = best.powers
+    ends = best.frequencies[0], best.frequencies[-1]
+    u = fq.multisine(ends, duration, 1e-3, powers=share)
+    u *= amplitude / np.abs(u).max()
+    power = np.array(best.powers) / np.sum(best.powers) * np.mean(u**2)
+    told = fq.asymptotic_fit(
+        plant, fq.LineSpectrum(best.frequencies, power), 1e-3, noise_std=noise, duration=duration
+    )
+    for p in plant.free_parameters:
+        std = told.parameters["std"][p.name] / abs(p.value)
+        assert row[f"std {p.name}"] == pytest.approx(std, rel=0.03)
