@@ -83,13 +83,13 @@ def _findings(x: FloatArray, measured: bool) -> list[dict[str, str | float]]:
         return found
     values = np.unique(x)
     q = float(np.diff(values).min())
-    at_limit = False
+    at_limit, stairs = False, _is_staircase(x, edges, q)
     for value, which in ((x.max(), "largest"), (x.min(), "smallest")):
         plateaus = np.flatnonzero((x[edges[:-1]] == value) & (runs >= _PLATEAU))
         arrivals = plateaus[plateaus > 0]
         # a quantised sine lingers at its top too, but does not arrive there at full speed
         jumps = np.abs(value - x[edges[:-1][arrivals] - 1])
-        if len(values) > 3 and len(jumps) and np.median(jumps) > _FAST * q:
+        if len(values) > 3 and not stairs and len(jumps) and np.median(jumps) > _FAST * q:
             at_limit = True
             add("saturated", value, f"{int((x == value).sum())} samples stand at the {which} value,"
                 f" up to {int(runs[plateaus].max())} in a row: the sensor or the drive was "
@@ -106,6 +106,14 @@ def _findings(x: FloatArray, measured: bool) -> list[dict[str, str | float]]:
         how = "; of a step fit(..., offset='estimate') leaves it free instead" if measured else ""
         add("offset", x.mean(), "the mean is far above the movement; detrend() takes it off" + how)
     return found
+
+
+def _is_staircase(x: FloatArray, edges: IntArray, q: float) -> bool:
+    """Whether a channel steps to most values and rests there, as at its largest and smallest."""
+    at, runs = edges[1:-2], np.diff(edges)[1:-1]
+    between = (x[at] > x.min()) & (x[at] < x.max())
+    rests = (runs >= _PLATEAU) & (np.abs(x[at] - x[at - 1]) > _FAST * q)
+    return bool(between.any()) and float(np.mean(rests[between])) > 0.5
 
 
 def _repeated(runs: IntArray) -> int:
