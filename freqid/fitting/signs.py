@@ -103,7 +103,8 @@ def not_physical(e: Evidence) -> Iterator[Finding]:
     """A parameter outside its physical range."""
     for p, value, error in zip(e.parameters, e.values, e.std, strict=True):
         low, high = p.physical
-        if low <= value <= high:
+        # bounds beyond that range say that it is meant
+        if low <= value <= high or p.upper <= low or p.lower >= high:
             continue
         beyond = low - value if value < low else value - high
         why, severity = "check the hold that was assumed and the band", "serious"

@@ -229,3 +229,18 @@ def test_two_lags_that_are_alike_have_a_minimum():
         assert est.converged
         assert est["g"] == pytest.approx(1.5, rel=0.01)
         assert est["t1"] + est["t2"] == pytest.approx(0.04, rel=0.02)
+
+
+@pytest.mark.parametrize("bounds", [(-200.0, -10.0), (-200.0, 0.0), (-np.inf, -10.0)])
+def test_a_parameter_that_is_bounded_below_zero_is_meant_there(bounds):
+    def lag(g, p):
+        return [[-p]], [[1.0]], [[g]], [[0.0]]
+
+    model = fq.GreyBox(lag, [fq.Parameter("g", -60.0), fq.Parameter("p", 6.0)])
+    model = model.with_bounds(g=bounds)
+    rng = np.random.default_rng(0)
+    u = np.repeat(rng.standard_normal(100), 4)
+    record = fq.simulate(model.with_values(g=-40.0, p=5.0), u, 0.01).with_noise(0.01, seed=1)
+    est = fq.fit(model, record)
+    assert est.values == pytest.approx([-40.0, 5.0], rel=0.01)
+    assert est.verdict.grade == "trust", est.warnings

@@ -110,9 +110,13 @@ class GreyStructure:
         """
         same = copy.copy(self)
         ends = np.array([p.physical for p in self.parameters]).T / self.scale[: self.count]
+        low, high = self.lower[: self.count], self.upper[: self.count]
+        within = np.maximum(low, ends[0] + _INSIDE), np.minimum(high, ends[1] - _INSIDE)
+        # whoever bounds a parameter elsewhere means what is there
+        there = within[0] < within[1]
         same.lower, same.upper = self.lower.copy(), self.upper.copy()
-        same.lower[: self.count] = np.maximum(self.lower[: self.count], ends[0] + _INSIDE)
-        same.upper[: self.count] = np.minimum(self.upper[: self.count], ends[1] - _INSIDE)
+        same.lower[: self.count] = np.where(there, within[0], low)
+        same.upper[: self.count] = np.where(there, within[1], high)
         return same
 
     def physical(self, x: FloatArray) -> dict[str, float]:
