@@ -98,8 +98,9 @@ def through_references(
         alone = share < _CHANCE and any(_strangers(r) for r in records)
         if (share < _NOTHING or alone) and reference is not True:
             notes.append(
-                f"the reference explains {100 * share:.2g} % of the input's power: it comes too "
-                "late, or belongs to another input, and the input was fitted as it is"
+                f"the reference explains {100 * share:.2g} % of the input's power: noise rules the "
+                "input, or it comes too late, or belongs to another input, and the input was "
+                "fitted as it is; reference=True goes through the reference all the same"
             )
             continue
         if share > _WHOLE and reference is not True:

@@ -80,7 +80,9 @@ def _triangular(phi: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArr
         raise np.linalg.LinAlgError("the sampled matrices are not finite")
     scale = np.ones(len(phi))
     if len(phi) > 1:
-        phi, (scale, _) = scipy.linalg.matrix_balance(phi, permute=False, separate=True)
+        # of a lag that is gone within a sample the scales are beyond integers, which scipy asks for
+        with np.errstate(invalid="ignore"):
+            phi, (scale, _) = scipy.linalg.matrix_balance(phi, permute=False, separate=True)
     S, Q = scipy.linalg.schur(phi, output="complex")
     return S, Q.conj().T / scale, scale[:, None] * Q
 

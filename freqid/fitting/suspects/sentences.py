@@ -29,7 +29,10 @@ CURES = {
         "or move the plant so that it does not turn round"
     ),
     "nonlinear": "lower the excitation, or identify at the level at which the plant will work",
-    "feedback": "the record is of a closed loop: give it its reference, or excite it by one",
+    "feedback": (
+        "the record is of a closed loop: give it its reference, with reference=True where a note "
+        "says that it was left out, or excite it by one"
+    ),
     "unlike experiments": "fit them apart and compare; find out what has changed between them",
     "amplitude": "the plant is not linear: identify it at the level at which it will work",
     "unsteady": "see est.spread, fit the halves apart, and find out what has changed",
