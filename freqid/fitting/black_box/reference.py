@@ -6,6 +6,7 @@ target with the noise taken off, and its cost a bound that no plant of the order
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +16,9 @@ import numpy as np
 import scipy
 
 from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.channel_units import alike
+from freqid.fitting.black_box.order_minimum import descended
+from freqid.fitting.black_box.plant_in_plane import bilinear_plant, held_plant
 from freqid.fitting.black_box.refinement import (
     exchanged_model,
     first_model,
@@ -28,8 +32,8 @@ from freqid.fitting.cost.experiments import Experiment, SpectralExperiment, thin
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
-from freqid.lti import Hold, PeriodicHold, StateSpace, observed, reduced
-from freqid.models import DiscreteModel, GreyBox, Model, late_sampled, observed_order
+from freqid.lti import Hold, StateSpace, observed, reduced
+from freqid.models import DiscreteModel, GreyBox, Model, observed_order
 
 # evaluations of a black box at the most, and the gain that ends them
 _LIMIT, _TOLERANCE = 60, 1e-7
@@ -71,7 +75,8 @@ class Reference:
         begun = partial(nested_model, stable=True) if stable else first_model
         try:
             centre = begun(seen.lines, order, seen.direct)
-            return cls._descended(seen.objective(centre), seen.bilinear)
+            found = cls._descended(seen.objective(centre), seen.bilinear)
+            return found if found.solution.converged else found._or_alike(seen, order)
         except np.linalg.LinAlgError as error:
             raise InputError(f"the black box of order {order} has no start: {error}") from None
 
@@ -99,7 +104,7 @@ class Reference:
         pairs = [seen.plane.points(pair) for pair in begun]
         # what is not seen of the plant is not seen of its samples
         W, X = observed(model.state_space(), observed_order(model))
-        own = to_plane(reduced(_held(model, readings[0].hold), W, X), seen.plane)
+        own = to_plane(reduced(held_plant(model, readings[0].hold), W, X), seen.plane)
         poles = np.linalg.eigvals(own.A).astype(complex)
         gain = _CHANCE / sum(e.n_rows for e in seen.lines)
         try:
@@ -117,6 +122,18 @@ class Reference:
         start = np.zeros(chart.size)
         found = polish(objective, start, limit=_LIMIT, tolerance=_TOLERANCE, worth=worth)
         return cls(objective, found, bilinear)
+
+    def _or_alike(self, seen: SampledLines, order: int) -> Reference:
+        """The better of it and of one begun where all outputs count alike."""
+        units = alike(seen.lines)
+        if units is None:
+            return self
+        own = dataclasses.replace(seen, lines=units.lines)
+        begun = nested_model(own.lines, order, own.direct, stable=True)
+        chart, near, _ = descended(own.chart(begun), own.lines)
+        centre = units.back(chart.matrices(near.x))
+        other = self._descended(seen.objective(centre), seen.bilinear)
+        return min(self, other, key=lambda each: each.cost)
 
     @property
     def chart(self) -> Chart:
@@ -152,8 +169,7 @@ class Reference:
             try:
                 # a poor start may grow beyond all numbers within a sample
                 with np.errstate(all="ignore"):
-                    centre = begin()
-                found = self._beginning(centre)
+                    found = self._beginning(begin())
             except (InputError, np.linalg.LinAlgError):
                 continue
             least = best or self
@@ -179,7 +195,11 @@ class Reference:
 
     def _around(self, model: GreyBox, readings: Sequence[Reading]) -> StateSpace:
         """The sampled model of a plant, in the plane of the chart."""
-        in_z = _bilinear(model, self.chart.dt) if self.bilinear else _held(model, readings[0].hold)
+        in_z = (
+            bilinear_plant(model, self.chart.dt)
+            if self.bilinear
+            else held_plant(model, readings[0].hold)
+        )
         # what is not seen of the plant is not seen of its samples
         W, X = observed(model.state_space(), len(self.chart.centre.A))
         return to_plane(reduced(in_z, W, X), self.chart.plane)
@@ -222,7 +242,7 @@ class Reference:
         """One that begins from a model of an order less and a sampled mode beside it; ``worth`` as
         it is for ``on``.
         """
-        chart, own = self.chart, _held(model, readings[0].hold)
+        chart, own = self.chart, held_plant(model, readings[0].hold)
         W, X = observed(model.state_space(), len(chart.centre.A) - len(mode.A))
         own = reduced(own, W, X)
         both = StateSpace(
@@ -270,25 +290,3 @@ def _lags(lines: Sequence[SpectralExperiment], dt: float) -> list[ComplexArray]:
         return []
     z = np.exp(-np.geomspace(low, high, _RATES) * dt).astype(complex)
     return [np.array([slow, fast]) for slow, fast in zip(z, z[_RATES // 2 :], strict=False)]
-
-
-def _held(model: GreyBox | DiscreteModel, hold: Hold) -> StateSpace:
-    """The sampled model of a plant behind a hold, with what reaches the next sample fed through."""
-    if isinstance(model, DiscreteModel):
-        return model.state_space()
-    assert isinstance(hold, PeriodicHold)
-    at, s = model.state_space(), model.sampled(hold)
-    if model.late:
-        s = late_sampled(model, hold)
-    # z Γ⁺ is (zI − Φ)Γ⁺ + ΦΓ⁺
-    return StateSpace(s.phi, s.gamma + s.phi @ s.gamma_next, at.C, at.D + at.C @ s.gamma_next)
-
-
-def _bilinear(model: GreyBox, dt: float) -> StateSpace:
-    """The plant as a function of z = (1 + s·dt/2)/(1 − s·dt/2)."""
-    A, B, C, D = model.state_space()
-    eye = np.eye(len(A))
-    inverse = np.linalg.inv(eye - A * dt / 2)
-    return StateSpace(
-        inverse @ (eye + A * dt / 2), inverse @ B * dt, C @ inverse, D + C @ inverse @ B * dt / 2
-    )

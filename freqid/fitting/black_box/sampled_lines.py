@@ -78,10 +78,13 @@ class SampledLines:
         direct = bilinear or bool(model.state_space().D.any() or model.delay_sources)
         return cls(lines, plane, dt, direct or readings[0].hold.reaches_next, bilinear, stable)
 
+    def chart(self, centre: StateSpace) -> Chart:
+        """Models around one."""
+        return Chart(centre, self.direct, self.plane, self.dt, stable=self.stable)
+
     def objective(self, centre: StateSpace) -> Objective:
         """The cost of models around one."""
-        chart = Chart(centre, self.direct, self.plane, self.dt, stable=self.stable)
-        return Objective(chart, self.lines)
+        return Objective(self.chart(centre), self.lines)
 
 
 def _middle_period(readings: Sequence[Reading]) -> float:

@@ -1,0 +1,47 @@
+"""Outputs of very different size: a cart's way and the angle of what hangs from it."""
+
+import numpy as np
+import pytest
+import scipy.signal
+
+import freqid as fq
+
+TRUE = {"M": 5.0, "m": 2.0, "l": 0.8, "c": 4.0}
+DT, N = 0.01, 4000
+
+
+def _crane(M, m, l, c):  # noqa: E741
+    g = 9.81
+    A = np.array([
+        [0, 1, 0, 0],
+        [0, -c / M, m * g / M, 0],
+        [0, 0, 0, 1],
+        [0, c / (M * l), -(M + m) * g / (M * l), 0],
+    ])  # fmt: skip
+    B = np.array([[0], [1 / M], [0], [-1 / (M * l)]])
+    return A, B, np.eye(4)[[0, 2]], np.zeros((2, 1))
+
+
+def _record(seed):
+    """Ramps of two seconds, 5 % of noise at both outputs; simulated by scipy."""
+    rng = np.random.default_rng(seed)
+    edges = np.arange(0, N + 200, 200)
+    u = np.interp(np.arange(N), edges, rng.uniform(-1, 1, len(edges)))
+    A, B, C, _, _ = scipy.signal.cont2discrete(_crane(**TRUE), DT)
+    x, y = np.zeros(4), np.empty((N, 2))
+    for k in range(N):
+        y[k] = C @ x
+        x = A @ x + B[:, 0] * u[k]
+    return fq.Record(u, y + 0.05 * y.std(axis=0) * rng.standard_normal(y.shape), DT)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("seed", range(6))
+def test_a_start_a_third_off_ends_where_the_truth_does(seed):
+    crane = fq.GreyBox(_crane, [fq.Parameter(n, v, lower=0) for n, v in TRUE.items()])
+    record = _record(seed)
+    start = {n: v * (1.4 if i % 2 else 0.75) for i, (n, v) in enumerate(TRUE.items())}
+    est, right = fq.fit(crane, record, start=start), fq.fit(crane, record)
+    assert est.cost <= right.cost * (1 + 1e-6)
+    std = est.parameters["std"].to_numpy()
+    assert (np.abs(est.values - list(TRUE.values())) < 4 * std).all()
