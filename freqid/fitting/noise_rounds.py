@@ -23,8 +23,9 @@ from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.witness import Testimony, groups_of
 from freqid.models import GreyBox
 
-# fits with the noise of the one before, and the part of a standard error that ends them
-_NOISE_ROUNDS = 8
+# fits with the noise of the one before, how many of them may end on their way, and the part of a
+# standard error that ends them
+_NOISE_ROUNDS, _ROUGH_ROUNDS = 8, 5
 _STANDS = 0.01
 # part of the cost by which another start's end is another minimum
 _DEEPER = 1e-6
@@ -84,7 +85,7 @@ def _in_turn(
         if _stands(est, before) and (est.converged or not rough):
             break
         # a round that moves little is the last: it goes to its end
-        rough = i < _NOISE_ROUNDS - 2 and not _stands(est, before)
+        rough = i + 1 < _ROUGH_ROUNDS and not _stands(est, before)
     if not _stands(est, whole):
         # what is noise has changed on the way, and with it perhaps which minimum is the least
         other = fitter_of(model)(model, readings, anew)
