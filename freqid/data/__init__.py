@@ -16,6 +16,7 @@ from freqid.data.data_set import (
     output_dt,
     rate_factor,
 )
+from freqid.data.empirical_response import EmpiricalResponse
 from freqid.data.files import check_name, naming, read, whole_file, write
 from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
 from freqid.data.frequency_response import FrequencyResponse

@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import InputError
 from freqid.data.averaged_response import AveragedResponse
+from freqid.data.empirical_response import EmpiricalResponse
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import LocalResponse
 from freqid.data.periodic_response import PeriodicResponse
@@ -72,6 +73,8 @@ def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> Frequ
     kept: dict[str, Any] = {}
     if isinstance(frf, AveragedResponse):
         kept = {"memory": frf.memory}
+    elif isinstance(frf, EmpiricalResponse):
+        kept = {"input_phase": frf.input_phase}
     elif isinstance(frf, LocalResponse) and frf.line_noise is not None:
         kept = {"line_noise": frf.line_noise.of(y, u)}
     elif isinstance(frf, PeriodicResponse):

@@ -28,6 +28,7 @@ from freqid.data.analyser_columns import (
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
 from freqid.data.averaged_response import MEMORY, SEGMENT, AveragedResponse, remembered_memory
 from freqid.data.column_names import without_units
+from freqid.data.empirical_response import PHASE, EmpiricalResponse
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import NOISE, LineNoise, LocalResponse
@@ -216,6 +217,8 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
     if shared is not None and found.variance is not None:
         noise = LineNoise.of_texts(shared, found.variance)
         return LocalResponse(**found.__dict__, line_noise=noise)
+    if PHASE in frame.columns:
+        return EmpiricalResponse(**found.__dict__, input_phase=numbers_of(first, PHASE))
     if len(f) < 2 or not {MEMORY, SEGMENT} <= set(frame.columns):
         return found
     count = round(float(numbers_of(first, SEGMENT)[0]))
@@ -247,6 +250,8 @@ def picked(
     kept: dict[str, Any] = {} if own is None else {"line_noise": own.of(p[o], m[i])}
     if isinstance(frf, AveragedResponse):
         kept = {"memory": frf.memory}
+    if isinstance(frf, EmpiricalResponse):
+        kept = {"input_phase": frf.input_phase}
     left = (*frf.output_names[o], *frf.input_names[i])
     return dataclasses.replace(
         frf, units={n: u for n, u in frf.units.items() if n in left},

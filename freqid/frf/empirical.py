@@ -7,7 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import AveragedResponse, FrequencyResponse, Record, as_records, that_estimates
+from freqid.data import (
+    AveragedResponse,
+    EmpiricalResponse,
+    FrequencyResponse,
+    Record,
+    as_records,
+    that_estimates,
+)
 from freqid.frf.measured import aliased_of, measured
 from freqid.frf.segments import memory
 from freqid.frf.spectra import spectra
@@ -32,7 +39,7 @@ def etfe(
     >>> import freqid as fq
     >>> u = fq.chirp(10, 80, duration=10, dt=0.5e-3)
     >>> fq.etfe(fq.simulate(fq.two_mass(), u, dt=0.5e-3), band=(10, 80))
-    <FrequencyResponse 1x1: 701 lines, 10-80 Hz, dt=0.0005 s>
+    <EmpiricalResponse 1x1: 701 lines, 10-80 Hz, dt=0.0005 s>
     """
     sets = as_records(record, varying=False)
     first, count = sets[0], len(sets)
@@ -76,6 +83,8 @@ def etfe(
     frf = measured(
         first, s.frequency[keep], G, variance, None, power[keep].T, aliased=aliased_of(sets)
     )
+    if count == first.n_inputs == 1:
+        return EmpiricalResponse(**frf.__dict__, input_phase=np.angle(U[:, 0, 0]))
     if count == first.n_inputs:
         return frf
     # a mean over experiments lacks what each cuts off, as one over segments does

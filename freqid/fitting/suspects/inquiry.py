@@ -28,6 +28,7 @@ from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
+from freqid.fitting.suspects.record_ends import ended_in_motion
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
@@ -204,7 +205,7 @@ class Inquiry:
         if found := silent(scene, self.minimum, self.model):
             return turned(self, scene, quiet=True) or constant(scene, self.model) or found
         asked = scene, self.model, self._std
-        found = leaking(*asked) or still_moving(*asked, self.readings)
+        found = leaking(*asked) or ended_in_motion(*asked) or still_moving(*asked, self.readings)
         if found := found or begun_in_motion(self.minimum, scene, self.readings):
             return found
         turn = turned(self, scene)

@@ -33,6 +33,7 @@ CURES = {
         "the record is of a closed loop: give it its reference, with reference=True where a note "
         "says that it was left out, or excite it by one"
     ),
+    "leakage": "fit the record itself, or local_rational(record)",
     "unlike experiments": "fit them apart and compare; find out what has changed between them",
     "amplitude": "the plant is not linear: identify it at the level at which it will work",
     "unsteady": "see est.spread, fit the halves apart, and find out what has changed",

@@ -1,0 +1,80 @@
+"""What a record's ends leak into the ratio of two DFTs: a plant that still moves when it is over.
+
+Y = G U + C (zI − Φ)⁻¹ z δ with a state δ, that at the beginning less that at the end (Ljung, System
+Identification, 1999, section 6.3). A fit to the record has it free; in Y/U it looks like a part of
+the plant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+
+from freqid.checks import FloatArray
+from freqid.data import EmpiricalResponse
+from freqid.fitting.findings import Finding, Severity
+from freqid.fitting.suspects.register import Columns
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import score
+from freqid.fitting.suspects.seen import Seen
+from freqid.fitting.suspects.sentences import sentence
+from freqid.lti import on_circle
+from freqid.models import Model
+
+# chance's level; standard errors by which a parameter is moved that are worth a word, and that are
+# more than its error bar tells; and the part of itself that harms nobody
+_LEVEL, _SMALL, _MUCH, _HARMLESS = 5e-4, 0.3, 1.0, 1e-3
+
+
+def ended_in_motion(scene: Scene, model: Model, std: FloatArray) -> list[Finding]:
+    """A finding where motion at the ends of a record moves a parameter of a fit to Y/U."""
+    each = [_motions(s, model) for s in scene.seen]
+    if not any(len(rows) for rows in each):
+        return []
+    test = score(scene, Columns(_apart(each, [len(s.left) for s in scene.seen])), std)
+    if test is None or test.p_value > _LEVEL:
+        return []
+    if test.largest_shift < _SMALL or test.largest_change < _HARMLESS:
+        return []
+    what = "the plant still moved when the record was over, and what leaks from there is in Y/U"
+    severity: Severity = "serious" if test.largest_shift > _MUCH else "minor"
+    text = sentence("leakage", what, test, test.p_value, scene.freedom)
+    return [Finding("leakage", text, severity, test.largest_shift, test.p_value)]
+
+
+def _motions(s: Seen, model: Model) -> FloatArray:
+    """Rows (n, rows) of what each state at the ends adds to a response; none (0, rows) where the
+    input is not known, or the plant cannot be computed at its lines.
+    """
+    none, data = np.zeros((0, len(s.left))), s.reading.data
+    if not isinstance(data, EmpiricalResponse):
+        return none
+    data = data if s.reading.band is None else data.select(s.reading.band)
+    U, own = data.input_lines, s.own(model)
+    if U is None or len(U) != len(s.omega_input) or not U.all():
+        return none
+    A, _, C, _ = own.state_space()
+    phi = A if own.dt else scipy.linalg.expm(A * data.dt)
+    z, one = on_circle(data.omega * data.dt)[:, None, None], np.eye(len(A))
+    try:
+        # motions that grow may leave the numbers
+        with np.errstate(all="ignore"):
+            free = z * (C @ np.linalg.inv(z * one - phi)) / U[:, None, None]  # (K, outputs, n)
+    except np.linalg.LinAlgError:
+        return none
+    if not np.isfinite(free).all():
+        return none
+    return np.array([s.answered(np.moveaxis(free[:, :, i : i + 1], 0, -1)) for i in range(len(A))])
+
+
+def _apart(each: Sequence[FloatArray], counts: Sequence[int]) -> list[FloatArray]:
+    """Columns of each experiment, for each has motions of its own."""
+    total, at, found = sum(map(len, each)), 0, []
+    for rows, count in zip(each, counts, strict=True):
+        own = np.zeros((total, count))
+        own[at : at + len(rows)] = rows
+        at += len(rows)
+        found.append(own)
+    return found
