@@ -206,7 +206,8 @@ def _once(est: Estimate, std: np.ndarray) -> list[str]:
         return []
     return [
         f"not settled: one start was made, and the data leave {', '.join(vague)} uncertain by more "
-        "than half of their values: another may end better; leave n_starts at 'auto'"
+        "than half of their values: another may end better; ask for more, n_starts=30, or begin "
+        "nearer, start="
     ]
 
 

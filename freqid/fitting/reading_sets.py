@@ -19,8 +19,9 @@ def read_for(
         given = channel_counts(r.data)
         if given != shape:
             raise InputError(
-                f"data have {given[0]} outputs and {given[1]} inputs; the model has {shape[0]} "
-                f"and {shape[1]}"
+                f"data have {given[0]} outputs and {given[1]} inputs "
+                f"({', '.join(r.data.output_names)}; {', '.join(r.data.input_names)}); the model "
+                f"has {shape[0]} and {shape[1]}"
             )
     made: list[Experiment] = []
     for i, r in enumerate(readings):
