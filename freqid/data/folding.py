@@ -93,8 +93,8 @@ def powers_above(x: FloatArray, factor: int, first: int = 0) -> tuple[FloatArray
     window = scipy.signal.get_window("hann", len(x))[:, None]
     power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
     above = power[len(power) // factor + 1 :].sum(axis=0)
-    whole = x[first:]
-    stands = (whole == np.repeat(whole[::factor], factor, axis=0)[: len(whole)]).all(axis=0)
+    kept = x[first:]
+    stands = (kept == np.repeat(kept[::factor], factor, axis=0)[: len(kept)]).all(axis=0)
     return np.where(stands, 0.0, above), power.sum(axis=0)
 
 
