@@ -85,3 +85,14 @@ def test_the_phase_is_one_number_a_line():
     frf = _response("white", 0, 0)
     with pytest.raises(ValueError, match="input_phase"):
         type(frf)([1.0, 2.0], [1j, 2j], input_phase=[0.0])
+
+
+def test_what_leaks_hides_no_fault():
+    # what is left of the motion after 1.2 s leaks a little; an output that comes early is named too
+    rng = np.random.default_rng(1)
+    u = np.concatenate([INPUTS["white"](rng), np.zeros(600)])
+    record = fq.simulate(MODE, u, DT)
+    early = fq.Record(record.u[:-1], record.y[1:], DT).with_noise(0.01 * record.y.std(), seed=1)
+    found = fq.fit(MODE, fq.etfe(early, (2, 50))).warnings
+    assert "hold rejected" in [w.kind for w in found]
+    assert [w.severity for w in found if w.kind == "leakage"] == ["minor"]

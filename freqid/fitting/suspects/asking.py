@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from freqid.data import FrequencyResponse
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.parts import Parting
@@ -39,3 +40,9 @@ class Asking(Protocol):
     def apart(self, parting: Parting) -> list[Estimate | None]:
         """Fits to each part of the data alone."""
         ...
+
+
+def equally_weighted(reading: Reading) -> bool:
+    """Whether errors of a response were taken to be of one size at all of its lines."""
+    plain = reading.noise.plain and not reading.logarithmic
+    return isinstance(reading.data, FrequencyResponse) and plain

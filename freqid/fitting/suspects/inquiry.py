@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data import FrequencyResponse
 from freqid.fitting.findings import Finding, Severity, between_parts, suspects_table
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects import changing, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
+from freqid.fitting.suspects.asking import equally_weighted
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.coarse import coarse
@@ -28,11 +28,11 @@ from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
-from freqid.fitting.suspects.record_ends import ended_in_motion
+from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import Asked, Glance, score
+from freqid.fitting.suspects.scores import Asked, Glance, Score, score
 from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import constant, silent, unheard
 from freqid.fitting.suspects.spread import compared
@@ -100,6 +100,10 @@ class Inquiry:
         return np.sqrt(np.where(np.isfinite(variance), np.maximum(variance, 0), np.inf))
 
     @cached_property
+    def _leak(self) -> Score | None:
+        return leaked(self.scene, self.model, self._std)
+
+    @cached_property
     def asked(self) -> list[Asked]:
         """Every suspect that the data could show, the strongest first."""
         scene = self.scene
@@ -132,7 +136,7 @@ class Inquiry:
         scene, limit = self.scene, LEVEL / max(len(self.asked), 1)
         if scene is None:
             return []
-        told = self._told
+        told = beyond_leakage(self._told, self._leak)
         if max((a.test.gain for a in told), default=0.0) >= _HARDLY * scene.cost:
             return told
         return [*unexplained(self, scene, limit, self._std), *told]
@@ -191,7 +195,10 @@ class Inquiry:
     @tuned
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects, or that there has to be one."""
-        found = self._on_suspects()
+        leak = leakage(self.scene, self._leak)
+        if any(f.severity == "serious" for f in leak):
+            return leak
+        found = [*self._on_suspects(), *leak]
         if any(f.severity == "serious" for f in found):
             return found
         other = [*beyond_noise(self.minimum), *coarse(self.scene, self._std)]
@@ -205,7 +212,7 @@ class Inquiry:
         if found := silent(scene, self.minimum, self.model):
             return turned(self, scene, quiet=True) or constant(scene, self.model) or found
         asked = scene, self.model, self._std
-        found = leaking(*asked) or ended_in_motion(*asked) or still_moving(*asked, self.readings)
+        found = leaking(*asked) or still_moving(*asked, self.readings)
         if found := found or begun_in_motion(self.minimum, scene, self.readings):
             return found
         turn = turned(self, scene)
@@ -248,7 +255,7 @@ class Inquiry:
         else:
             what = words(a.name, a.test.size, a.unit, a.detail, a.channel)
         text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
-        if a.name in LACKING and all(_equally_weighted(r) for r in self.readings):
+        if a.name in LACKING and all(equally_weighted(r) for r in self.readings):
             text += "; where errors are a share of the response, fit with error='log'"
         small = (
             a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS or a.harm < LITTLE
@@ -291,9 +298,3 @@ class Inquiry:
             )
             for a in [*first, *(a for a in self.asked if a not in first)]
         })  # fmt: skip
-
-
-def _equally_weighted(reading: Reading) -> bool:
-    """Whether errors of a response were taken to be of one size at all of its lines."""
-    plain = reading.noise.plain and not reading.logarithmic
-    return isinstance(reading.data, FrequencyResponse) and plain

@@ -17,7 +17,7 @@ from freqid.data import EmpiricalResponse
 from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import score
+from freqid.fitting.suspects.scores import Asked, Score, score
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.suspects.sentences import sentence
 from freqid.lti import on_circle
@@ -28,20 +28,35 @@ from freqid.models import Model
 _LEVEL, _SMALL, _MUCH, _HARMLESS = 5e-4, 0.3, 1.0, 1e-3
 
 
-def ended_in_motion(scene: Scene, model: Model, std: FloatArray) -> list[Finding]:
-    """A finding where motion at the ends of a record moves a parameter of a fit to Y/U."""
+def leaked(scene: Scene | None, model: Model, std: FloatArray) -> Score | None:
+    """The test of motion at the ends of records; None where it is chance, or moves no parameter of
+    a fit to Y/U.
+    """
+    if scene is None:
+        return None
     each = [_motions(s, model) for s in scene.seen]
     if not any(len(rows) for rows in each):
-        return []
+        return None
     test = score(scene, Columns(_apart(each, [len(s.left) for s in scene.seen])), std)
     if test is None or test.p_value > _LEVEL:
-        return []
-    if test.largest_shift < _SMALL or test.largest_change < _HARMLESS:
+        return None
+    harmless = test.largest_shift < _SMALL or test.largest_change < _HARMLESS
+    return None if harmless else test
+
+
+def leakage(scene: Scene | None, test: Score | None) -> list[Finding]:
+    """The finding that a test deserves."""
+    if scene is None or test is None:
         return []
     what = "the plant still moved when the record was over, and what leaks from there is in Y/U"
     severity: Severity = "serious" if test.largest_shift > _MUCH else "minor"
     text = sentence("leakage", what, test, test.p_value, scene.freedom)
     return [Finding("leakage", text, severity, test.largest_shift, test.p_value)]
+
+
+def beyond_leakage(found: Sequence[Asked], test: Score | None) -> list[Asked]:
+    """Those that explain more than leakage does, for which they may else be taken."""
+    return [a for a in found if test is None or a.certain or a.test.gain > test.gain]
 
 
 def _motions(s: Seen, model: Model) -> FloatArray:
