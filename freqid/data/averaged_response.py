@@ -41,12 +41,6 @@ class AveragedResponse(FrequencyResponse):
         self.__dict__["memory"] = memory
 
     @that_follows
-    def with_conditions(self, **conditions: float) -> AveragedResponse:
-        """The same with what was set for it, by name."""
-        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
-        return AveragedResponse(**fields)
-
-    @that_follows
     def select(self, limits: tuple[float, float]) -> AveragedResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
         return AveragedResponse(**{**super().select(limits).__dict__, "memory": self.memory})

@@ -54,12 +54,6 @@ class EmpiricalResponse(FrequencyResponse):
         return lines
 
     @that_follows
-    def with_conditions(self, **conditions: float) -> EmpiricalResponse:
-        """The same with what was set for it, by name."""
-        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
-        return EmpiricalResponse(**fields)
-
-    @that_follows
     def select(self, limits: tuple[float, float]) -> EmpiricalResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
         kept = super().select(limits)

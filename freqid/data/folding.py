@@ -83,19 +83,12 @@ def power_above(x: FloatArray, factor: int) -> float:
     return float(np.max(above / np.where(total > 0, total, np.inf)))
 
 
-def powers_above(x: FloatArray, factor: int, first: int = 0) -> tuple[FloatArray, FloatArray]:
-    """Power of each signal, (N, channels), above that limit, and all of it beside its mean.
-
-    None above it of a signal that stands from each sample that is kept, the ``first`` and so on, to
-    the next: it is the same behind a zero-order hold of the slow period.
-    """
+def powers_above(x: FloatArray, factor: int) -> tuple[FloatArray, FloatArray]:
+    """Power of each signal, (N, channels), above that limit, and all of it beside its mean."""
     # a window, so that a record's ends do not look like high frequencies
     window = scipy.signal.get_window("hann", len(x))[:, None]
     power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
-    above = power[len(power) // factor + 1 :].sum(axis=0)
-    kept = x[first:]
-    stands = (kept == np.repeat(kept[::factor], factor, axis=0)[: len(kept)]).all(axis=0)
-    return np.where(stands, 0.0, above), power.sum(axis=0)
+    return power[len(power) // factor + 1 :].sum(axis=0), power.sum(axis=0)
 
 
 def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:

@@ -174,7 +174,7 @@ class FrequencyResponse:
         >>> FrequencyResponse([1.0], [1j]).with_conditions(q=0.3).conditions
         {'q': 0.3}
         """
-        return dataclasses.replace(self, conditions={**self.conditions, **conditions})
+        return type(self)(**{**self.__dict__, "conditions": {**self.conditions, **conditions}})
 
     def to_control(self) -> control.FrequencyResponseData:
         """The response as ``control.FrequencyResponseData``.

@@ -154,12 +154,6 @@ class LocalResponse(FrequencyResponse):
         self.__dict__["line_noise"] = line_noise
 
     @that_follows
-    def with_conditions(self, **conditions: float) -> LocalResponse:
-        """The same with what was set for it, by name."""
-        fields = {**self.__dict__, "conditions": {**self.conditions, **conditions}}
-        return LocalResponse(**fields)
-
-    @that_follows
     def select(self, limits: tuple[float, float]) -> LocalResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
         kept = super().select(limits)

@@ -95,7 +95,7 @@ def _findings(x: FloatArray, measured: bool) -> list[dict[str, str | float]]:
                 f" up to {int(runs[plateaus].max())} in a row: the sensor or the drive was "
                 "overloaded")  # fmt: skip
     longest = int(inner.max(initial=0))
-    if longest > max(_STUCK * N, 20) and not at_limit and len(values) > 3:
+    if longest > max(_STUCK * N, 20) and not at_limit and not stairs and len(values) > 3:
         where = int(edges[1:-2][int(inner.argmax())]) if len(inner) else 0
         add("stuck", longest, f"{longest} samples in a row are equal, from sample {where}")
     steps = np.diff(values) / q

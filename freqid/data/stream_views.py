@@ -46,22 +46,22 @@ class Folding:
                     # a source may fill the same memory once more
                     window.append(np.array(some, dtype=float))
                 if have == _LOOK:
-                    first = self._look(window, first, 1 if number < _ALL else _SOME, number)
+                    first = self._look(window, first, 1 if number < _ALL else _SOME)
                     window, have, number = [], 0, number + 1
             yield rows
         if not number:
             self._look(window, first, 1)
 
     def _look(
-        self, window: Sequence[FloatArray], first: FloatArray | None, times: int, number: int = 0
+        self, window: Sequence[FloatArray], first: FloatArray | None, times: int
     ) -> FloatArray | None:
-        """Count window ``number`` so many ``times``; the mean of the ``first``, or of this one."""
+        """Count a window so many ``times``; the mean of the ``first``, or of this one."""
         x = np.concatenate(window) if window else np.zeros((0, self.count))
         if len(x) <= self.factor or not np.isfinite(x).all():
             return first
         mean = x.mean(axis=0)
         first = mean if first is None else first
-        above, total = powers_above(x, self.factor, -number * _LOOK % self.factor)
+        above, total = powers_above(x, self.factor)
         # what a window's own mean is to it is slow to all of them; a Hann window's power is 3/8
         apart = (mean - first) ** 2 * 3 / 8 * len(x) * (len(x) // 2 + 1)
         self._above += times * above

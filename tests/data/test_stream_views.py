@@ -458,23 +458,3 @@ def test_files_remember_it_for_streams_and_responses(tmp_path):
     frf.to_frame().to_csv(tmp_path / "frf.csv", index=False)
     assert fq.read_response(tmp_path / "frf.csv").aliased == kept.aliased
     assert frf.select((2.0, 60.0)).aliased == kept.aliased
-
-
-def test_an_input_that_stands_over_the_slow_period_folds_nothing():
-    rng = np.random.default_rng(0)
-    u = np.repeat(rng.choice([-1.0, 1.0], 8000), 5)
-    plant = fq.GreyBox(
-        lambda k, T: ([[-1 / T]], [[k / T]], [[1.0]], [[0.0]]),
-        [fq.Parameter("k", 1.0), fq.Parameter("T", 0.02)],
-    )
-    record = fq.simulate(plant, u, 1e-3).with_noise(0.02, seed=1)
-    slow = record.decimate(5)
-    stream = fq.open(np.column_stack([record.u, record.y]), dt=1e-3).decimate(5)
-    # every other period, and periods that begin at another sample, fold what they did
-    assert slow.aliased == stream.load().aliased == 0
-    assert record.decimate(10).aliased > 0.1 < record.slice(0.002, None).decimate(5).aliased
-    # a zero-order hold of the slow period is exact, the one that is remembered is not
-    est = fq.fit(plant, slow, hold="zoh")
-    assert est.verdict.grade == "trust", est.warnings
-    assert (np.abs(est.values - [1.0, 0.02]) < 4 * np.sqrt(np.diag(est.covariance_matrix))).all()
-    assert fq.fit(plant, slow).verdict.grade != "trust"

@@ -54,6 +54,16 @@ def test_at_rest_at_both_ends_nothing_leaks(name):
     assert said == [None] * 5
 
 
+def test_many_records_are_asked_in_groups():
+    est = fq.fit(MODE, [_response("white", seed, 0) for seed in range(12)])
+    said = _said(est)
+    assert said is not None
+    off = np.abs(est.values - [p.value for p in MODE.parameters])
+    assert said.number > 0.5 * np.max(off / np.sqrt(np.diag(est.covariance_matrix)))
+    rest = [_response("white", seed, 8000) for seed in range(12)]
+    assert _said(fq.fit(MODE, rest)) is None
+
+
 def test_without_noise_it_is_the_whole_of_what_is_left():
     est = fq.fit(MODE, _response("white", 0, 0, level=0.0))
     test = _said(est)

@@ -7,6 +7,7 @@ the plant.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -26,6 +27,8 @@ from freqid.models import Model
 # chance's level; standard errors by which a parameter is moved that are worth a word, and that are
 # more than its error bar tells; and the part of itself that harms nobody
 _LEVEL, _SMALL, _MUCH, _HARMLESS = 5e-4, 0.3, 1.0, 1e-3
+# experiments whose ends are asked together
+_TOGETHER = 10
 
 
 def leaked(scene: Scene | None, model: Model, std: FloatArray) -> Score | None:
@@ -37,11 +40,31 @@ def leaked(scene: Scene | None, model: Model, std: FloatArray) -> Score | None:
     each = [_motions(s, model) for s in scene.seen]
     if not any(len(rows) for rows in each):
         return None
-    test = score(scene, Columns(_apart(each, [len(s.left) for s in scene.seen])), std)
+    counts, tests = [len(s.left) for s in scene.seen], []
+    # columns of all of many experiments at once would be mostly zeros
+    for at in range(0, len(each), _TOGETHER):
+        some = [e if at <= i < at + _TOGETHER else e[:0] for i, e in enumerate(each)]
+        tests.append(
+            score(scene, Columns(_apart(some, counts)), std) if any(map(len, some)) else None
+        )
+    test = _summed([t for t in tests if t is not None])
     if test is None or test.p_value > _LEVEL:
         return None
     harmless = test.largest_shift < _SMALL or test.largest_change < _HARMLESS
     return None if harmless else test
+
+
+def _summed(tests: Sequence[Score]) -> Score | None:
+    """The strongest of several, corrected for their number, with what all may do together."""
+    if not tests:
+        return None
+    return dataclasses.replace(
+        min(tests, key=lambda t: t.p_value),
+        p_value=min(len(tests) * min(t.p_value for t in tests), 1.0),
+        gain=sum(t.gain for t in tests),
+        largest_shift=sum(t.largest_shift for t in tests),
+        largest_change=sum(t.largest_change for t in tests),
+    )
 
 
 def leakage(scene: Scene | None, test: Score | None) -> list[Finding]:
