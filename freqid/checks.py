@@ -231,6 +231,8 @@ def unknown(name: str, value: object, allowed: Iterable[str]) -> str:
     folded = {n.casefold(): n for n in names}
     near = difflib.get_close_matches(str(value).casefold(), folded, n=1, cutoff=0.5)
     hint = f"; did you mean {folded[near[0]]!r}?" if near else ""
+    if not names:
+        return f"{name}={value!r} is not there: there are none"
     return f"{name}={value!r} is not one of {', '.join(map(repr, names))}{hint}"
 
 

@@ -217,7 +217,9 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
     if np.abs(gaps - step).max() > 0.01 * step:
         raise InputError(uneven(times))
     if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
-        raise InputError(f"dt={dt:g} s, but column 'time' steps by {step:g} s; drop one of them")
+        raise InputError(
+            f"dt={dt:g} s, but the column of times steps by {step:g} s; drop one of them"
+        )
     # a time column printed with few digits carries their rounding: prefer the round number
     kept = kept_step(frame)
     if kept is not None and abs(kept - step) > 1e-3 * step:

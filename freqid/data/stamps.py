@@ -40,6 +40,8 @@ def _counted(name: str, given: ArrayLike) -> tuple[Array, tuple[float, str]]:
     import pandas as pd
 
     array = np.asarray(given)
+    if given is None:
+        raise InputError(f"{name}=None; expected the times of its samples in s, (N,)")
     if array.dtype.kind in "MO" or hasattr(given, "tz"):
         try:
             dates = pd.to_datetime(pd.Series(given), utc=True).dt.tz_localize(None)

@@ -27,7 +27,7 @@ from freqid.fitting.reading import Domain, InitialState, Reading
 from freqid.fitting.robust import robust_fit
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.stamped import check_stamped
-from freqid.fitting.suspects import Inquiry
+from freqid.fitting.suspects import asked_of
 from freqid.frf import stretches
 from freqid.lti import Hold, InputHolds, tuned
 from freqid.models import GreyBox
@@ -214,7 +214,7 @@ def fit(
     if way.loops:
         est, share = with_loop_noise(est, readings, way.loops)
     call = call_of(model, len(sets), given)
-    inquiry = None if est.problem is None else Inquiry(est.problem, est.model, readings, share)
+    inquiry = None if est.problem is None else asked_of(est.problem, est.model, readings, share)
     notes += [*est.notes, *notes_of(given_sets)]
     est = dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,

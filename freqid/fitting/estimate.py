@@ -26,6 +26,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding, Inquired
 from freqid.fitting.questioned import Questioned
 from freqid.fitting.search.verdict import Witness
+from freqid.fitting.separate import with_unknowns
 from freqid.fitting.shown import Shown
 from freqid.fitting.tied import with_tied
 from freqid.fitting.uncertainty.error_bars import derived, modes, pole_scatter, response_variance
@@ -116,8 +117,9 @@ class Estimate(Questioned, Shown):
         if not isinstance(self.model, GreyBox):
             return self.minimum.structure, self.minimum.x, self.scatter
         # an estimate that is not of a fit: the grey box itself still tells all that is asked
-        structure = GreyStructure(self.model)
-        own = self.covariance_matrix[: structure.count, : structure.count]
+        model, at = with_unknowns(self.model, self.names)
+        structure = GreyStructure(model)
+        own = self.covariance_matrix[np.ix_(at, at)]
         given = own / np.outer(structure.scale, structure.scale)
         return structure, structure.start, Spread(structure.scale, given=given)
 
@@ -236,10 +238,7 @@ class Estimate(Questioned, Shown):
         """
         if not isinstance(self.model, GreyBox):
             raise InputError("a function of parameters needs a grey-box estimate")
-        # of values that each experiment has for itself the model has the first
-        first = {n.split("[")[0]: i for i, n in reversed([*enumerate(self.names)])}
-        free = [p.name for p in self.model.free_parameters]
-        model, at = self.model.fix(*{*free} - {*first}), [first[n] for n in free if n in first]
+        model, at = with_unknowns(self.model, self.names)
         return derived(model, function, self.covariance_matrix[np.ix_(at, at)])
 
     def modes(self) -> pd.DataFrame:

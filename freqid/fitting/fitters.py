@@ -12,6 +12,7 @@ from freqid.checks import ComplexArray, InputError
 from freqid.data import Record
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
+from freqid.lti import Hold, PeriodicHold
 from freqid.models import GreyBox
 
 # a sampled pole this near to one is an integrator's to rounding
@@ -30,6 +31,12 @@ def refuse_on_line(poles: ComplexArray, readings: Sequence[Reading]) -> None:
 
 def _apart_from_zero(readings: Sequence[Reading]) -> bool:
     return all(r.skip_zero or not isinstance(r.data, Record) for r in readings)
+
+
+def check_late(hold: Hold) -> None:
+    """ValueError for a hold between whose samples no delay can be told."""
+    if isinstance(hold, PeriodicHold) and not hold.constant:
+        raise InputError(f"hold={hold!r}: a delay needs a zero-order hold or a band-limited input")
 
 
 class Near(dict[str, float]):

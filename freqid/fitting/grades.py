@@ -20,8 +20,9 @@ Grade = Literal["trust", "doubt", "do not use"]
 
 # starts after which one that is alone is a doubt
 _MANY = 10
-# relative standard error from which a value is not told
-_VAGUE = 0.5
+# relative standard error from which a value is not told, and from which error bars may not hold:
+# the plant is no longer straight in it
+_VAGUE, _LOOSE = 0.5, 0.25
 # values more than unknowns from which these tell the noise
 _TELLING = 5
 # how often chance makes a gap to a black box as large that is next to none
@@ -136,17 +137,20 @@ def _besides(est: Estimate, std: np.ndarray) -> list[str]:
 
 
 def _wider(est: Estimate, std: np.ndarray) -> list[str]:
-    """Error bars that are not what the data allow, where a value is hardly told."""
-    vague = _vague(est, std)
-    if est.problem is None or est.minimum.exact or not vague:
+    """Error bars that are not what the data allow, where a value is told loosely."""
+    vague, loose = _vague(est, std), _vague(est, std, _LOOSE)
+    if est.problem is None or est.minimum.exact or not loose:
         return []
     wide = [est.names[i] for i in wider_than_linear(est.minimum, est.scatter.change, std)]
     # of what is not told from zero anyway nothing more need be said
     wide = [n for n in wide if n not in vague]
     if not wide:
         return []
+    left = f"leave {', '.join(vague)} open"
+    if not vague:
+        left = f"tell {', '.join(loose)} to no better than a quarter of the value"
     return [
-        f"not told: the data leave {', '.join(vague)} open, and allow {', '.join(wide)} farther "
+        f"not told: the data {left}, and allow {', '.join(wide)} farther "
         "out than the error bars say, which hold where the plant is all but straight in its "
         "parameters; see est.intervals('profile'), give what is known of them (with_prior, "
         "with_bounds), or excite more"
@@ -154,17 +158,18 @@ def _wider(est: Estimate, std: np.ndarray) -> list[str]:
 
 
 def _rival(est: Estimate, std: np.ndarray) -> list[str]:
-    """Another minimum that explains the data as well, where a value is hardly told."""
-    vague = _vague(est, std)
-    if est.problem is None or est.minimum.exact or not vague:
+    """Another minimum that explains the data as well."""
+    if est.problem is None or est.minimum.exact or not isinstance(est.model, GreyBox):
         return []
-    other = rival_of(est.minimum, std)
+    vague = _vague(est, std)
+    other = rival_of(est.minimum, std, bool(vague))
     if other is None:
         return []
     values = ", ".join(f"{n}={v:.4g}" for n, v in zip(est.names, other, strict=True))
+    left = f"leave {', '.join(vague)} open, and " if vague else ""
     return [
-        f"not told: the data leave {', '.join(vague)} open, and explain {values}, next to the "
-        "start, about as well; give what is known of them (with_prior, with_bounds), or excite more"
+        f"not told: the data {left}explain {values} about as well, another minimum of the cost; "
+        "give what is known of them (with_prior, with_bounds), or excite more"
     ]
 
 
@@ -211,11 +216,11 @@ def _once(est: Estimate, std: np.ndarray) -> list[str]:
     ]
 
 
-def _vague(est: Estimate, std: np.ndarray) -> list[str]:
-    """Parameters of a grey box that are known to no more than half of their values."""
+def _vague(est: Estimate, std: np.ndarray, part: float = _VAGUE) -> list[str]:
+    """Parameters of a grey box that are known to no more than a part of their values, half."""
     if not isinstance(est.model, GreyBox):
         return []
-    return [n for n, r in zip(est.names, _relative(est, std), strict=True) if r > _VAGUE]
+    return [n for n, r in zip(est.names, _relative(est, std), strict=True) if r > part]
 
 
 def _relative(est: Estimate, std: np.ndarray) -> np.ndarray:

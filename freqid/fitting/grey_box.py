@@ -17,8 +17,9 @@ from freqid.fitting.cost.places import Place, places_of
 from freqid.fitting.cost.priors import Prior
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fits
+from freqid.fitting.fitters import SearchOptions, check_late, fits
 from freqid.fitting.grey_search import search_grey
+from freqid.fitting.physical_minimum import physical_minimum
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import Solution, minimise
@@ -51,10 +52,20 @@ def fit_grey_box(
     objective = Objective(structure, experiments)
     found = search_grey(structure, objective, readings, options)
     solution = _unmirrored(objective, structure, found.solution)
-    found = dataclasses.replace(found, solution=nearest_to_start(objective, structure, solution))
+    if not options.refit:
+        found = physical_minimum(
+            objective, structure, dataclasses.replace(found, solution=solution)
+        )
+    solution = nearest_to_start(objective, structure, found.solution)
+    found = dataclasses.replace(found, solution=solution)
     alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
-    minimum = Minimum(objective, found.solution, None if objective.prior is None else alone)
+    minimum = Minimum(
+        objective,
+        found.solution,
+        None if objective.prior is None else alone,
+        others=tuple(other.x * structure.scale for other in found.others),
+    )
     est = _estimate(structure, minimum, found, readings)
     testimony = Testimony(minimum, tuple(readings), found.n_agreed)
     return dataclasses.replace(est, testimony=testimony, notes=notes)
@@ -102,6 +113,8 @@ def _possible_delays(structure: GreyStructure, readings: Sequence[Reading]) -> N
     """ValueError for a delay to begin from that outlasts half of a record."""
     begin = structure.at(structure.start)
     for r in readings:
+        if begin.delay_sources:
+            check_late(r.hold)
         if isinstance(r.data, Record) and begin.late:
             longest, duration = max(begin.delays, key=abs), r.data.n_samples * r.data.dt
             if abs(longest) > duration / 2:

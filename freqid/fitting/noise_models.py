@@ -74,6 +74,10 @@ class NoiseModel(ABC):
         """That of the kept lines, where all were told and these are all but the first."""
         return self
 
+    def crossed(self, pair: tuple[int, int]) -> NoiseModel:
+        """That of data whose two outputs are in each other's place."""
+        return self
+
 
 class BiasIntegral(NoiseModel):
     """None at all: ones (the bias integral, paper eq. 2), for a response its input spectrum."""
@@ -102,6 +106,9 @@ class GivenWeights(NoiseModel):
 
     def without_first(self, kept: int, every: int) -> GivenWeights:
         return GivenWeights(_without_first(self.given, kept, every))
+
+    def crossed(self, pair: tuple[int, int]) -> GivenWeights:
+        return GivenWeights(_crossed(self.given, pair))
 
 
 class ResponseNoise(NoiseModel):
@@ -211,9 +218,22 @@ class MeasuredNoise(NoiseModel):
         found = self.found
         return self if found is None else MeasuredNoise(_without_first(found, kept, every))
 
+    def crossed(self, pair: tuple[int, int]) -> NoiseModel:
+        found = self.found
+        return self if found is None else MeasuredNoise(_crossed(found, pair))
+
 
 def _without_first(weights: FloatArray, kept: int, every: int) -> FloatArray:
     return weights[..., 1:] if kept < every == weights.shape[-1] else weights
+
+
+def _crossed(weights: FloatArray, pair: tuple[int, int]) -> FloatArray:
+    """Weights (outputs, K) with two rows exchanged; those of all outputs as they are."""
+    if weights.ndim < 2 or len(weights) <= max(pair):
+        return weights
+    turned = weights.copy()
+    turned[list(pair)] = weights[list(pair)[::-1]]
+    return turned
 
 
 # an argument ``weights``: none, a name, or an array

@@ -53,7 +53,10 @@ def noise_weighted(
             first, est, seen = other
     if known and est.message != INTERRUPTED:
         est = fitter_of(model)(model, seen, again(est, options))
-    testimony = est.testimony
+    testimony, problem = est.testimony, est.problem
+    if problem is not None and first.problem is not None and first.problem.others:
+        # later rounds walk from the minimum that the first has chosen
+        problem = dataclasses.replace(problem, others=first.problem.others)
     if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
         testimony = testimony.after(first.testimony)
     found = dataclasses.replace(
@@ -62,6 +65,7 @@ def noise_weighted(
         n_starts=first.n_starts,
         n_agreed=first.n_agreed,
         testimony=testimony,
+        problem=problem,
     )
     return found, seen
 

@@ -38,6 +38,11 @@ class KnowsNeighbours(Protocol):
 
 def without(function: Matrices, names: Sequence[str]) -> Matrices:
     """The function of parameters of which it does not take some."""
+    if not callable(function):
+        raise InputError(
+            f"matrices={function!r:.80} is no function; expected one of parameters that returns "
+            "A, B, C and D"
+        )
     if not names:
         return function
     taken = inspect.signature(function).parameters

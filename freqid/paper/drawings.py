@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, whole
+from freqid.checks import FloatArray, InputError, path_of, whole
 from freqid.data import Record, whole_file
 from freqid.excitation import sine
 from freqid.lti import Hold, ZeroOrderHold
@@ -37,7 +37,8 @@ def draw(number: int) -> Figure:
 
 def save_all(out: str | Path) -> list[Path]:
     """fig01 … fig10 as .png and .pdf in the folder ``out``, each whole or not at all."""
-    return [path for number in _FIGURES for path in save(draw(number), number, out)]
+    folder = path_of("out", out)
+    return [path for number in _FIGURES for path in save(draw(number), number, folder)]
 
 
 def save(fig: Figure, number: int, out: str | Path) -> list[Path]:

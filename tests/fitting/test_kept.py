@@ -214,3 +214,44 @@ def test_the_band_of_a_loaded_black_box_of_several_channels(tmp_path):
     omega = np.geomspace(1, 300, 20)
     kept = fq.load(tmp_path / "box.json").frequency_response(omega).variance
     np.testing.assert_allclose(kept, est.frequency_response(omega).variance, rtol=1e-4)
+
+
+def _of_places():
+    """Estimates of records that have some parameters for themselves, or know one."""
+    lag, two = fq.first_order(50, 20), fq.two_mass()
+    u, torque = fq.white_noise(500), fq.chirp(5, 80, 4, 1e-3)
+    lags = [fq.simulate(fq.first_order(b, 20), u, 0.01).with_noise(0.1, seed=b) for b in (50, 80)]
+    axes = [
+        fq.simulate(fq.two_mass(Ja=load), torque, 1e-3).with_noise(0.1, seed=load)
+        for load in (2, 5)
+    ]
+    known = [r.with_conditions(Ja=load) for r, load in zip(axes, (2.0, 5.0), strict=True)]
+    return {
+        "separate": fq.fit(lag, lags, separate=["b"]),
+        "the second": fq.fit(two, axes, separate=["Ja"]),
+        "conditions": fq.fit(two, known),
+        "one condition": fq.fit(two, [known[0], axes[1]]),
+    }
+
+
+def test_responses_of_what_experiments_have_for_themselves_scatter_as_before(tmp_path):
+    """They took rows of the covariance by their number: a variance a hundred million times as large
+    without a word, or "operands could not be broadcast together".
+    """
+    omega = np.array([5.0, 50.0, 100.0])
+    for name, est in _of_places().items():
+        est.save(tmp_path / f"{name}.json")
+        kept = fq.load(tmp_path / f"{name}.json")
+        own, again = (e.frequency_response(omega).variance for e in (est, kept))
+        assert np.allclose(again, own, rtol=1e-9), name
+
+
+def test_the_variance_of_a_kept_response_is_the_closed_form(tmp_path):
+    """Of G = b/(s + a), with b and its error those of the first experiment."""
+    est = _of_places()["separate"]
+    est.save(tmp_path / "est.json")
+    kept, s = fq.load(tmp_path / "est.json"), 1j * np.array([1.0, 20.0, 100.0])
+    change = np.array([1 / (s + est["a"]), -est["b[0]"] / (s + est["a"]) ** 2])
+    own = est.covariance.loc[["b[0]", "a"], ["b[0]", "a"]].to_numpy()
+    wanted = np.einsum("ik,ij,jk->k", change, own, change.conj()).real
+    assert np.allclose(kept.frequency_response(s.imag).variance.ravel(), wanted, rtol=1e-9)

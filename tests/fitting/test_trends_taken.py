@@ -114,3 +114,16 @@ def test_an_offset_is_found_beside_a_line_that_was_taken_off():
     est = fq.fit(lag(), record, offset="estimate")
     assert est.verdict.trusted
     assert np.allclose(est.values, fq.fit(lag(), record).values, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [(None, None), (0, "a constant was taken"), (1, "straight lines were taken")],
+)
+def test_an_estimate_says_what_was_taken_off(order, words):
+    """A free constant in the cost was said nowhere."""
+    record = moving(lag(), 400, 0)
+    est = fq.fit(lag(), record if order is None else record.detrend(order))
+    told = [note for note in est.notes if "taken off all channels" in note]
+    assert len(told) == (words is not None)
+    assert words is None or words in told[0]

@@ -15,6 +15,11 @@ TWO = fq.Record(np.column_stack([RECORD.u, RECORD.u]), RECORD.y, DT)
 STREAM = fq.open(np.column_stack([RECORD.u, RECORD.y]), dt=DT)
 FRF = fq.FrequencyResponse(np.arange(1.0, 20), 1 / (1 + 0.1j * np.arange(1, 20)))
 EST = fq.fit(PLANT, RECORD)
+LATE = fq.GreyBox(
+    lambda b, a: ([[-a]], [[b]], [[1.0]], None),
+    [fq.Parameter("b", 45.0), fq.Parameter("a", 22.0)],
+    input_delay=0.001,
+)
 APART = fq.Record(np.column_stack([RECORD.u, np.roll(RECORD.u, 31)]), RECORD.y, DT)
 WHITE = fq.WhiteSpectrum()
 FRAME = pd.DataFrame({"time": DT * np.arange(len(U)), "u": RECORD.u, "y": RECORD.y})
@@ -109,6 +114,24 @@ REFUSALS = {
     "a column of no such name": (
         lambda: fq.Record.from_frame(FRAME, inputs="u", outputs="z"),
         "outputs='z' is not one of",
+    ),
+    "a page beside several records": (
+        lambda: EST.report("page.html", validation=[RECORD]),
+        "validation=list is neither a Record",
+    ),
+    "figures in a folder of no name": (lambda: fq.paper.figures(3), "out=3 must be a path"),
+    "a delay between straight lines": (
+        lambda: fq.fit(LATE, RECORD, hold="foh"),
+        "a delay needs a zero-order hold",
+    ),
+    "logs without times": (lambda: fq.Record.from_logs(None, U, U, U), "u_time=None"),
+    "matrices that are a number": (
+        lambda: fq.GreyBox(3, [fq.Parameter("k", 1.0)]),
+        "matrices=3 is no function",
+    ),
+    "a fleet without parameters": (
+        lambda: fq.plot_fleet(pd.DataFrame({"a": [1]}), parameter="k"),
+        "there are none",
     ),
     "no column at all": (
         lambda: fq.Record.from_frame(FRAME, inputs=[], outputs="y"),

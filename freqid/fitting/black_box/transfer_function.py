@@ -23,7 +23,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
-from freqid.fitting.fitters import OnLineError, SearchOptions, fits
+from freqid.fitting.fitters import OnLineError, SearchOptions, check_late, fits
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import Solution, polish
@@ -64,10 +64,8 @@ def fit_transfer_function(
     names, shape = common_names([first.data]), channel_counts(first.data)
     if late and first.in_time:
         raise InputError("a delay needs domain='frequency' and no initial state at rest")
-    if late and isinstance(first.hold, PeriodicHold) and not first.hold.constant:
-        raise InputError(
-            f"hold={first.hold!r}: a delay needs a zero-order hold or a band-limited input"
-        )
+    if late:
+        check_late(first.hold)
     readings = [r.with_(delayed=late) for r in readings]
     experiments = read_for(shape, readings)
     estimated = spec.delay == "estimate"

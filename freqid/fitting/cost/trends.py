@@ -7,6 +7,8 @@ its own and what the plant makes of the input's: a polynomial of the same degree
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 import scipy
 
@@ -16,6 +18,8 @@ from freqid.data import Record
 # highest degree that is looked for, and the part of a signal that is but the rounding of what was
 # taken off
 _MOST, _ROUNDING = 3, 1e-10
+# of records that have been asked already
+_TAKEN: WeakKeyDictionary[Record, int] = WeakKeyDictionary()
 
 
 def trends_taken(record: Record) -> int:
@@ -23,6 +27,12 @@ def trends_taken(record: Record) -> int:
 
     Most records, long ones too, have a mean, and one sum of their samples says so.
     """
+    if record not in _TAKEN:
+        _TAKEN[record] = _taken(record)
+    return _TAKEN[record]
+
+
+def _taken(record: Record) -> int:
     channels = [record.outputs, record.inputs]
     for degree in range(_MOST + 1):
         if not all(_without(x, degree) for x in channels):

@@ -31,8 +31,8 @@ _AGREEMENT, _DOUBTED = ((_CONVINCED, 1), (_RARE, 2)), 4
 _ALIKE = 6
 # part of the starts that shows a cost with one minimum
 _UNANIMOUS = 0.8
-# costs that agree to this belong to one minimum
-_SAME = 1e-6
+# costs that agree to this belong to one minimum, and minima beside the best that are kept
+_SAME, _KEPT = 1e-6, 3
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class Found:
     n_stale: int = 0
     # whether no doubt is left that more lines may settle
     sure: bool = True
+    # the least of the other minima
+    others: tuple[Solution, ...] = ()
 
     def joined(self, other: Solution, rounding: float, visits: int = 1) -> Found:
         """With the end of one place more, to which so many starts have led."""
@@ -53,7 +55,15 @@ class Found:
         if abs(gap) <= _SAME * self.solution.cost + rounding:
             best = other if gap < 0 else self.solution
             return dataclasses.replace(self, solution=best, n_agreed=self.n_agreed + visits)
-        return Found(other, self.n_starts, max(visits, 1)) if gap < 0 else self
+        if gap < 0:
+            others = self._beside(self.solution, other)
+            return Found(other, self.n_starts, max(visits, 1), others=others)
+        return dataclasses.replace(self, others=self._beside(other, self.solution))
+
+    def _beside(self, one: Solution, best: Solution) -> tuple[Solution, ...]:
+        """The least of the minima beside the best, with one more."""
+        apart = [s for s in self.others if abs(s.cost - one.cost) > _SAME * best.cost]
+        return tuple(sorted([*apart, one], key=lambda s: s.cost)[:_KEPT])
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,9 @@ def _crossed(r: Reading, side: str, pair: tuple[int, int]) -> Reading:
     signal = np.array(getattr(r.data, side), dtype=float)
     signal[..., list(pair)] = signal[..., list(pair)[::-1]]
     signals: dict[str, Any] = {side: signal}
-    return r.with_(data=dataclasses.replace(r.data, **signals))
+    # the noise is that of the channel, wherever it stands
+    noise = r.noise.crossed(pair) if side == "y" else r.noise
+    return r.with_(data=dataclasses.replace(r.data, **signals), noise=noise)
 
 
 def _negated(r: Reading, side: str = "y", channel: int | None = None) -> Reading:

@@ -31,6 +31,7 @@ MOST_LEVERAGE = 0.9
 
 
 @tuned
+@np.errstate(all="ignore")
 def score_covariance(
     objective: Objective, x: FloatArray, alone: FloatArray | None = None
 ) -> FloatArray | None:
@@ -57,28 +58,27 @@ def score_covariance(
     except Exception:  # the user's function may raise anything
         return None
     total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
-    with np.errstate(all="ignore"):
-        for e in lines:
-            # all of its lines: those few that an input has, or that tell a parameter, are not to be
-            # missed
-            evaluation = e.at(realisation)
-            r, Q, delta = projected(evaluation)
-            J = evaluation.jacobian(delta)
-            J = J - (J @ Q.T) @ Q
-            left = r if noise_at is realisation else projected(e.at(noise_at))[0]
-            if e.response:
-                size = e.lines.scale.reshape(*e.n_channels, -1)
-                total += _of_response(J, left, size, e.reach, e.line_noise)
-            else:
-                left = left / np.sqrt(1 - leverage(J, Q))
-                total += (J * local_power(left, e)) @ J.T
-            rows += e.n_rows
-            unknown += 0 if delta is None else len(delta)
-        for log in stamped:
-            part, n_free = _of_stamps(log, realisation, noise_at)
-            total += part
-            rows += log.n_rows
-            unknown += n_free
+    for e in lines:
+        # all of its lines: those few that an input has, or that tell a parameter, are not to be
+        # missed
+        evaluation = e.at(realisation)
+        r, Q, delta = projected(evaluation)
+        J = evaluation.jacobian(delta)
+        J = J - (J @ Q.T) @ Q
+        left = r if noise_at is realisation else projected(e.at(noise_at))[0]
+        if e.response:
+            size = e.lines.scale.reshape(*e.n_channels, -1)
+            total += _of_response(J, left, size, e.reach, e.line_noise)
+        else:
+            left = left / np.sqrt(1 - leverage(J, Q))
+            total += (J * local_power(left, e)) @ J.T
+        rows += e.n_rows
+        unknown += 0 if delta is None else len(delta)
+    for log in stamped:
+        part, n_free = _of_stamps(log, realisation, noise_at)
+        total += part
+        rows += log.n_rows
+        unknown += n_free
     if not np.isfinite(total).all():
         return None
     # lines of a response have had their share of the freedom taken off one by one

@@ -44,6 +44,8 @@ class Minimum:
     inflation: float = 1.0
     # covariance of the data's gradient, where it is not what the residuals alone tell
     score: FloatArray | None = None
+    # values of the parameters at other minima that the search has met, the least first
+    others: tuple[FloatArray, ...] = ()
 
     @property
     def structure(self) -> EstimatedStructure:

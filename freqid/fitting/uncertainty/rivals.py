@@ -1,4 +1,4 @@
-"""Another minimum, next to where a fit began, that the data do not tell from the one it found."""
+"""Other minima, which a search has met or may have, that the data do not tell from its best."""
 
 from __future__ import annotations
 
@@ -15,16 +15,43 @@ _RIVAL = 10.0
 _APART, _LIMIT = 4.0, 60
 
 
-def rival_of(minimum: Minimum, std: FloatArray) -> FloatArray | None:
-    """Its values (P,), where they are far off for the standard errors (P,); None where none is."""
+def rival_of(minimum: Minimum, std: FloatArray, vague: bool) -> FloatArray | None:
+    """Its values (P,), where they are far off for the standard errors (P,); None where none is.
+
+    Those that the search has met are looked at, and, where the estimate is ``vague``, the one next
+    to where it began.
+    """
     structure = minimum.structure
     if not isinstance(structure, GreyStructure) or minimum.prior is not None:
         return None
-    try:
-        other = minimise(minimum.objective, structure.start, limit=_LIMIT)
-    except InputError:
-        return None
-    if other.cost > minimum.cost + _RIVAL * minimum.noise_variance:
-        return None
-    away = np.abs(other.x - minimum.x) * structure.scale
-    return other.x * structure.scale if (away > _APART * std).any() else None
+    most = highest_rival(minimum, std / structure.scale)
+    begun = [structure.start] if vague else []
+    for x in [*(values / structure.scale for values in minimum.others), *begun]:
+        try:
+            other = minimise(minimum.objective, x, limit=_LIMIT)
+        except InputError:
+            continue
+        if other.cost > most:
+            continue
+        away = np.abs(other.x - minimum.x) * structure.scale
+        values = other.x * structure.scale
+        if (away > _APART * std).any() and physical(structure, values):
+            return values
+    return None
+
+
+def highest_rival(minimum: Minimum, std: FloatArray) -> float:
+    """The cost up to which another minimum explains the data about as well; standard errors (P,) of
+    the unknowns say how much more than white noise of its size the noise moves it.
+    """
+    noise = minimum.noise_variance
+    white = noise * np.diag(minimum.determined.inverse)
+    told = np.isfinite(std) & (white > 0)
+    wider = max(1.0, float((std[told] ** 2 / white[told]).max(initial=1.0)))
+    return float(minimum.cost + _RIVAL * noise * wider)
+
+
+def physical(structure: GreyStructure, values: FloatArray) -> bool:
+    """Whether all parameters lie where they may be."""
+    ends = [p.physical for p in structure.parameters]
+    return all(low <= v <= high for v, (low, high) in zip(values, ends, strict=False))

@@ -7,7 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from freqid.checks import InputError, flag, path_of
-from freqid.data import DataSet, check_replacing, whole_file
+from freqid.data import DataSet, FrequencyResponse, Record, check_replacing, whole_file
 from freqid.fitting import Estimate
 from freqid.models import GreyBox
 from freqid.pages.report.figures import figures
@@ -34,6 +34,11 @@ def write_report(
     path = path_of("path", path)
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"path={str(path)!r} must end in .html")
+    if not isinstance(validation, Record | FrequencyResponse | None):
+        raise InputError(
+            f"validation={type(validation).__name__} is neither a Record nor a FrequencyResponse; "
+            "of several give one, and est.compare the others"
+        )
     if not (flag("overwrite", overwrite) or _is_report(path)):
         check_replacing(path, overwrite=False)
     environment = jinja2.Environment(

@@ -1,0 +1,70 @@
+"""Of minima that noise does not tell apart the one where every parameter is physical."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.search.stopping import Found
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.uncertainty.rivals import highest_rival, physical
+
+# standard errors by which a value may lie outside and be that of a physical plant
+_ALLOWED = 2.0
+# evaluations of each descent
+_LIMIT = 60
+
+
+def physical_minimum(objective: Objective, structure: GreyStructure, found: Found) -> Found:
+    """The least physical minimum, of those that the search has met and the one next to its start,
+    where the best is none and noise does not tell the two apart.
+
+    What a user knows of the signs is as much knowledge as the data: a spring of -5e5 ± 3e8 helps
+    nobody beside one of 58 ± 6 that explains them as well.
+    """
+    best = found.solution
+    if physical(structure, best.x * structure.scale):
+        return found
+    minimum = Minimum(objective, best)
+    if minimum.exact:
+        return found
+    std = np.sqrt(np.diag(minimum.covariance))
+    if not _allowed(structure, best.x, std):
+        return found
+    most = highest_rival(minimum, std)
+    near = [end for end in _ends(objective, structure, found) if end.cost <= most]
+    if not near:
+        return found
+    least = min(near, key=lambda end: end.cost)
+    return dataclasses.replace(found, solution=least, n_agreed=1, others=(best, *found.others))
+
+
+def _allowed(structure: GreyStructure, x: FloatArray, std: FloatArray) -> bool:
+    """Whether all values that are unphysical may be so by the noise."""
+    each = slice(structure.count)
+    ends = np.array([p.physical for p in structure.parameters]).T / structure.scale[each]
+    outside = np.maximum(ends[0] - x[each], x[each] - ends[1])
+    return bool((outside <= _ALLOWED * std[each]).all())
+
+
+def _ends(objective: Objective, structure: GreyStructure, found: Found) -> Iterator[Solution]:
+    """Minima that are physical."""
+    begun: list[FloatArray] = [other.x for other in found.others]
+    confined = structure.confined()
+    inside = np.clip(structure.start, confined.lower, confined.upper)
+    with contextlib.suppress(InputError):
+        begun.append(minimise(objective.of(confined, None), inside, limit=_LIMIT).x)
+    for x in begun:
+        try:
+            end = polish(objective, x, limit=_LIMIT)
+        except InputError:
+            continue
+        if end.converged and physical(structure, end.x * structure.scale):
+            yield end

@@ -1,0 +1,146 @@
+"""Outputs that hardly count beside a larger one: asked where the noise of each weighs it.
+
+Without weights a speed in rad/s outweighs a current in A ten thousand times over. Values that the
+speed alone tells to their error bars may miss the current by far, and what is left of it then looks
+like a fault of the plant. Next to the estimate there is one that meets all outputs; what speaks
+against that one speaks against the plant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.findings import Finding, Inquired
+from freqid.fitting.noise_models import MeasuredNoise
+from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import polish
+from freqid.fitting.suspects.inquiry import Inquiry
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.uncertainty.evenness import channel_power
+from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.witness import Share
+from freqid.models import GreyBox, Model
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from freqid.fitting.estimate import Estimate
+
+# power of what is left of one output beside another's from which the other hardly counts
+_UNEVEN = 100.0
+# rounds in which the noise is learnt, and evaluations of each
+_ROUNDS, _LIMIT = 3, 60
+# standard errors within which both are estimates of one plant
+_SAME = 3.0
+
+
+def asked_of(
+    minimum: Minimum, model: Model, readings: Sequence[Reading], share: Share | None
+) -> Inquired:
+    """What asks every suspect of a fit when it is wanted."""
+    inquiry = Inquiry(minimum, model, readings, share)
+    several = isinstance(model, GreyBox) and model.n_outputs > 1
+    return EvenInquiry(inquiry) if several else inquiry
+
+
+@dataclass(frozen=True, eq=False)
+class EvenInquiry:
+    """An inquiry that accuses no plant of what outputs leave that hardly counted in its fit."""
+
+    inquiry: Inquiry
+
+    def findings(self) -> list[Finding]:
+        """Sentences on the strongest suspects."""
+        found = self.inquiry.findings()
+        if self._cleared is None:
+            return found
+        return [self._uneven(self._cleared), *self._cleared.findings()]
+
+    def table(self) -> pd.DataFrame:
+        """The suspects by name."""
+        return (self._cleared or self.inquiry).table()
+
+    def on_modes(self, est: Estimate, changed: bool) -> list[Finding]:
+        """Modes of a black box that are noise, or move midway."""
+        return self.inquiry.on_modes(est, changed)
+
+    def spread(self, est: Estimate) -> pd.DataFrame:
+        """How far the numbers move between parts of the data."""
+        return self.inquiry.spread(est)
+
+    @cached_property
+    def _cleared(self) -> Inquiry | None:
+        """The same inquiry at the minimum that meets all outputs, where that is near and nothing
+        serious speaks there; None where all is well, and where something does.
+        """
+        if not any(f.severity == "serious" for f in self.inquiry.findings()):
+            return None
+        try:
+            other = self._beside()
+        except (InputError, np.linalg.LinAlgError, ArithmeticError):
+            return None
+        if other is None or any(f.severity == "serious" for f in other.findings()):
+            return None
+        return other
+
+    @cached_property
+    def _powers(self) -> tuple[FloatArray, list[str]]:
+        """Power of what is left of each output of the first record that has several, and names."""
+        scene = self.inquiry.scene
+        for s in [] if scene is None else scene.seen:
+            if s.record is not None and s.n_outputs > 1:
+                return channel_power(s.left, s.experiment)[0], [*s.record.output_names]
+        return np.ones(1), [""]
+
+    def _beside(self) -> Inquiry | None:
+        """The inquiry at the minimum that the noise of each output weighs; None where outputs count
+        alike, or where that minimum is another.
+        """
+        before, scene = self.inquiry, self.inquiry.scene
+        structure = before.minimum.structure
+        if scene is None or not isinstance(structure, GreyStructure) or before.minimum.prior:
+            return None
+        if any(
+            s.record is None or r.own_cost or not r.noise.plain
+            for s, r in zip(scene.seen, before.readings, strict=True)
+        ):
+            return None
+        powers = self._powers[0]
+        if powers.max() < _UNEVEN * powers.min():
+            return None
+        x = before.minimum.x
+        for _ in range(_ROUNDS):
+            readings = [
+                r.with_(noise=MeasuredNoise().learnt(s.unweighted(s.left[None])[0], s.grid[0]))
+                for r, s in zip(before.readings, scene.seen, strict=True)
+            ]
+            objective = Objective(structure, [r.experiment() for r in readings])
+            minimum = Minimum(objective, polish(objective, x, limit=_LIMIT))
+            x, scene = minimum.x, Scene.of(minimum, readings, before.share)
+        moved = np.abs(x - before.minimum.x)
+        std = np.sqrt(np.diag(before.minimum.covariance))
+        if not minimum.solution.converged or (moved > _SAME * std).any():
+            return None
+        return Inquiry(minimum, structure.at(x), readings, before.share)
+
+    def _uneven(self, other: Inquiry) -> Finding:
+        powers, names = self._powers
+        most, least = int(powers.argmax()), int(powers.argmin())
+        times = float(np.sqrt(powers[most] / powers[least]))
+        std = np.sqrt(np.diag(self.inquiry.minimum.covariance))
+        moved = float(np.max(np.abs(other.minimum.x - self.inquiry.minimum.x) / std))
+        text = (
+            f"what is left of {names[most]!r} is {times:.2g} times as large as of "
+            f"{names[least]!r}, which hardly counts beside it and is not met; values that meet all "
+            f"outputs lie up to {moved:.2g} standard errors away, and nothing speaks against "
+            "these; fit with weights='noise'"
+        )
+        return Finding("uneven outputs", text, "minor", moved)
