@@ -19,7 +19,7 @@ from freqid.checks import FloatArray
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
-from freqid.fitting.matched_twins import matched
+from freqid.fitting.matched_twins import elsewhere, matched
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.models import GreyBox
@@ -33,8 +33,8 @@ _NEARER = 0.05
 _TOLD, _TIMES = float(np.log(2)), 3.0
 # nepers of a change of sign
 _FARTHEST = 1e3
-# standard errors by which values differ
-_APART = 2.0
+# standard errors by which values differ, and evaluations down to another answer's own minimum
+_APART, _LOOKS = 2.0, 40
 # what stands for the number of a part in names: all digits, each digit, the last word or letter
 _LABELS = (r"(\d+)", r"(\d)", r"(?<=_)([^_]+)$", r"([A-Za-z])$")
 # pairs of places in the vector of unknowns that are exchanged together
@@ -116,7 +116,7 @@ def exchangeable(minimum: Minimum | None) -> list[Finding]:
         if point is not None and _same_cost(minimum.objective, minimum.point.cost, point.cost):
             found.append(_names(structure, exchange))
     if not found:
-        return []
+        return _elsewhere(minimum, structure, std)
     return [
         Finding(
             "exchangeable",
@@ -125,6 +125,42 @@ def exchangeable(minimum: Minimum | None) -> list[Finding]:
             "answers; begin near the one that is meant, or bound one of them (with_bounds)",
         )
     ]
+
+
+def _elsewhere(minimum: Minimum, structure: GreyStructure, std: FloatArray) -> list[Finding]:
+    """A word on other values with the same response, unless the start is much nearer to those found
+    or the data leave an unknown open.
+    """
+    if minimum.prior is not None or not np.isfinite(std).all():
+        return []
+    meant = [structure.meant[name] for name in structure.physical_names]
+
+    def away(x: FloatArray) -> float:
+        values = (x * structure.scale).tolist()
+        return sum(_apart(start, value) for start, value in zip(meant, values, strict=True))
+
+    own = away(minimum.x)
+    if own <= _NEARER:
+        # who begins at an answer means it
+        return []
+    for other in elsewhere(structure, minimum.x):
+        far = away(other)
+        if far - own > _TOLD or far > _TIMES * own:
+            continue
+        if (np.abs(other - minimum.x) <= _APART * std).all():
+            continue
+        found = polish(minimum.objective, other, limit=_LOOKS)
+        if not _same_cost(minimum.objective, minimum.point.cost, found.cost):
+            continue
+        return [
+            Finding(
+                "exchangeable",
+                f"the model is the same with {structure.describe(found.x)}: no data tell these "
+                "values from those that were found, and the start is about as far from both; begin "
+                "near those that are meant, or bound one of them (with_bounds)",
+            )
+        ]
+    return []
 
 
 def _names(structure: GreyStructure, exchange: Exchange) -> str:
