@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.interrupted import best_so_far
 from freqid.fitting.search.noise_floor import noise_floor
+from freqid.fitting.search.scatter import around
 from freqid.fitting.search.stages import Search
 from freqid.fitting.search.stopping import Found
 from freqid.fitting.sight import hold_that_changes, out_of_sight
@@ -34,6 +36,8 @@ _MORE = 8
 _WON = 0.02
 # evaluations down to data's own rounding; those of a refit that others follow, for each unknown
 _DIRECT, _ROUGH = 40, 5
+# outputs that a long delay leaves open, and starts that are tried beside it
+_OPEN, _BESIDE = 20, 6
 # starts of experiments at many places beside which there are no black boxes
 _ALONE = 3
 # a start that costs so many times more on a part of the lines costs more on all
@@ -185,12 +189,17 @@ def _without_hiding(
 
     if shifts(found.solution.x) == shifts(start):
         return found
-    try:
-        other = polish(scout, start)
-    except InputError:
-        return found
-    if left(other) < left(found.solution):
-        return dataclasses.replace(found, solution=other, n_agreed=1)
+    begun = [start]
+    if found.solution.point.n_initial > len(structure.at(start).poles) + _OPEN:
+        # the start may lead there as well
+        begun += [*around(structure, start, _BESIDE, 0)]
+    ends: list[Solution] = []
+    for x in begun:
+        with contextlib.suppress(InputError):
+            ends.append(polish(scout, x, limit=_DIRECT if ends else None))
+    best = min(ends, key=left, default=found.solution)
+    if left(best) < left(found.solution):
+        return dataclasses.replace(found, solution=best, n_agreed=1)
     return found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -36,13 +36,22 @@ def physical_minimum(objective: Objective, structure: GreyStructure, found: Foun
     if minimum.exact:
         return found
     std = np.sqrt(np.diag(minimum.covariance))
-    if not _allowed(structure, best.x, std):
+    # what is unphysical for certain may be a minimum that is not the least, if it was met at once
+    chance = _allowed(structure, best.x, std)
+    if not chance and found.n_starts > 1:
         return found
-    most = highest_rival(minimum, std)
-    near = [end for end in _ends(objective, structure, found) if end.cost <= most]
+    noise = minimum.noise_variance
+
+    def charged(end: Solution) -> float:
+        # unknowns that a long delay leaves open take up as much noise each
+        return end.cost + noise * end.point.n_initial
+
+    most = charged(best) + (highest_rival(minimum, std) - minimum.cost if chance else 0.0)
+    begun = [other.x for other in found.others] if chance else []
+    near = [end for end in _ends(objective, structure, begun, most) if charged(end) <= most]
     if not near:
         return found
-    least = min(near, key=lambda end: end.cost)
+    least = min(near, key=charged)
     return dataclasses.replace(found, solution=least, n_agreed=1, others=(best, *found.others))
 
 
@@ -54,16 +63,21 @@ def _allowed(structure: GreyStructure, x: FloatArray, std: FloatArray) -> bool:
     return bool((outside <= _ALLOWED * std[each]).all())
 
 
-def _ends(objective: Objective, structure: GreyStructure, found: Found) -> Iterator[Solution]:
-    """Minima that are physical."""
-    begun: list[FloatArray] = [other.x for other in found.others]
+def _ends(
+    objective: Objective, structure: GreyStructure, begun: Sequence[FloatArray], most: float
+) -> Iterator[Solution]:
+    """Minima that are physical, below points, and below the start with all values kept physical."""
     confined = structure.confined()
     inside = np.clip(structure.start, confined.lower, confined.upper)
+    ends = [*begun]
     with contextlib.suppress(InputError):
-        begun.append(minimise(objective.of(confined, None), inside, limit=_LIMIT).x)
-    for x in begun:
+        own = objective.of(confined, None)
+        led = minimise(own, inside, limit=_LIMIT, worth=most).x
+        if not ((led <= confined.lower) | (led >= confined.upper)).any():
+            ends.append(led)
+    for x in ends:
         try:
-            end = polish(objective, x, limit=_LIMIT)
+            end = polish(objective, x, limit=_LIMIT, worth=most)
         except InputError:
             continue
         if end.converged and physical(structure, end.x * structure.scale):
