@@ -26,6 +26,7 @@ _LOOKS, _MATCHED = 25, 1e-7
 _SCATTERED, _SPREAD, _OTHER = 5, np.log(4), 0.01
 
 
+@np.errstate(all="ignore")
 def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
     """Unknowns with the response of those at ``x``, from the start on; None where they are the same
     or the start is near anyway.
@@ -46,6 +47,7 @@ def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
     return other if np.abs(nearer).sum() < np.abs(moved).sum() else None
 
 
+@np.errstate(all="ignore")
 def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
     """Other unknowns with the response of those at ``x``, seen from points around them and from the
     start; those that are physical.
@@ -85,7 +87,6 @@ class _Look:
     there: BoolArray
 
     @classmethod
-    @np.errstate(all="ignore")
     def at(cls, structure: GreyStructure, x: FloatArray, begin: FloatArray) -> _Look | None:
         """At ``x``; None where nothing is left to be looked for."""
         values = x * structure.scale
@@ -101,7 +102,6 @@ class _Look:
         there = np.abs(G) > 0
         return cls(structure, values, told, omega, G[there], there)
 
-    @np.errstate(all="ignore")
     def end(self, begin: FloatArray) -> FloatArray | None:
         """Unknowns with the same response that values lead to, what has no sign as it is; None
         where they lead to none that a bound admits.

@@ -224,6 +224,10 @@ def test_a_twin_is_looked_for_from_the_start():
     kept = ROLL.with_values(a=6.0).with_bounds(a=(5.0, 50.0))
     bounded = GreyStructure(kept, {"b": 80.0, "a": 6.0, "tau": 0.03})
     assert matched(bounded, np.array(list(OTHER.values())) / bounded.scale) is None
+    # a refit that begins at a bound of zero, which was not the user's start
+    still = GreyStructure(ROLL, {"b": 80.0, "a": 0.0, "tau": 0.03})
+    still.meant = {"b": 80.0, "a": 1.0, "tau": 0.03}
+    assert matched(still, np.array([80.0, 0.5, 0.03]) / still.scale) is None
     mass = fq.two_mass()
     alone = GreyStructure(mass, {n: v / 8 for n, v in mass.values.items()})
     assert matched(alone, np.array([mass[n] for n in alone.physical_names]) / alone.scale) is None
