@@ -239,11 +239,9 @@ def _supported(est: Estimate, std: np.ndarray) -> str:
         elif np.isfinite(relative).any():
             worst = int(np.nanargmax(np.where(np.isfinite(relative), relative, np.nan)))
             name, size = est.names[worst], f"{100 * relative[worst]:.2g} %"
-            size += (
-                " of a sample"
-                if std[worst] > 1.001 * relative[worst] * abs(est.values[worst])
-                else ""
-            )
+            # of what is late a part of a sample is told
+            if std[worst] > 1.001 * relative[worst] * abs(est.values[worst]):
+                size += " of a sample"
             text += f"; the least certain parameter, {name}, is known to {size}"
             text += ": the data do not tell it from zero" if relative[worst] > 0.5 else ""
     if est.witness.verdict == "complete":

@@ -1,5 +1,7 @@
 """Parameters that may be exchanged: which answer is given, and when that is said."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.matched_twins import elsewhere, matched
 from freqid.fitting.search.descent import polish
 from freqid.fitting.twins import nearest_to_start
+from freqid.fitting.uncertainty.rivals import rival_of
 
 DT = 2.0
 
@@ -231,6 +234,13 @@ def test_a_twin_is_looked_for_from_the_start():
     mass = fq.two_mass()
     alone = GreyStructure(mass, {n: v / 8 for n, v in mass.values.items()})
     assert matched(alone, np.array([mass[n] for n in alone.physical_names]) / alone.scale) is None
+
+
+def test_a_twin_that_the_search_has_met_is_no_other_minimum():
+    est = fq.fit(plant(), record(), start={"t1": 40, "t2": 14})
+    twin = est.values[[0, 2, 1]]
+    met = dataclasses.replace(est.minimum, others=(twin * 1.001,))
+    assert rival_of(met, est.parameters["std"].to_numpy(), False) is None
 
 
 LOAD = 5.0

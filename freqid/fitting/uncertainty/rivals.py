@@ -13,6 +13,8 @@ from freqid.fitting.uncertainty.minimum import Minimum
 _RIVAL = 10.0
 # standard errors from the other at which it is another, and evaluations
 _APART, _LIMIT = 4.0, 60
+# costs that agree to this part are those of one response
+_TWIN = 1e-6
 
 
 def rival_of(minimum: Minimum, std: FloatArray, vague: bool) -> FloatArray | None:
@@ -31,7 +33,8 @@ def rival_of(minimum: Minimum, std: FloatArray, vague: bool) -> FloatArray | Non
             other = minimise(minimum.objective, x, limit=_LIMIT)
         except InputError:
             continue
-        if other.cost > most:
+        # at the same cost it is the same plant by other names
+        if other.cost > most or abs(other.cost - minimum.cost) <= _TWIN * minimum.cost:
             continue
         away = np.abs(other.x - minimum.x) * structure.scale
         values = other.x * structure.scale
