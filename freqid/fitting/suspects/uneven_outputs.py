@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 # power of what is left of one output beside another's from which the other hardly counts
 _UNEVEN = 100.0
+# what was found by fits of its own, whatever weighs it here
+_FITTED = {"swapped channels", "wrong sign"}
 # rounds in which the noise is learnt, and evaluations of each
 _ROUNDS, _LIMIT = 3, 60
 # standard errors within which both are estimates of one plant
@@ -59,14 +61,14 @@ class EvenInquiry:
 
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects."""
-        found = self.inquiry.findings()
         if self._cleared is None:
-            return found
-        return [self._uneven(self._cleared), *self._cleared.findings()]
+            return self._found
+        other, minor = self._cleared
+        return [self._uneven(other), *minor]
 
     def table(self) -> pd.DataFrame:
         """The suspects by name."""
-        return (self._cleared or self.inquiry).table()
+        return (self._cleared[0] if self._cleared else self.inquiry).table()
 
     def on_modes(self, est: Estimate, changed: bool) -> list[Finding]:
         """Modes of a black box that are noise, or move midway."""
@@ -77,19 +79,25 @@ class EvenInquiry:
         return self.inquiry.spread(est)
 
     @cached_property
-    def _cleared(self) -> Inquiry | None:
+    def _found(self) -> list[Finding]:
+        return self.inquiry.findings()
+
+    @cached_property
+    def _cleared(self) -> tuple[Inquiry, list[Finding]] | None:
         """The same inquiry at the minimum that meets all outputs, where that is near and nothing
-        serious speaks there; None where all is well, and where something does.
+        serious speaks there, and what does; None where all is well, and where something is serious.
         """
-        if not any(f.severity == "serious" for f in self.inquiry.findings()):
+        serious = {f.kind for f in self._found if f.severity == "serious"}
+        if not serious or serious & _FITTED:
             return None
         try:
             other = self._beside()
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return None
-        if other is None or any(f.severity == "serious" for f in other.findings()):
+        minor = [] if other is None else other.findings()
+        if other is None or any(f.severity == "serious" for f in minor):
             return None
-        return other
+        return other, minor
 
     @cached_property
     def _powers(self) -> tuple[FloatArray, list[str]]:
