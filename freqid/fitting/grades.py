@@ -167,9 +167,13 @@ def _rival(est: Estimate, std: np.ndarray) -> list[str]:
         return []
     values = ", ".join(f"{n}={v:.4g}" for n, v in zip(est.names, other, strict=True))
     left = f"leave {', '.join(vague)} open, and " if vague else ""
+    uneven = est.weights is None and est.model.n_outputs > 1
+    weigh = (
+        "fit with weights='noise' if one output hardly counts beside another, " if uneven else ""
+    )
     return [
         f"not told: the data {left}explain {values} about as well, another minimum of the cost; "
-        "give what is known of them (with_prior, with_bounds), or excite more"
+        f"{weigh}give what is known of them (with_prior, with_bounds), or excite more"
     ]
 
 

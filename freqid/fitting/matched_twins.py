@@ -16,6 +16,7 @@ import scipy
 from freqid.checks import BoolArray, ComplexArray, FloatArray
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.uncertainty.rivals import physical
 from freqid.lti import in_doubles
 
 # nepers that a value has moved where another answer is looked for, and frequencies in a look
@@ -61,18 +62,13 @@ def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
     found: list[FloatArray] = []
     for begin in [meant, *look.values * np.exp(ways)]:
         other = look.end(begin)
-        if other is None or not _physical(structure, other):
+        if other is None or not physical(structure, other):
             continue
         # a value that is zero is no other
         each = [np.abs(other - y) > _OTHER * np.maximum(np.abs(y), 1e-300) for y in (x, *found)]
         if all(some.any() for some in each):
             found.append(other)
     return found
-
-
-def _physical(structure: GreyStructure, x: FloatArray) -> bool:
-    ends = [p.physical for p in structure.parameters]
-    return all(low <= v <= high for v, (low, high) in zip(x * structure.scale, ends, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,14 +30,14 @@ def physical_minimum(objective: Objective, structure: GreyStructure, found: Foun
     nobody beside one of 58 ± 6 that explains them as well.
     """
     best = found.solution
-    if physical(structure, best.x * structure.scale):
+    if physical(structure, best.x):
         return found
     minimum = Minimum(objective, best)
     if minimum.exact:
         return found
     std = np.sqrt(np.diag(minimum.covariance))
     # what is unphysical for certain may be a minimum that is not the least, if it was met at once
-    chance = _allowed(structure, best.x, std)
+    chance = physical(structure, best.x, _ALLOWED * std)
     if not chance and found.n_starts > 1:
         return found
     noise = minimum.noise_variance
@@ -53,14 +53,6 @@ def physical_minimum(objective: Objective, structure: GreyStructure, found: Foun
         return found
     least = min(near, key=charged)
     return dataclasses.replace(found, solution=least, n_agreed=1, others=(best, *found.others))
-
-
-def _allowed(structure: GreyStructure, x: FloatArray, std: FloatArray) -> bool:
-    """Whether all values that are unphysical may be so by the noise."""
-    each = slice(structure.count)
-    ends = np.array([p.physical for p in structure.parameters]).T / structure.scale[each]
-    outside = np.maximum(ends[0] - x[each], x[each] - ends[1])
-    return bool((outside <= _ALLOWED * std[each]).all())
 
 
 def _ends(
@@ -80,5 +72,5 @@ def _ends(
             end = polish(objective, x, limit=_LIMIT, worth=most)
         except InputError:
             continue
-        if end.converged and physical(structure, end.x * structure.scale):
+        if end.converged and physical(structure, end.x):
             yield end

@@ -67,3 +67,14 @@ def test_a_fault_is_still_one(late):
     est = fq.fit(*started(0, late=late))
     assert accused(est)
     assert est.verdict.grade != "trust"
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_what_is_added_to_the_smaller_output_is_a_fault(seed):
+    """A sensor that drifts by 2 A, which its own noise would be taken to be."""
+    plant, record = started(seed, pole=0.0)
+    drift = np.column_stack([np.linspace(0, 2, N), np.zeros(N)])
+    drifting = fq.Record(record.u, record.y + drift, DT, output_names=["i", "w"])
+    est = fq.fit(plant, drifting)
+    assert accused(est)
+    assert "uneven outputs" not in [w.kind for w in est.warnings]

@@ -22,10 +22,12 @@ from freqid.fitting.findings import Finding, Inquired
 from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
+from freqid.fitting.suspects.holds import HOLDS
 from freqid.fitting.suspects.inquiry import Inquiry
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.evenness import channel_power
 from freqid.fitting.uncertainty.minimum import Minimum
+from freqid.fitting.uncertainty.rivals import physical
 from freqid.fitting.witness import Share
 from freqid.models import GreyBox, Model
 
@@ -36,12 +38,14 @@ if TYPE_CHECKING:
 
 # power of what is left of one output beside another's from which the other hardly counts
 _UNEVEN = 100.0
-# what was found by fits of its own, whatever weighs it here
-_FITTED = {"swapped channels", "wrong sign"}
+# what an output that is not met may look like: what is added to one would be taken for its noise
+_LIKENESSES = {"nonlinear", "friction", "spikes", "delay", "feedthrough", "hold rejected"}
+# chance below which a suspect has not gone
+_HINT = 0.05
 # rounds in which the noise is learnt, and evaluations of each
 _ROUNDS, _LIMIT = 3, 60
-# standard errors within which both are estimates of one plant
-_SAME = 3.0
+# standard errors within which both are estimates of one plant, and from which one is not physical
+_SAME, _CERTAIN = 3.0, 2.0
 
 
 def asked_of(
@@ -88,16 +92,27 @@ class EvenInquiry:
         serious speaks there, and what does; None where all is well, and where something is serious.
         """
         serious = {f.kind for f in self._found if f.severity == "serious"}
-        if not serious or serious & _FITTED:
+        if not serious or serious - _LIKENESSES:
             return None
         try:
             other = self._beside()
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return None
-        minor = [] if other is None else other.findings()
-        if other is None or any(f.severity == "serious" for f in minor):
+        if other is None:
+            return None
+        minor = other.findings()
+        if any(f.severity == "serious" for f in minor) or self._hinted(other, serious):
             return None
         return other, minor
+
+    def _hinted(self, other: Inquiry, serious: set[str]) -> bool:
+        """Whether one of those that spoke is no more than likely to be chance where all outputs are
+        met: what bends there has been taken for noise.
+        """
+        named = {
+            name for kind in serious for name in (HOLDS if kind == "hold rejected" else (kind,))
+        }
+        return any(a.name in named and a.p_value < _HINT for a in other.asked)
 
     @cached_property
     def _powers(self) -> tuple[FloatArray, list[str]]:
@@ -136,6 +151,9 @@ class EvenInquiry:
         moved = np.abs(x - before.minimum.x)
         std = np.sqrt(np.diag(before.minimum.covariance))
         if not minimum.solution.converged or (moved > _SAME * std).any():
+            return None
+        own = np.sqrt(np.diag(minimum.covariance))
+        if not physical(structure, x, _CERTAIN * own):
             return None
         return Inquiry(minimum, structure.at(x), readings, before.share)
 

@@ -38,7 +38,7 @@ def rival_of(minimum: Minimum, std: FloatArray, vague: bool) -> FloatArray | Non
             continue
         away = np.abs(other.x - minimum.x) * structure.scale
         values = other.x * structure.scale
-        if (away > _APART * std).any() and physical(structure, values):
+        if (away > _APART * std).any() and physical(structure, other.x):
             return values
     return None
 
@@ -54,7 +54,14 @@ def highest_rival(minimum: Minimum, std: FloatArray) -> float:
     return float(minimum.cost + _RIVAL * noise * wider)
 
 
-def physical(structure: GreyStructure, values: FloatArray) -> bool:
-    """Whether all parameters lie where they may be."""
-    ends = [p.physical for p in structure.parameters]
-    return all(low <= v <= high for v, (low, high) in zip(values, ends, strict=False))
+def physical(structure: GreyStructure, x: FloatArray, spare: FloatArray | None = None) -> bool:
+    """Whether all parameters lie where they may be, by no more than what is to ``spare`` (P,)."""
+    each = slice(structure.count)
+    # bounds beyond that range say that it is meant
+    ends = [
+        (-np.inf, np.inf) if p.upper <= p.physical[0] or p.lower >= p.physical[1] else p.physical
+        for p in structure.parameters
+    ]
+    low, high = np.array(ends).T / structure.scale[each]
+    more = np.zeros(len(x)) if spare is None else spare
+    return bool(((low - more[each] <= x[each]) & (x[each] <= high + more[each])).all())
