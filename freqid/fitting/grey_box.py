@@ -23,6 +23,7 @@ from freqid.fitting.physical_minimum import physical_minimum
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import Solution, minimise
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.search.stopping import Found
 from freqid.fitting.sight import gone_with, hold_that_changes, out_of_sight
 from freqid.fitting.signs import Evidence, findings
@@ -51,13 +52,7 @@ def fit_grey_box(
     enough_rows(experiments, len(structure.names))
     objective = Objective(structure, experiments)
     found = search_grey(structure, objective, readings, options)
-    solution = _unmirrored(objective, structure, found.solution)
-    if not options.refit:
-        found = physical_minimum(
-            objective, structure, dataclasses.replace(found, solution=solution)
-        )
-    solution = nearest_to_start(objective, structure, found.solution)
-    found = dataclasses.replace(found, solution=solution)
+    found = _meant(objective, structure, found, options.refit)
     alone = found.solution.x
     found, objective = _with_prior(structure, objective, found, readings)
     minimum = Minimum(
@@ -69,6 +64,19 @@ def fit_grey_box(
     est = _estimate(structure, minimum, found, readings)
     testimony = Testimony(minimum, tuple(readings), found.n_agreed)
     return dataclasses.replace(est, testimony=testimony, notes=notes)
+
+
+def _meant(objective: Objective, structure: GreyStructure, found: Found, refit: bool) -> Found:
+    """Of minima that no data tell apart the one that is meant; at Ctrl-C the one so far."""
+    try:
+        solution = _unmirrored(objective, structure, found.solution)
+        found = dataclasses.replace(found, solution=solution)
+        if not refit and solution.message != INTERRUPTED:
+            found = physical_minimum(objective, structure, found)
+        solution = nearest_to_start(objective, structure, found.solution)
+    except KeyboardInterrupt:
+        solution = dataclasses.replace(found.solution, converged=False, message=INTERRUPTED)
+    return dataclasses.replace(found, solution=solution)
 
 
 def structure_of(
