@@ -17,6 +17,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding, Inquired
 from freqid.fitting.noise_models import MeasuredNoise
@@ -106,8 +107,8 @@ class EvenInquiry:
         return other, minor
 
     def _hinted(self, other: Inquiry, serious: set[str]) -> bool:
-        """Whether one of those that spoke is no more than likely to be chance where all outputs are
-        met: what bends there has been taken for noise.
+        """Whether one of those that spoke is hardly chance where all outputs are met: what bends may be
+        taken for noise.
         """
         named = {
             name for kind in serious for name in (HOLDS if kind == "hold rejected" else (kind,))
@@ -131,13 +132,15 @@ class EvenInquiry:
         structure = before.minimum.structure
         if scene is None or not isinstance(structure, GreyStructure) or before.minimum.prior:
             return None
+        if isinstance(structure, PlacedStructure):
+            return None
         if any(
             s.record is None or r.own_cost or not r.noise.plain
             for s, r in zip(scene.seen, before.readings, strict=True)
         ):
             return None
         powers = self._powers[0]
-        if powers.max() < _UNEVEN * powers.min():
+        if not 0 < _UNEVEN * powers.min() <= powers.max():
             return None
         x = before.minimum.x
         for _ in range(_ROUNDS):
@@ -162,7 +165,8 @@ class EvenInquiry:
         most, least = int(powers.argmax()), int(powers.argmin())
         times = float(np.sqrt(powers[most] / powers[least]))
         std = np.sqrt(np.diag(self.inquiry.minimum.covariance))
-        moved = float(np.max(np.abs(other.minimum.x - self.inquiry.minimum.x) / std))
+        way = np.abs(other.minimum.x - self.inquiry.minimum.x)
+        moved = float(np.max(way[std > 0] / std[std > 0], initial=0.0))
         text = (
             f"what is left of {names[most]!r} is {times:.2g} times as large as of "
             f"{names[least]!r}, which hardly counts beside it and is not met; values that meet all "
