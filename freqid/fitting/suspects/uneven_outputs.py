@@ -107,8 +107,8 @@ class EvenInquiry:
         return other, minor
 
     def _hinted(self, other: Inquiry, serious: set[str]) -> bool:
-        """Whether one of those that spoke is hardly chance where all outputs are met: what bends may be
-        taken for noise.
+        """Whether one of those that spoke is hardly chance where all outputs are met: what bends
+        may be taken for noise.
         """
         named = {
             name for kind in serious for name in (HOLDS if kind == "hold rejected" else (kind,))
