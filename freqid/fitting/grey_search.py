@@ -36,8 +36,8 @@ _MORE = 8
 _WON = 0.02
 # evaluations down to data's own rounding; those of a refit that others follow, for each unknown
 _DIRECT, _ROUGH = 40, 5
-# outputs that a long delay leaves open, and starts that are tried beside it
-_OPEN, _BESIDE = 20, 6
+# outputs that a long delay leaves open, starts that are tried beside it, and evaluations of each
+_OPEN, _BESIDE, _LOOKS = 20, 6, 40
 # starts of experiments at many places beside which there are no black boxes
 _ALONE = 3
 # a start that costs so many times more on a part of the lines costs more on all
@@ -196,7 +196,7 @@ def _without_hiding(
     ends: list[Solution] = []
     for x in begun:
         with contextlib.suppress(InputError):
-            ends.append(polish(scout, x, limit=_DIRECT if ends else None))
+            ends.append(polish(scout, x, limit=_LOOKS if ends else None))
     best = min(ends, key=left, default=found.solution)
     if left(best) < left(found.solution):
         return dataclasses.replace(found, solution=best, n_agreed=1)

@@ -53,9 +53,11 @@ def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
     """Other unknowns with the response of those at ``x``, seen from points around them and from the
     start; those that are physical.
     """
+    if isinstance(structure, PlacedStructure):
+        return []
     meant = np.array([structure.meant[name] for name in structure.physical_names])
     look = _Look.at(structure, x, meant)
-    if look is None or isinstance(structure, PlacedStructure):
+    if look is None:
         return []
     rng = np.random.default_rng(0)
     ways = rng.uniform(-_SPREAD, _SPREAD, (_SCATTERED, len(x)))

@@ -17,7 +17,6 @@ from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.suspects.asking import Asking
@@ -126,7 +125,6 @@ def _weighed(objective: Objective, x: FloatArray, scene: Scene) -> list[Reading]
     readings = []
     for s, e in zip(scene.seen, objective.experiments, strict=True):
         assert isinstance(e, SpectralExperiment)
-        left = projected(e.at(realisation))[0]
-        noise = MeasuredNoise().learnt(s.unweighted(left[None])[0], s.grid[0])
+        noise = s.noise_told(projected(e.at(realisation))[0])
         readings.append(s.reading.with_(noise=noise))
     return readings

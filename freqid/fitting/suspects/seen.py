@@ -10,6 +10,7 @@ from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.data import Record
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.noise_ends import noise_ends
+from freqid.fitting.noise_models import MeasuredNoise, NoiseModel
 from freqid.fitting.reading import Reading
 from freqid.lti import directions, sum_runs
 from freqid.models import Model
@@ -136,6 +137,10 @@ class Seen:
         each = np.ascontiguousarray(rows).view(complex).reshape(len(rows), *scale.shape)
         found: ComplexArray = np.divide(each, scale, out=np.zeros_like(each), where=scale > 0)
         return found
+
+    def noise_told(self, left: FloatArray) -> NoiseModel:
+        """The noise that rows (rows,) of what is left of a record tell."""
+        return MeasuredNoise().learnt(self.unweighted(left[None])[0], self.grid[0])
 
     def lines_of(self, signals: FloatArray) -> ComplexArray:
         """The lines (…, K) of signals (…, N) in time."""

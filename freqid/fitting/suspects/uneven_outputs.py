@@ -20,7 +20,6 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding, Inquired
-from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.holds import HOLDS
@@ -145,7 +144,7 @@ class EvenInquiry:
         x = before.minimum.x
         for _ in range(_ROUNDS):
             readings = [
-                r.with_(noise=MeasuredNoise().learnt(s.unweighted(s.left[None])[0], s.grid[0]))
+                r.with_(noise=s.noise_told(s.left))
                 for r, s in zip(before.readings, scene.seen, strict=True)
             ]
             objective = Objective(structure, [r.experiment() for r in readings])
