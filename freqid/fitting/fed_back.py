@@ -10,13 +10,13 @@ import numpy as np
 from freqid.checks import FloatArray
 from freqid.data import Record
 from freqid.fitting.closed_loop import Through
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.heard_back import heard_back
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
-from freqid.fitting.uncertainty.gradient_noise import projected
 
 # said where the rest of the input did harm
 FED_BACK = (

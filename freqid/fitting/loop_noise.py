@@ -19,13 +19,14 @@ from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.data import Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution
-from freqid.fitting.uncertainty.gradient_noise import leverage, projected
+from freqid.fitting.uncertainty.gradient_noise import leverage
 from freqid.fitting.uncertainty.shared_noise import Chance
 from freqid.lti import Plane, Realisation
 from freqid.models import DiscreteModel, Model

@@ -139,9 +139,11 @@ def solved(T: FloatArray, b: FloatArray, lower: bool = False) -> FloatArray:
 
 
 def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal rows that span those of T (q, rows), and the δ that makes |r + δ T| least."""
+    """Orthonormal rows that span those of T (q, rows), and the δ (q,) that makes |r + δ T| least;
+    of several r (rows, R) the δ of each (q, R).
+    """
     size = np.sqrt(np.einsum("ij,ij->i", T, T))
-    delta = np.zeros(len(T))
+    delta = np.zeros((len(T), *r.shape[1:]))
     used = size > 1e-200
     if not used.any() or not np.isfinite(size).all():
         return np.zeros((0, len(r))), delta
@@ -164,5 +166,5 @@ def eliminate(T: FloatArray, r: FloatArray) -> tuple[FloatArray, FloatArray]:
     U, s, Vt = np.linalg.svd(unit.T, full_matrices=False)
     strong = s > 1e-11 * s[0]
     U, s, Vt = U[:, strong], s[strong], Vt[strong]
-    delta[used] = -(Vt.T @ ((U.T @ r) / s)) / size
+    delta[used] = -((Vt.T @ ((U.T @ r).T / s).T).T / size).T
     return U.T, delta

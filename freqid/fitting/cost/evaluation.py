@@ -9,7 +9,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.delays import open_ends
-from freqid.lti import BandLimited, PeriodicHold, Realisation, sum_runs, transition
+from freqid.lti import BandLimited, PeriodicHold, Realisation, eliminate, sum_runs, transition
 
 if TYPE_CHECKING:
     from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
@@ -64,14 +64,18 @@ class SpectralEvaluation:
         return self.plant.solve(self.z, self.plant.drive(self.z, U), self.inverse)
 
     def jacobian(self, initial: FloatArray | None) -> FloatArray:
-        """Derivative of the residual by each parameter, (P, rows)."""
+        """Derivative of the residual by each parameter, (P, rows).
+
+        ``initial`` (q,) are the unknowns of the initial state, (q, channels) where each channel
+        has its own.
+        """
         rows, t = self.experiment.lines.rows, self.motion
         if initial is None or self._w is None or t is None:
             return rows(self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x))
         # of all that is free the state alone is moved by the plant
         states = self.basis.to_basis.shape[-1]
-        delta = (self.basis.to_basis @ initial[:states])[:, None, None]
-        x_free = self.free.solve(t.z, delta * t.factor, self.free_inverse)
+        delta = self.basis.to_basis @ initial[:states].reshape(states, -1)
+        x_free = self.free.solve(t.z, delta[:, :, None] * t.factor, self.free_inverse)
         if self.shared:
             return rows(self._forced_change(self._w, self.x + x_free))
         forced = self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x)
@@ -108,3 +112,18 @@ class SumOfEvaluations:
         for e in others:
             total = total + e.jacobian(None)
         return total
+
+
+def projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """The residual with the transient taken off, the rows that span that, and its unknowns."""
+    return bared(evaluation.residual, evaluation.transient)
+
+
+def bared(r: FloatArray, T: FloatArray | None) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """A residual (rows,) without what rows T (q, rows) of unknown size explain of it: what is left,
+    the orthonormal rows that span theirs, and the sizes.
+    """
+    if T is None:
+        return r, np.zeros((0, len(r))), None
+    Q, delta = eliminate(T, r)
+    return r - (Q @ r) @ Q, Q, delta

@@ -9,8 +9,10 @@ does not grow with the record.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +20,8 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.priors import Prior
-from freqid.lti import Hold, Realisation, eliminate, triangle, triangle_of
+from freqid.fitting.cost.repeats import Lone, Repeats, groups_of
+from freqid.lti import Hold, Realisation, triangle, triangle_of
 
 # squares of what is larger leave the range of numbers
 _HUGE = 1e150
@@ -155,6 +158,11 @@ class Objective:
                 self.least = x.copy(), found.cost
         return self._points[key]
 
+    @cached_property
+    def _groups(self) -> list[Lone | Repeats]:
+        """The experiments, those at the same lines together."""
+        return groups_of(self.experiments)
+
     def forget(self) -> None:
         """Compute the points that are remembered anew, if they are asked for."""
         self._points.clear()
@@ -165,21 +173,18 @@ class Objective:
         except Exception as error:  # the user's function may raise anything at a trial point
             self.failure = error
             return None
-        blocks, initial, parts = [], [], []
+        blocks: list[tuple[FloatArray, FloatArray, FloatArray | None]] = []
+        initial: list[FloatArray | None] = [None] * len(self.experiments)
+        parts = [0.0] * len(self.experiments)
         folded: list[FloatArray] = []
         held = 0
         try:
-            for experiment in self.experiments:
-                evaluation = experiment.at(realisation)
-                r, T, delta = evaluation.residual, evaluation.transient, None
-                Q = None
-                if T is not None:
-                    Q, delta = eliminate(T, r)
-                    r = r - (Q @ r) @ Q
-                blocks.append((evaluation.jacobian(delta), r, Q))
-                initial.append(delta)
-                parts.append(float(r @ r))
-                held += blocks[-1][0].size
+            for number, J, r, Q, delta in itertools.chain.from_iterable(
+                group.at(realisation) for group in self._groups
+            ):
+                blocks.append((J, r, Q if len(Q) else None))
+                initial[number], parts[number] = delta, float(r @ r)
+                held += J.size
                 if held > _HELD:
                     folded.append(triangle_of(blocks))
                     blocks, held = [], 0

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray, InputError
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -24,7 +25,6 @@ from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.seen import Seen
-from freqid.fitting.uncertainty.gradient_noise import projected
 
 # what is added to an output, level from which it is worth a fit, and standard errors that one step
 # must not have gone

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from freqid.checks import BoolArray, FloatArray, InputError
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.noise_models import BiasIntegral
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
-from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.models import GreyBox, Model
 
 # values of all states by all unknowns from which a record is too long to be simulated

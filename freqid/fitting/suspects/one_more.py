@@ -14,6 +14,7 @@ from freqid.checks import InputError
 from freqid.data import FrequencyResponse, StampedRecord
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -28,7 +29,6 @@ from freqid.fitting.suspects.lacking_mode import lacking_mode
 from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.suspects.weighing import LOOSE
-from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.shared_noise import Chance, shared
 from freqid.fitting.witness import weighted_by
 from freqid.lti import directions

@@ -12,6 +12,7 @@ import numpy as np
 from freqid.checks import BoolArray, FloatArray, InputError
 from freqid.data import StampedRecord
 from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import EstimatedStructure, Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -27,7 +28,6 @@ from freqid.fitting.uncertainty.evenness import (
     tied,
     together,
 )
-from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import shaped_power
 from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, noise_freedom

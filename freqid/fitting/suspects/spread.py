@@ -15,12 +15,12 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import between_parts
 from freqid.fitting.suspects.parts import widths
 from freqid.fitting.uncertainty.evenness import is_white
-from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.uncertainty.noise_spectrum import local_power
 from freqid.models import GreyBox

@@ -14,11 +14,11 @@ import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import StampedRecord
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import minimise
-from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.fitting.uncertainty.minimum import Minimum
 
 # part of a period, rms, that stamps are off even ticks from which the data are asked whose times

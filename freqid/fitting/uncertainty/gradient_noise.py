@@ -7,14 +7,15 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data import ToldNoise
-from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
+from freqid.fitting.cost.evaluation import projected
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.log_responses import LogResponse
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.uncertainty.noise_spectrum import local_mean, local_power, smoothed_power
-from freqid.lti import Realisation, eliminate, tuned
+from freqid.lti import Realisation, tuned
 
 # means for each unknown from which they tell their own noise
 _MEANS = 5
@@ -289,12 +290,3 @@ def _of_logarithms(
         scale = np.asarray(e.weight / np.abs(e.measured))
         total += _of_response(turned[1:], turned[0], scale, e.reach, e.line_noise)
     return total if np.isfinite(total).all() else None
-
-
-def projected(evaluation: Evaluation) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """The residual with the transient taken off, the rows that span that, and its unknowns."""
-    r, T = evaluation.residual, evaluation.transient
-    if T is None:
-        return r, np.zeros((0, len(r))), None
-    Q, delta = eliminate(T, r)
-    return r - (Q @ r) @ Q, Q, delta

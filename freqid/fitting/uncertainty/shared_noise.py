@@ -10,11 +10,11 @@ import numpy as np
 
 from freqid.checks import FloatArray
 from freqid.data import PeriodicResponse
+from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.uncertainty.evenness import may_be_tied, tied, together
-from freqid.fitting.uncertainty.gradient_noise import projected
 from freqid.lti import directions
 
 # directions of unknowns below this part of the largest are none
