@@ -19,24 +19,22 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from freqid.checks import FloatArray, InputError
-from freqid.data import FrequencyResponse, StampedRecord
+from freqid.checks import InputError
+from freqid.data import StampedRecord
 from freqid.fitting.black_box.late import plant_in_step
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_variance
+from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.reading import Reading
-from freqid.fitting.residuals import errors_of, errors_of_response
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import RARE, Verdict, Witness
-from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
 from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, noise_freedom, shared
 from freqid.lti import tuned
-from freqid.models import Model, observed_order
+from freqid.models import observed_order
 
 # level below which the black box explains the data so much better that it is no chance
 _LEVEL = 0.01
@@ -47,9 +45,6 @@ _TOUCHES = 1e-3
 _OPEN, _WANTED = 0.5, 4
 # part of the data's energy from which on noise outweighs what is explained, and makes many minima
 _DROWNED = 0.5
-# part of the lines that are left out on either side, the factor between the others' variances from
-# which these are unlike, and the neper from one line to the next up to which they are no scatter
-_FEW, _UNEVEN, _SMOOTH = 0.05, 30.0, 0.25
 # the same where both have the same freedom, and so the same minimum
 _ALIKE = 1e-6
 
@@ -219,56 +214,6 @@ def _beside(
     if any(r.both_ends for r in own):
         found = found.on(own)
     return min(found, found.beside(model, own), key=lambda r: r.cost)
-
-
-def weighted_by(
-    models: Sequence[Model],
-    groups: Sequence[Sequence[int]],
-    readings: Sequence[Reading],
-    every: bool = False,
-) -> list[Reading]:
-    """Readings weighted by what the model of each group leaves of them, where that is uneven, or
-    ``every`` one.
-    """
-    weighted = list(readings)
-    for model, group in zip(models, groups, strict=True):
-        for i in group:
-            r = readings[i]
-            if not r.noise.plain or r.both_ends:
-                continue
-            if not isinstance(r.data, FrequencyResponse):
-                weighted[i] = _by_what_is_left(model, r, every)
-            elif tells_variance(r.data):
-                if every or _uneven(r.data.variance):  # type: ignore[arg-type]
-                    weighted[i] = r.with_(noise=MeasuredNoise.of(r.data))
-            # of an analyser's, whose errors may be a share of it, they would hide that
-            elif r.data.input_spectrum is not None:
-                weighted[i] = _by_what_is_left(model, r, every)
-    return weighted
-
-
-def _by_what_is_left(model: Model, reading: Reading, every: bool) -> Reading:
-    """A reading weighted by what a model leaves, where that is uneven, or in any case."""
-    if isinstance(reading.data, FrequencyResponse):
-        error, scale = errors_of_response(model, reading)
-        noise: NoiseModel = MeasuredNoise.of_response(error, scale)
-        error = (error * scale).reshape(-1, error.shape[-1])
-    else:
-        left = errors_of(model, reading)
-        error, noise = left.error, MeasuredNoise().learnt(left.error, left.n_samples)
-    # weights that are not needed would add their own scatter
-    even = evenly_spread(error, together=True)
-    return reading if even and not every else reading.with_(noise=noise)
-
-
-def _uneven(variance: FloatArray) -> bool:
-    """Whether variances that are told, (outputs, inputs, K), differ by more than their own scatter,
-    which shows from line to line: those of a few averages are no weights.
-    """
-    low, high = np.quantile(variance, [_FEW, 1 - _FEW])
-    if high <= _UNEVEN * low:
-        return False
-    return bool(np.median(np.abs(np.diff(np.log(variance)))) < _SMOOTH)
 
 
 def excess(

@@ -15,13 +15,13 @@ from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
+from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.halves import poles_of, weakly_damped
 from freqid.fitting.suspects.one_more import lines_beside
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.shared_noise import shared
-from freqid.fitting.witness import weighted_by
 from freqid.models import ContinuousModel, DiscreteModel, GreyBox, observed_order
 
 # level above which what a pair of poles explains is what noise alone has somewhere

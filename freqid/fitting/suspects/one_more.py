@@ -19,6 +19,7 @@ from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
@@ -30,7 +31,6 @@ from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.suspects.weighing import LOOSE
 from freqid.fitting.uncertainty.shared_noise import Chance, shared
-from freqid.fitting.witness import weighted_by
 from freqid.lti import directions
 from freqid.models import DiscreteModel, GreyBox, observed_order
 
