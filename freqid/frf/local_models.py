@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 
 from freqid.checks import FloatArray, InputError, whole
 from freqid.data import (
@@ -36,6 +37,9 @@ from freqid.lti import tuned
 _INFLATED, _WIDEST = 10.0, 0.15
 # and where polynomials remain useless all the same
 _HOPELESS = 100.0
+# part of the power of a line's neighbours below which it is not driven, that of the strongest line
+# below which none around is, and the part of all that polynomials need: every second line will do
+_UNDRIVEN, _SILENT, _FEW = 0.01, 1e-6, 0.45
 # inputs whose spectra have so small an eigenvalue are the same
 _DEPENDENT = 1e-12
 
@@ -64,7 +68,8 @@ def local_polynomial(
     Returns a FrequencyResponse (outputs, inputs, K) at the DFT lines with its variance; its
     ``coherence`` is the part of the output's power in each window that is not noise. Polynomials
     suit inputs whose DFT is rough, such as noise; for a chirp take ``local_rational``. Raises
-    ValueError for windows that are too narrow or a record that is too short.
+    ValueError for windows that are too narrow, a record that is too short, and an input of three
+    periods and more, which drives too few of the lines (see ``periodic``).
 
     Source: Pintelon and Schoukens, 2012, section 7.2.
 
@@ -115,6 +120,8 @@ def _estimate(
     form = _form(sets, whole("order", order, least=0), poles, width)
     lines = _lines(sets, signals, band, form.width)
     _told_apart(lines, sets[0])
+    if not poles:
+        _dense(lines, form.width)
     if width is None:
         lines, form = _widened(sets, signals, band, lines, form)
     local = local_models(lines, form)
@@ -144,6 +151,23 @@ def _told_apart(lines: Lines, first: Record) -> None:
         raise InputError(
             f"inputs {', '.join(first.input_names)} depend on one another at every line, so that "
             "their effects cannot be told apart; excite them differently"
+        )
+
+
+def _dense(lines: Lines, width: int) -> None:
+    """InputError where so few lines are driven, as those of a signal of several periods, that
+    polynomials would have to reach from one to the next over a resonance between them.
+    """
+    power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
+    around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
+    within = lines.wanted & (around > _SILENT * power.max(initial=0))
+    driven = float(np.mean(power[within] > _UNDRIVEN * around[within])) if within.any() else 1.0
+    if driven < _FEW:
+        raise InputError(
+            f"the input drives one line of {1 / driven:.0f}, as a signal does that repeats within "
+            "the record, and polynomials do not reach from one to the next; average its periods "
+            "with fq.periodic(record, period=...), cut out one with slice(), or take "
+            "local_rational"
         )
 
 

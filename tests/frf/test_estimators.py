@@ -3,6 +3,7 @@
 import copy
 import gc
 import pickle
+import warnings
 import weakref
 
 import control
@@ -392,3 +393,35 @@ def test_levels_without_noise():
         found = fq.distortion(runs, 1.0, skip=1)
         assert bool(found.warnings) == (cubic > 0)
         assert np.isfinite(found.levels["p_value"]).all()
+
+
+INPUTS = {
+    "noise": fq.white_noise(6000, seed=2),
+    "chirp": fq.chirp(0.1, 60, 12, 2e-3),
+    "steps": np.repeat(np.sign(np.sin(1.7 * np.arange(60) ** 1.3)), 100),
+    "prbs": fq.prbs(10, 2e-3, clock=5)[:5000],
+    "two periods": np.tile(fq.multisine((0.5, 60), 4, 2e-3, seed=1), 2),
+}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_polynomials_take_what_drives_half_of_the_lines(light, name):
+    record = fq.simulate(light, INPUTS[name], 2e-3)
+    for band in (None, (1, 50)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            assert np.isfinite(fq.local_polynomial(record, band=band).response).all()
+
+
+@pytest.mark.parametrize("band", [None, (1.0, 50.0)])
+@pytest.mark.parametrize("count", [3, 6])
+def test_polynomials_do_not_reach_from_line_to_line_of_several_periods(light, count, band):
+    period = fq.multisine((0.5, 60), 2, 2e-3, seed=1)
+    record = fq.simulate(light, np.tile(period, count + 3), 2e-3).slice(6, 6 + 2 * count)
+    noisy = record.with_noise(0.01 * record.y.std(), seed=0)
+    with pytest.raises(ValueError, match=f"one line of {count}.*fq.periodic"):
+        fq.local_polynomial(noisy, band=band)
+    means = fq.periodic(noisy, 2.0)
+    true = light.frequency_response(means.omega, record.hold).response
+    near = np.abs(means.frequency - 20) < 2
+    assert np.abs(means.response / true - 1)[..., near].max() < 0.1
