@@ -361,3 +361,32 @@ def test_a_minimum_that_one_start_alone_found_is_a_doubt():
     assert lonely.verdict.grade == "doubt"
     assert any("not settled" in r for r in lonely.verdict.reasons)
     assert dataclasses.replace(est, n_starts=40, n_agreed=2).verdict.grade == "trust"
+
+
+def shaken(seed, samples=2000, dt=2e-3):
+    """A mass on a spring that is driven and shaken by unknown forces, under a noisy sensor."""
+    plant = [[0, 1], [-4e3, -8.0]], [[0], [1.0]], [[1.0, 0]], [[0]]
+    sampled = scipy.signal.cont2discrete([np.array(M) for M in plant], dt)
+    rng = np.random.default_rng(seed)
+    u, force = rng.standard_normal((2, samples + 500))
+    y, v = (scipy.signal.dlsim(sampled, w)[1][500:, 0] for w in (u, 0.05 * force))
+    return fq.Record(u[500:], y + v + 0.02 * y.std() * rng.standard_normal(samples), dt)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("weights", [None, "noise"])
+def test_noise_with_the_plants_own_resonance_above_a_floor(weights):
+    """Error bars of d were 2.5 times too small, and 6 of 10 right fits were accused."""
+    plant = fq.GreyBox(
+        lambda m, k, d: ([[0, 1], [-k / m, -d / m]], [[0], [1 / m]], [[1.0, 0]], None),
+        [fq.Parameter("m", 1.2), fq.Parameter("k", 4.8e3), fq.Parameter("d", 9.0)],
+    )
+    truth, z, grades = np.array([1.0, 4e3, 8.0]), [], []
+    for seed in range(20):
+        est = fq.fit(plant, shaken(seed), weights=weights)
+        z.append((est.values - truth) / est.parameters["std"].to_numpy())
+        grades.append(est.verdict.grade)
+    rms = np.sqrt(np.mean(np.square(z), axis=0))
+    # over 60 seeds 1.01, 0.87 and 1.19 where noise weighs
+    assert (rms < 1.8).all(), rms
+    assert grades.count("trust") >= 17, grades

@@ -12,8 +12,9 @@ from freqid.fitting.uncertainty.evenness import evenly_spread
 # median step of the logarithm of variances from line to line above which they are those of a few
 # averages (of ten 0.3), and by how much one is above its neighbours that is none of theirs
 _SCATTERED, _TONE = 0.2, 6.0
-# autoregressions of at most this order, and lines that each order needs
-_ORDERS, _ORDER_LINES = 8, 15
+# autoregressions of at most this order: a resonance that something shakes above a white floor takes
+# many; lines that each order needs, and orders without a gain after which none is tried
+_ORDERS, _ORDER_LINES, _IN_VAIN = 24, 15, 8
 
 
 def smoothed_power(error: ComplexArray) -> FloatArray:
@@ -76,8 +77,8 @@ def local_mean(power: FloatArray) -> FloatArray:
 def _autoregressive(power: FloatArray) -> FloatArray:
     """Spectra of autoregressions for periodograms (channels, K), ones where none is needed.
 
-    Levinson's recursion, the order by Bayes' criterion (Stoica and Moses, Spectral Analysis of
-    Signals, 2005, sections 3.5.1 and C.8).
+    Levinson's recursion, the order by Akaike's criterion (Stoica and Moses, Spectral Analysis of
+    Signals, 2005, sections 3.5.1 and C.4): Bayes' takes too few for a resonance and cuts its peak.
     """
     K = power.shape[1]
     most = min(_ORDERS, K // _ORDER_LINES)
@@ -89,15 +90,18 @@ def _autoregressive(power: FloatArray) -> FloatArray:
     left = np.where(going, r[:, 0], 1.0)
     a = np.zeros_like(r)
     a[:, 0] = 1.0
-    chosen, best = a.copy(), 2 * K * np.log(left)
+    chosen, best, gained = a.copy(), 2 * K * np.log(left), 0
     for order in range(1, most + 1):
         k = -(a[:, :order] * r[:, order:0:-1]).sum(axis=1) / left
         a[:, : order + 1] += k[:, None] * a[:, order::-1]
         going &= left * (1 - k**2) > 1e-12 * r[:, 0]
         left = np.where(going, left * (1 - k**2), left)
-        criterion = 2 * K * np.log(left) + order * np.log(2 * K)
+        criterion = 2 * K * np.log(left) + 2 * order
         better = going & (criterion < best)
         best[better], chosen[better] = criterion[better], a[better]
+        gained = order if better.any() else gained
+        if order - gained >= _IN_VAIN:
+            break
     coloured = chosen[:, 1:].any(axis=1)
     if coloured.any():
         z = np.exp(-1j * np.pi * np.arange(K) / max(K - 1, 1))
