@@ -13,7 +13,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.findings import Finding, Severity, between_parts, suspects_table
 from freqid.fitting.reading import Reading
-from freqid.fitting.suspects import changing, measurement, nonlinear, plant
+from freqid.fitting.suspects import changing, jumps, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.asking import equally_weighted
 from freqid.fitting.suspects.between_periods import beyond_noise
@@ -25,7 +25,7 @@ from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
-from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone
+from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
@@ -59,7 +59,7 @@ _NOTHING, _QUIET = 1e-5, 1e-4
 # part of what is left that is most of it, and that is hardly any
 _MOST, _HARDLY = 0.5, 0.1
 # the files whose suspects are known
-_KNOWN = (changing, measurement, nonlinear, plant)
+_KNOWN = (changing, jumps, measurement, nonlinear, plant)
 # level at which all suspects together speak of good data
 LEVEL = 0.0065
 
@@ -137,7 +137,7 @@ class Inquiry:
         if scene is None:
             return []
         told = beyond_leakage(self._told, self._leak)
-        if max((a.test.gain for a in told), default=0.0) >= _HARDLY * scene.cost:
+        if simply(told) >= _HARDLY * scene.cost:
             return told
         return [*unexplained(self, scene, limit, self._std), *told]
 

@@ -27,8 +27,9 @@ _SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
 _LATE = 0.5
 # that a model lacks something, which only what is simpler can say better
 LACKING = ("another mode", "structure")
-# what a sharp mode looks like from near: it has to explain more
-_NARROW = ("unsteady", "tone")
+# what a sharp mode looks like from near: it has to explain more; jumps at many places imitate
+# whatever a model lacks
+_NARROW = ("unsteady", "tone", "jump")
 # faults of a sensor leave room for a plant that changes, and a mode that moves looks like two
 _BESIDE = ("unsteady", *LACKING, "offset", "drift", "spikes", "saturation", "tone")
 
@@ -51,6 +52,11 @@ def outdone(left: float, named: Sequence[Asked], scene: Scene) -> bool:
     """
     delays = [scene.cost - a.test.gain for a in named if a.name == "delay"]
     return any(cost < _LATE * left * scene.energy for cost in delays)
+
+
+def simply(told: Sequence[Asked]) -> float:
+    """What the best of them but jumps explains of the cost."""
+    return max((a.test.gain for a in told if a.name != "jump"), default=0.0)
 
 
 def _clearly(a: Asked, other: Asked) -> bool:

@@ -22,6 +22,10 @@ CURES = {
         "the input too, which harms a plant that all but integrates)"
     ),
     "spikes": "look at the record there; fit with loss='huber', or mend the sample",
+    "jump": (
+        "look in the log for rows that are missing there, an input that was cut off, or a knock; "
+        "fit the parts between, cut with slice(), as experiments"
+    ),
     "tone": "look for its source; weights='noise' counts the lines around it less",
     "saturation": "lower the excitation, or leave those samples out",
     "friction": (
@@ -74,6 +78,7 @@ def words(name: str, size: float, unit: str, detail: str, channel: str = "") -> 
         "offset": f"{channel or 'an output'} has a constant of {number} added",
         "drift": f"{channel or 'an output'} drifts by {number}",
         "spikes": f"one sample{of} is off by {number} {detail}",
+        "jump": f"the motion jumps at {detail}, as where rows are lost in all channels",
         "tone": f"a sine of {number} {detail} is added{to} that the input does not have",
         "saturation": f"{detail or f'{channel or one} stays at one extreme value'}, as at a limit",
         # a sensor that looks the other way makes it negative
