@@ -15,6 +15,7 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import LocalResponse
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.record import Record
+from freqid.data.units import unit_in_name, unlike
 
 _Set = TypeVar("_Set", bound=Record | FrequencyResponse)
 
@@ -23,7 +24,7 @@ def in_one_order(name: str, sets: Sequence[_Set]) -> list[_Set]:
     """Data sets with the channels of the first in its order, where they have the same names.
 
     Channels of other names are taken by place. Raises InputError where one of several that are not
-    all the same stands at another place.
+    all the same stands at another place, or one is in a multiple of the first's unit.
     """
     first = sets[0]
     found = [first]
@@ -36,7 +37,21 @@ def in_one_order(name: str, sets: Sequence[_Set]) -> list[_Set]:
                     f"{moved!r} stands at another place; give both the same channels, with select()"
                 )
         found.append(with_channels(each, first.input_names, first.output_names))
+        _in_one_unit(f"{name}[{number}]", found[-1], first)
     return found
+
+
+def _in_one_unit(name: str, each: _Set, first: _Set) -> None:
+    """InputError for a channel in a multiple of the unit that it has in the first."""
+    own, other = (
+        {n: s.units.get(n) or unit_in_name(n) for n in (*s.input_names, *s.output_names)}
+        for s in (each, first)
+    )
+    for (channel, unit), (_, told) in zip(own.items(), other.items(), strict=False):
+        if unit and told and unlike(unit, told):
+            raise InputError(
+                f"{name} has {channel!r} in {unit} and the first in {told}; give both in one unit"
+            )
 
 
 def displaced(wanted: Sequence[str], given: Sequence[str]) -> str | None:

@@ -52,6 +52,8 @@ _OTHERS = {
     "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "inch": 0.0254,
           "ft": 0.3048},
     "m/s": {"mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6},
+    "m/s^2": {"mm/s^2": 1e-3, "cm/s^2": 1e-2, "mm/s²": 1e-3, "cm/s²": 1e-2, "mm/s2": 1e-3,
+              "cm/s2": 1e-2},
     "A": {"mA": 1e-3},
     "V": {"mV": 1e-3},
 }  # fmt: skip
@@ -82,6 +84,21 @@ def coherent(unit: str) -> tuple[str, float] | None:
             if written in others:
                 return base, others[written]
     return _ANY_CASE.get(plain.casefold())
+
+
+def unlike(one: str, other: str) -> bool:
+    """Whether two units are multiples of one another; False for what is not known to be.
+
+    >>> unlike("mm", "m"), unlike("deg", "rad"), unlike("V", "N"), unlike("m/s²", "m/s^2")
+    (True, True, False, False)
+    """
+    (base, size), (same, scale) = (coherent(u) or (_spelled(u), 1.0) for u in (one, other))
+    return base == same and abs(size / scale - 1) > 1e-6
+
+
+def _spelled(unit: str) -> str:
+    """A unit as the coherent ones are written here."""
+    return re.sub(r"(?<=s)2$", "^2", re.sub(r"[·*]", " ", unit).replace("²", "^2").strip())
 
 
 def units_of_channels(names: Sequence[str], units: Mapping[str, str]) -> list[tuple[str, str]]:

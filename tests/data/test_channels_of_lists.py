@@ -56,6 +56,24 @@ def test_a_name_at_another_place_is_refused():
         fq.fit(named, other)
 
 
+def test_a_channel_in_a_multiple_of_the_firsts_unit_is_refused():
+    """Its numbers were taken for those of the first: a mass of 0.004 for 2."""
+
+    def measured(seed, unit, factor):
+        r = record(seed)
+        return fq.Record(r.u, r.y * [factor, 1], r.dt, input_names=IN, output_names=OUT,
+                         units={"angle": unit})  # fmt: skip
+
+    one = measured(0, "m/s^2", 1.0)
+    other = measured(1, "mm/s^2", 1e3)
+    for estimate in (lambda sets: fq.fit(MODEL, sets), lambda sets: fq.h1(sets, segment=80)):
+        with pytest.raises(ValueError, match=r"\[1\] has 'angle' in mm/s\^2 and the first in m/s"):
+            estimate([one, other])
+        # however it is written, and what is in no unit that is known, is taken as it is
+        estimate([one, measured(1, "m/s²", 1.0)])
+        estimate([one, measured(1, "", 1.0)])
+
+
 def test_other_names_go_by_place():
     other = record(1)
     other = fq.Record(other.u, other.y, other.dt, input_names=["p", "q"])
