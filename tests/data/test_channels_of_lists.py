@@ -14,8 +14,9 @@ MODEL = fq.GreyBox(plant, [fq.Parameter("a", 5.0), fq.Parameter("b", 12.0)])
 IN, OUT = ["torque", "force"], ["angle", "place"]
 
 
-def record(seed, turned=False):
-    u = np.column_stack([np.tile(fq.white_noise(100, seed=seed + i), 4) for i in (10, 20)])
+def record(seed, turned=False, periods=4):
+    noise = [fq.white_noise(400 // periods, seed=seed + i) for i in (10, 20)]
+    u = np.column_stack([np.tile(each, periods) for each in noise])
     one = fq.simulate(MODEL, u, 0.02)
     one = fq.Record(one.u, one.y, one.dt, input_names=IN, output_names=OUT)
     return one.select(IN[::-1], OUT[::-1]) if turned else one
@@ -84,7 +85,7 @@ def test_other_names_go_by_place():
 @pytest.mark.parametrize("estimate", [fq.local_polynomial, lambda s: fq.h1(s, segment=80)])
 def test_a_turned_response_keeps_what_it_knows_of_its_noise(estimate):
     """How lines share their noise was lost, and standard errors were five times other ones."""
-    sets = [record(seed).with_noise(0.02, seed=seed) for seed in range(3)]
+    sets = [record(seed, periods=1).with_noise(0.02, seed=seed) for seed in range(3)]
     turned = [s.select(IN[::-1], OUT[::-1]) for s in sets]
     named = fq.GreyBox(plant, MODEL.parameters, inputs=IN, outputs=OUT)
     one, other = (fq.fit(named, estimate(s)) for s in (sets, turned))

@@ -73,7 +73,8 @@ def test_who_means_the_unit_of_his_file_says_so_in_his_parameters():
     assert not [w for w in est.warnings if w.kind == "units"]
 
 
-def test_one_record_of_several_in_another_unit_is_told():
+def test_one_record_of_several_in_another_unit_is_refused():
     """The units of the last record had been those of all."""
     both = [measured({"angle": "°"}), measured({"angle": "rad"})]
-    assert [w.kind for w in fq.fit(spring(), both).warnings] == ["units"]
+    with pytest.raises(ValueError, match=r"data\[1\] has 'angle' in rad and the first in °"):
+        fq.fit(spring(), both)

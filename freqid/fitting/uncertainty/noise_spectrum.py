@@ -13,8 +13,9 @@ from freqid.fitting.uncertainty.evenness import evenly_spread
 # averages (of ten 0.3), and by how much one is above its neighbours that is none of theirs
 _SCATTERED, _TONE = 0.2, 6.0
 # autoregressions of at most this order: a resonance that something shakes above a white floor takes
-# many; lines that each order needs, and orders without a gain after which none is tried
-_ORDERS, _ORDER_LINES, _IN_VAIN = 24, 15, 8
+# many; lines that each order needs, orders without a gain after which none is tried, and by how
+# much Akaike's criterion has to be lower for more orders than Bayes' takes
+_ORDERS, _ORDER_LINES, _IN_VAIN, _CLEARLY = 24, 15, 8, 4.0
 
 
 def smoothed_power(error: ComplexArray) -> FloatArray:
@@ -77,8 +78,9 @@ def local_mean(power: FloatArray) -> FloatArray:
 def _autoregressive(power: FloatArray) -> FloatArray:
     """Spectra of autoregressions for periodograms (channels, K), ones where none is needed.
 
-    Levinson's recursion, the order by Akaike's criterion (Stoica and Moses, Spectral Analysis of
-    Signals, 2005, sections 3.5.1 and C.4): Bayes' takes too few for a resonance and cuts its peak.
+    Levinson's recursion, the order by Bayes' criterion, or by Akaike's where that is clearly lower
+    there (Stoica and Moses, Spectral Analysis of Signals, 2005, sections 3.5.1, C.4 and C.8):
+    Bayes' takes too few for a resonance and cuts its peak, Akaike's too many for white noise.
     """
     K = power.shape[1]
     most = min(_ORDERS, K // _ORDER_LINES)
@@ -90,18 +92,25 @@ def _autoregressive(power: FloatArray) -> FloatArray:
     left = np.where(going, r[:, 0], 1.0)
     a = np.zeros_like(r)
     a[:, 0] = 1.0
-    chosen, best, gained = a.copy(), 2 * K * np.log(left), 0
+    # penalties of an order by Bayes and by Akaike; the criterion, Akaike's, and the coefficients
+    penalties = np.log(2 * K), 2.0
+    least = [[2 * K * np.log(left) for _ in range(2)] for _ in penalties]
+    kept, gained = [a.copy() for _ in penalties], 0
     for order in range(1, most + 1):
         k = -(a[:, :order] * r[:, order:0:-1]).sum(axis=1) / left
         a[:, : order + 1] += k[:, None] * a[:, order::-1]
         going &= left * (1 - k**2) > 1e-12 * r[:, 0]
         left = np.where(going, left * (1 - k**2), left)
-        criterion = 2 * K * np.log(left) + 2 * order
-        better = going & (criterion < best)
-        best[better], chosen[better] = criterion[better], a[better]
-        gained = order if better.any() else gained
+        fitted = 2 * K * np.log(left)
+        for penalty, (criterion, akaike), own in zip(penalties, least, kept, strict=True):
+            better = going & (fitted + penalty * order < criterion)
+            criterion[better] = (fitted + penalty * order)[better]
+            akaike[better], own[better] = (fitted + 2 * order)[better], a[better]
+            gained = order if better.any() else gained
         if order - gained >= _IN_VAIN:
             break
+    clearly = least[0][1] - least[1][1] > _CLEARLY
+    chosen = np.where(clearly[:, None], kept[1], kept[0])
     coloured = chosen[:, 1:].any(axis=1)
     if coloured.any():
         z = np.exp(-1j * np.pi * np.arange(K) / max(K - 1, 1))
