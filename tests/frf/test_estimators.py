@@ -400,6 +400,7 @@ INPUTS = {
     "chirp": fq.chirp(0.1, 60, 12, 2e-3),
     "steps": np.repeat(np.sign(np.sin(1.7 * np.arange(60) ** 1.3)), 100),
     "prbs": fq.prbs(10, 2e-3, clock=5)[:5000],
+    "noise beside a hum": fq.white_noise(4000, seed=2) + 100 * np.sin(0.025 * np.arange(4000)),
     "two periods": np.tile(fq.multisine((0.5, 60), 4, 2e-3, seed=1), 2),
 }
 

@@ -23,6 +23,7 @@ from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
+from freqid.fitting.suspects.late_instead import late_for_a_mode
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
@@ -48,10 +49,9 @@ if TYPE_CHECKING:
 
     from freqid.fitting.estimate import Estimate
 
-# part of the strongest one's evidence from which another is said, and how many are
-_WORTH, _SAID = 0.5, 3
-# chance from which a suspect is no certainty
-_SURE = 1e-6
+# part of the strongest one's evidence from which another is said, how many are, and the chance
+# from which one is no certainty
+_WORTH, _SAID, _SURE = 0.5, 3, 1e-6
 # standard errors by which a suspect moves no parameter, and the part of it that harms nobody
 _SMALL, _HARMLESS = 0.3, 1e-3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
@@ -218,8 +218,8 @@ class Inquiry:
         turn = turned(self, scene)
         if turn and not outdone(turn[0].number or 0.0, named, scene):
             return turn
-        if not named:
-            return []
+        if not named or (late := late_for_a_mode(self, scene, named[0])):
+            return late if named else []
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
         least = evidence(scene, named[0])

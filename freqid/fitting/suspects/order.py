@@ -22,6 +22,9 @@ _AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
 BENT, _HALF = ("friction", "nonlinear"), 0.5
+# part of what jumps explain from which a plant that bends makes them, for at many places they
+# imitate all else; and the same where they explain less than the last part of what is left
+_FIFTH, _TWELFTH, _THIRD = 0.2, 0.08, 0.35
 _SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
 # part of what a turned channel leaves that a delay has to leave to be said instead
 _LATE = 0.5
@@ -59,6 +62,17 @@ def simply(told: Sequence[Asked]) -> float:
     return max((a.test.gain for a in told if a.name != "jump"), default=0.0)
 
 
+def _without_imitations(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
+    """Those without jumps that something else that speaks makes in the motion."""
+    others = [a for a in asked if a.name != "jump"]
+    jumps = next((a for a in asked if a.name == "jump"), None)
+    if jumps is None or not others:
+        return [*asked]
+    bent = max((a.test.gain for a in others if a.name in BENT), default=0.0)
+    enough = _FIFTH if jumps.test.gain >= _THIRD * scene.cost else _TWELFTH
+    return others if bent >= enough * jumps.test.gain else [*asked]
+
+
 def _clearly(a: Asked, other: Asked) -> bool:
     """Whether one explains more than another by no chance, all its unknowns counted."""
     more = a.test.degrees - other.test.degrees
@@ -69,6 +83,7 @@ def _clearly(a: Asked, other: Asked) -> bool:
 
 def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
     """The likeliest first, without a change midway that something else explains."""
+    asked = _without_imitations(asked, scene)
     ranked = sorted(asked, key=lambda a: evidence(scene, a), reverse=True)
     # what explains as much is as likely: which is likelier decides
     most = ranked[0].test.gain

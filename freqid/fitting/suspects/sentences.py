@@ -23,7 +23,7 @@ CURES = {
     ),
     "spikes": "look at the record there; fit with loss='huber', or mend the sample",
     "jump": (
-        "look in the log for rows that are missing there, an input that was cut off, or a knock; "
+        "look in the log for rows that are missing there, a sensor that hung, or a knock; "
         "fit the parts between, cut with slice(), as experiments"
     ),
     "tone": "look for its source; weights='noise' counts the lines around it less",

@@ -25,6 +25,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.late_instead import late_instead
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.turns import Turn, all_turns
 from freqid.fitting.uncertainty.minimum import Minimum
@@ -96,6 +97,8 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
     if best is None:
         return []
     left, turn = best
+    if late := late_instead(inquiry, begun, options, _BETTER * left):
+        return [late]
     swapped = turn.kind == "swapped channels"
     text = (
         f"{turn.what}: turned back, {100 * (1 - np.sqrt(left)):.4g} % of the data are explained by "

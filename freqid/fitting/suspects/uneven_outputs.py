@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 # power of what is left of one output beside another's from which the other hardly counts
 _UNEVEN = 100.0
 # what an output that is not met may look like: what is added to one would be taken for its noise
-_LIKENESSES = {"nonlinear", "friction", "spikes", "delay", "feedthrough", "hold rejected"}
+_LIKENESSES = {
+    "nonlinear", "friction", "spikes", "jump", "delay", "feedthrough", "hold rejected",
+}  # fmt: skip
 # chance below which a suspect has not gone
 _HINT = 0.05
 # rounds in which the noise is learnt, and evaluations of each
