@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 
 import freqid as fq
-
-DT = 2e-3
-
-
-def axis(Jm, Ja, k, d, f):
-    """A motor that drives a load through a shaft, seen by the motor's speed."""
-    A = [[0, 1, -1], [-k / Jm, -(f + d) / Jm, d / Jm], [k / Ja, d / Ja, -(f + d) / Ja]]
-    return A, [[0], [1 / Jm], [0]], [[0, 1, 0]], None
-
-
-VALUES = {"Jm": 1e-3, "Ja": 3e-3, "k": 8.0, "d": 0.01, "f": 4e-3}
-AXIS = fq.GreyBox(axis, [fq.Parameter(n, v) for n, v in VALUES.items()])
+from tests.fitting.test_jumps import AXIS, DT
 
 
 @pytest.mark.study

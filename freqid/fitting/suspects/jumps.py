@@ -107,18 +107,18 @@ def _motions(model: Model, s: Seen) -> FloatArray | None:
     slowest = float(np.abs(np.linalg.eigvals(phi)).max())
     if slowest >= 1 or slowest > np.exp(-1 / (_DIES * N)):
         return None
-    h = np.empty((N, *plant.C.shape))
-    row = plant.C.astype(float)
-    for k in range(N):
-        h[k] = row
-        row = row @ phi
+    h, power = plant.C.astype(float)[None], phi
+    while len(h) < N:
+        h, power = np.concatenate([h, h @ power]), power @ power
     # columns that are no states of their own make directions that are not seen
-    flat = np.moveaxis(h, -1, 0).reshape(len(phi), -1)
+    flat = np.moveaxis(h[:N], -1, 0).reshape(len(phi), -1)
     size = np.sqrt((flat**2).sum(axis=1))
+    if not (size > 0).any():
+        return None
     flat = flat[size > 0] / size[size > 0, None]
-    power, ways = np.linalg.eigh(flat @ flat.T)
-    kept = power > _SEEN * power.max(initial=0)
-    each = (ways[:, kept] / np.sqrt(power[kept])).T @ flat
+    sizes, ways = np.linalg.eigh(flat @ flat.T)
+    kept = sizes > _SEEN * sizes.max()
+    each = (ways[:, kept] / np.sqrt(sizes[kept])).T @ flat
     return np.moveaxis(each.reshape(len(each), N, -1), 1, -1)
 
 
