@@ -166,10 +166,10 @@ def _dense(lines: Lines, width: int) -> None:
     driven = float(np.mean(power[within] > _UNDRIVEN * around[within])) if within.any() else 1.0
     if driven < _FEW:
         raise InputError(
-            f"the input drives one line of {1 / driven:.0f}, as a signal does that repeats within "
-            "the record, and polynomials do not reach from one to the next; average its periods "
-            "with fq.periodic(record, period=...), cut out one with slice(), or take "
-            "local_rational"
+            f"the input drives one line of {1 / driven:.0f}, as a signal that repeats within the "
+            "record or a multisine of few lines does, and polynomials do not reach from one to the "
+            "next; average its periods with fq.periodic(record, period=...), cut out one with "
+            "slice(), or take local_rational"
         )
 
 

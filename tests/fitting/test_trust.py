@@ -387,6 +387,6 @@ def test_noise_with_the_plants_own_resonance_above_a_floor(weights):
         z.append((est.values - truth) / est.parameters["std"].to_numpy())
         grades.append(est.verdict.grade)
     rms = np.sqrt(np.mean(np.square(z), axis=0))
-    # over 60 seeds 1.01, 0.87 and 1.19 where noise weighs
+    # over 60 seeds 1.02, 0.87 and 1.20 where noise weighs
     assert (rms < 1.8).all(), rms
     assert grades.count("trust") >= 17, grades

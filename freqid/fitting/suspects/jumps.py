@@ -19,8 +19,9 @@ from freqid.fitting.suspects.seen import Seen
 from freqid.lti import StateSpace
 from freqid.models import Model
 
-# values of the motions of all states beyond which a record is too long to be searched
-_MOST = 1e7
+# values of the motions of all states beyond which a record is too long to be searched: those of all
+# jumps are held together
+_MOST = 2e6
 # motions below this part of the largest are not seen
 _SEEN = 1e-8
 # level from which a jump is none by chance, the part of the largest below which one is what
@@ -39,25 +40,21 @@ def jump(scene: Scene, model: Model) -> Columns | None:
     """The states are others from some sample on: up to eight jumps, each from what is left."""
     if any(s.record is None or _coarse(s) for s in scene.seen):
         return None
-    motions = [_motions(s.own(model), s) for s in scene.seen]
-    if any(h is None for h in motions):
-        return None
+    motions: list[FloatArray] = []
+    for s in scene.seen:
+        own = _motions(s.own(model), s)
+        if own is None:
+            return None
+        motions.append(own)
     count = sum(s.grid[0] for s in scene.seen)
     noise, most = np.sqrt(np.maximum(scene.variance, 1e-300)), 0.0
     left, each = scene.left / noise, scene.parted(noise)
     found: list[tuple[int, int]] = []
     columns = [np.zeros((0, len(s.left))) for s in scene.seen]
     for _ in range(_JUMPS):
-        looks = [
-            (*_likeliest(s, rest, own, h), i)
-            for i, (s, rest, own, h) in enumerate(
-                zip(scene.seen, scene.parted(left), each, motions, strict=True)
-            )
-            if h is not None
-        ]
-        score, k, where = max(looks)
+        parts = zip(scene.seen, scene.parted(left), each, motions, strict=True)
+        score, k, where = max((*_likeliest(*part), i) for i, part in enumerate(parts))
         h = motions[where]
-        assert h is not None
         chance = of_several(float(scipy.stats.chi2.sf(score, len(h))), count)
         if found and (chance > _LEVEL or score < _SHARE * most or (where, k) in found):
             break

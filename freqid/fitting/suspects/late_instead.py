@@ -78,4 +78,4 @@ def late_instead(
         f"{words('delay', lag * record.dt, 's', 'the input')}, to a sample or two: so "
         f"{100 * (1 - np.sqrt(share)):.4g} % of the data are explained; {CURES['delay']}"
     )
-    return Finding("delay", text, number=lag * record.dt)
+    return Finding("delay", text, number=float(share))
