@@ -48,10 +48,12 @@ def test_disturbing_torques_are_no_fault_and_no_bias(torque):
     rms = np.sqrt(np.mean(np.square(z), axis=0))
     # over 16 seeds 0.93 to 1.14 at the smaller, 0.95 to 1.75 at the larger torque
     assert ((rms > 0.5) & (rms < 2.2)).all(), rms
-    # the larger one leaves fm open, to 130 % and more of its value: of 16 seeds 6 are trusted
+    # the larger torque leaves fm open, to 130 % and more of its value
     assert said <= {"not settled"}
-    assert grades.count("trust") >= (4 if torque < 0.01 else 3), grades
     assert np.median(p) > 0.1, p
+    if torque == 0.02 and grades.count("trust") == 3:
+        pytest.xfail("3 of 6 trusted for 4: with the noise's resonance told one p is 0.18 for 0.56")
+    assert grades.count("trust") >= 4, grades
 
 
 @pytest.mark.study
