@@ -39,7 +39,8 @@ def as_data_sets(data: DataSet | Iterable[DataSet]) -> tuple[DataSet, ...]:
     for each in sets:
         if not isinstance(each, DataSet):
             raise InputError(
-                f"data holds a {type(each).__name__}; expected Record or FrequencyResponse"
+                f"data holds a {type(each).__name__}; expected Record or FrequencyResponse; a "
+                "stream is fitted alone, or load() it"
             )
     return tuple(in_one_order("data", sets))
 

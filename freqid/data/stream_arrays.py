@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from freqid.data.readers.columns import CLOCKS, step_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
-from freqid.data.stream_found import Asked, Clock, Found, Source, even, of_array, places
+from freqid.data.stream_found import Asked, Clock, Found, Source, agreed, even, of_array, places
 from freqid.data.time_column import time_named
 
 
@@ -69,8 +70,7 @@ class _Arrays:
 
         Raises ValueError for arrays beside times that differ.
         """
-        own = {_folder(n): n for n in reversed(times)}
-        beside = [own[f] for f in dict.fromkeys(map(_folder, wanted)) if f in own] or times[:1]
+        beside = _beside(wanted, times)
         clocks = [self._read_clock(name, count) for name in beside]
         for name, other in zip(beside[1:], clocks[1:], strict=True):
             first = clocks[0]
@@ -82,11 +82,19 @@ class _Arrays:
         return clocks[0] if clocks else None
 
     def _read_clock(self, time: str, count: int) -> Clock:
+        at, stamps, unit = self._stamps(time, count)
+        return even(str(self.path), _leaf(time), at, stamps, unit)
+
+    def _stamps(self, time: str, count: int) -> tuple[list[int], Array, str]:
         at = places(count)
         with self.opened() as file:
             stored = file[time]
-            stamps, unit = np.array([stored[i] for i in at]), unit_of(stored.attrs)
-        return even(str(self.path), _leaf(time), at, stamps, unit)
+            return at, np.array([stored[i] for i in at]), unit_of(stored.attrs)
+
+    def _agreed(self, wanted: Sequence[str], times: Sequence[str], count: int, dt: float) -> None:
+        """ValueError where a time beside the arrays says another sample time than ``dt`` (s)."""
+        for name in _beside(wanted, times):
+            agreed(str(self.path), _leaf(name), partial(self._stamps, name, count), dt)
 
     def step(self, names: Iterable[str]) -> float | None:
         """The sample time of arrays in s: what their folders say, those around these, or any.
@@ -133,7 +141,9 @@ class _Arrays:
             names = list(channel_names("columns", asked.columns, len(names), "channel"))
         wanted = [named[n] for n in asked.channels or () if n in named] or list(named.values())
         times = [n for n in times if self.shapes[n][0] == count]
-        clock = None if asked.dt is not None else self._clock(wanted, times, count)
+        clock = self._clock(wanted, times, count) if asked.dt is None else None
+        if asked.dt is not None and count > 1:
+            self._agreed(wanted, times, count, asked.dt)
         dt = None if asked.dt is not None else clock.step if clock else self.step(wanted)
 
         def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
@@ -251,6 +261,12 @@ def of_zarr(path: Path, asked: Asked) -> Found:
     except Exception as error:
         # zarr has errors of many kinds for a folder that is not what it says
         raise InputError(f"{path}: {damaged('zarr', error)}") from None
+
+
+def _beside(wanted: Sequence[str], times: Sequence[str]) -> list[str]:
+    """Times in the folders of the arrays that are ``wanted``, or the first of any."""
+    own = {_folder(n): n for n in reversed(times)}
+    return [own[f] for f in dict.fromkeys(map(_folder, wanted)) if f in own] or [*times[:1]]
 
 
 def _folder(name: str) -> str:

@@ -16,7 +16,7 @@ from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_aliased, kept_conditions, kept_hold, kept_of_record
 from freqid.data.stream_arrays import of_hdf5, of_zarr
-from freqid.data.stream_found import Asked, Found, Source, even, of_array, places
+from freqid.data.stream_found import Asked, Found, Source, agreed, even, of_array, places
 from freqid.data.stream_views import from_the_first
 from freqid.data.time_column import time_named
 
@@ -126,8 +126,12 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     with refusing(path, "Parquet"):
         if kept and count:
             told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
-        if time is not None and count > 1 and given is None:
-            clock = even(str(path), time, *_stamps(file, time), told_units.get(time, ""))
+        if time is not None and count > 1:
+            unit = told_units.get(time, "")
+            if given is None:
+                clock = even(str(path), time, *_stamps(file, time), unit)
+            else:
+                agreed(str(path), time, lambda: (*_stamps(file, time), unit), given)
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]

@@ -18,6 +18,8 @@ Source = Any
 
 # part of a step that the ends of a time may be off
 _EVEN = 1e-2
+# the same where a sample time is given instead of a time that is not even
+_GIVEN = 1e-2
 # rows at which a long time is looked at
 _PLACES = 256
 
@@ -148,6 +150,28 @@ def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "
         )
     # a time printed with few digits carries their rounding
     return Clock(float(f"{step:.9g}"), stamps[0], stamps[-1], plain, told or unit)
+
+
+def agreed(
+    origin: str, name: str, stamps: Callable[[], tuple[Sequence[int], Array, str]], given: float
+) -> None:
+    """ValueError for a time that says clearly another sample time than the one that was ``given``;
+    one that cannot be read says nothing. ``stamps`` reads rows, what stands there, and its unit.
+    """
+    import pandas as pd
+
+    plain, told = named(name)
+    try:
+        at, found, unit = stamps()
+        t, _ = in_seconds(plain, pd.Series(found), told or unit)
+    except InputError:
+        return
+    step = float(t[-1] - t[0]) / at[-1]
+    if np.isfinite(step) and step > 0 and abs(given - step) > _GIVEN * step:
+        raise InputError(
+            f"dt={given:g} s, but the time {name!r} of {origin} steps by {step:g} s; leave dt out, "
+            "or that time out of the file"
+        )
 
 
 def seconds_between(before: Clock, after: Clock) -> float:

@@ -42,7 +42,7 @@ def open(
             (n, channels), or a function that starts such an iterable anew for each pass.
         inputs, outputs: channels by name; of two, the first is the input.
         dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set or
-            an attribute ``time``, ``dt`` or ``fs``), or instead of it.
+            an attribute ``time``, ``dt`` or ``fs``), or instead of one that is not even.
         hold: what the input did, where the file does not remember it; a zero-order hold else.
         columns: names of the channels of arrays and blocks in turn, where these have none: inputs
             and outputs where not given, or else u and y.
@@ -52,7 +52,8 @@ def open(
         block: samples of a block.
 
     Float32 and integer samples are widened block by block. Raises FileNotFoundError for a missing
-    file, ValueError for unknown channels or a missing sample time.
+    file, ValueError for unknown channels, a missing sample time, or a ``dt`` that a column of times
+    contradicts.
 
     >>> import freqid as fq
     >>> record = fq.simulate(fq.first_order(), fq.white_noise(5000), 1e-3)

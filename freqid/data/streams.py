@@ -10,6 +10,7 @@ import numpy as np
 from freqid.checks import Array, FloatArray, InputError, flag, whole
 from freqid.data.band import Band, as_band
 from freqid.data.conditions import as_conditions
+from freqid.data.not_in_memory import NotInMemory
 from freqid.data.record import Record
 from freqid.data.rows import as_rows
 from freqid.data.sampling import samples_between
@@ -30,7 +31,7 @@ BLOCK = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
-class Stream:
+class Stream(NotInMemory):
     """A record that is not in memory: averages, ``periodic`` and ``fit`` take it in one pass.
 
     Made by ``freqid.open``; ``slice``, ``decimate``, ``select`` and ``with_band`` are views, which

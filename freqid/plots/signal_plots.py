@@ -32,7 +32,10 @@ def plot_record(
     >>> axes = fq.plot_record(fq.Record([0.0, 1.0], [0.0, 0.5], dt=0.1))
     """
     if not isinstance(record, Record):
-        raise InputError(f"record={type(record).__name__} is not a Record; draw several one by one")
+        raise InputError(
+            f"record={type(record).__name__} is not a Record; draw several one by "
+            "one, load() a stream"
+        )
     with stacked(ax, 2) as ax:
         steps = "steps-post" if record.hold.constant else "default"
         for axis, what, names, time, signals, drawn in (

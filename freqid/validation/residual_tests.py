@@ -76,7 +76,9 @@ def residual_test(
     if isinstance(record, FrequencyResponse):
         return _of_response(compare(model, record, hold=hold, band=band))
     if not isinstance(record, Record):
-        raise InputError(f"record={type(record).__name__} is neither a Record nor a response")
+        raise InputError(
+            f"record={type(record).__name__} is neither a Record nor a response; load() a stream"
+        )
     if record.n_samples < 4 * lags:
         raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
     limits = as_band(band, record.nyquist)

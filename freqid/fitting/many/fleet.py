@@ -212,4 +212,7 @@ def _is_path(source: object) -> TypeGuard[str | Path]:
 def _source(name: str, given: object) -> None:
     if not isinstance(given, (str, Path, Record, FrequencyResponse)):
         kind = type(given).__name__
-        raise InputError(f"{name} is a {kind}; expected a Record, a FrequencyResponse or a path")
+        raise InputError(
+            f"{name} is a {kind}; expected a Record, a FrequencyResponse or a path; of a stream "
+            "give the path, or load() it"
+        )
