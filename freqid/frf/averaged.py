@@ -81,15 +81,19 @@ def h2(
     window: Window = "hann",
     overlap: float | None = None,
     detrend: Detrend = "constant",
+    reference: Reference | None = None,
     state: str | Path | None = None,
     progress: bool | None = None,
 ) -> FrequencyResponse:
     """S_yy S_uy⁻¹: for noise on the input. Arguments, result and errors as in ``h1``.
 
-    It needs as many outputs as inputs.
+    It needs as many outputs as inputs. A ``reference`` leaves noise on neither end: then it is what
+    ``h1`` and ``hv`` are, S_yr S_ur⁻¹.
     """
     averaging = Averaging(segment, band, window, overlap, detrend)
-    s = spectral(records, averaging, None, state, progress)
+    s = spectral(records, averaging, reference, state, progress)
+    if s.reference is not None:
+        return _joint(s)
     if s.yu.shape[-1] != s.yu.shape[-2]:
         raise InputError(
             f"records have {s.yu.shape[-1]} inputs and {s.yu.shape[-2]} outputs; h2 needs as many "
@@ -109,17 +113,21 @@ def hv(
     window: Window = "hann",
     overlap: float | None = None,
     detrend: Detrend = "constant",
+    reference: Reference | None = None,
     state: str | Path | None = None,
     progress: bool | None = None,
 ) -> FrequencyResponse:
     """Total least squares, for noise on both ends in proportion to the signals.
 
-    With one input it is the geometric mean of H1 and H2. Arguments, result and errors as in ``h1``.
+    With one input it is the geometric mean of H1 and H2. Arguments, result and errors as in ``h1``;
+    with a ``reference`` it is S_yr S_ur⁻¹, as there.
 
     Source: Rocklin, Crowley and Vold, Proc. 3rd International Modal Analysis Conference, 1985.
     """
     averaging = Averaging(segment, band, window, overlap, detrend)
-    s = spectral(records, averaging, None, state, progress)
+    s = spectral(records, averaging, reference, state, progress)
+    if s.reference is not None:
+        return _joint(s)
     m, p = s.uu.shape[-1], s.yy.shape[-1]
     G = np.empty((len(s.frequency), p, m), complex)
     for o in range(p):

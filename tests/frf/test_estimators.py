@@ -172,6 +172,11 @@ def test_a_strong_loop_biases_the_direct_estimate_only():
     assert inside.mean() >= 0.99
     outside = np.abs(direct.response[0, 0] - true) > 3 * np.sqrt(direct.variance[0, 0])
     assert outside.mean() > 0.9
+    for other in (fq.h2, fq.hv):
+        # a reference leaves noise on neither end
+        same = other(record, 500, reference=True, band=(0.5, 45))
+        assert np.array_equal(same.response, through.response)
+        assert np.array_equal(same.variance, through.variance)
     local = fq.local_polynomial(record.slice(0, 100), reference=True, band=(0.5, 45))
     true = system(np.exp(1j * local.omega * 0.01))
     close = np.abs(local.response[0, 0] - true) < 3 * np.sqrt(local.variance[0, 0])
