@@ -184,31 +184,32 @@ class FrequencyResponse:
         """
         import control
 
-        return control.FrequencyResponseData(
-            self.response,
-            self.omega,
-            dt=self.dt,
-            inputs=list(self.input_names),
-            outputs=list(self.output_names),
+        inputs, outputs = list(self.input_names), list(self.output_names)
+        frd = control.FrequencyResponseData(
+            self.response, self.omega, dt=self.dt, inputs=inputs, outputs=outputs
         )
+        # control knows no hold, and from_control asks for it
+        frd.hold = self.hold
+        return frd
 
     @classmethod
     def from_control(
         cls, frd: control.FrequencyResponseData, hold: Hold | str | None = None
     ) -> FrequencyResponse:
-        """A response from ``control.FrequencyResponseData``; ValueError for anything else."""
+        """A response from ``control.FrequencyResponseData``; ValueError for anything else.
+
+        Without ``hold`` it is what ``to_control`` has kept; of another that is sampled a zero-order
+        hold at its ``dt``, by which ``control`` samples systems.
+        """
         if not hasattr(frd, "omega") or not hasattr(frd, "frdata"):
             raise InputError(f"frd={type(frd).__name__} is not a control.FrequencyResponseData")
         dt = 0.0 if frd.dt is None or frd.dt is True else float(frd.dt)
+        if hold is None and dt:
+            hold = getattr(frd, "hold", "zoh")
         order = np.argsort(frd.omega)
-        return cls(
-            np.asarray(frd.omega)[order] / (2 * np.pi),
-            np.asarray(frd.frdata)[:, :, order],
-            dt=dt,
-            hold=hold,
-            input_names=frd.input_labels,
-            output_names=frd.output_labels,
-        )
+        omega, response = np.asarray(frd.omega)[order], np.asarray(frd.frdata)[:, :, order]
+        names = {"input_names": frd.input_labels, "output_names": frd.output_labels}
+        return cls(omega / (2 * np.pi), response, dt=dt, hold=hold, **names)
 
     @classmethod
     def from_db(

@@ -148,7 +148,7 @@ def compare(
     if not isinstance(record, Record):
         raise InputError(
             f"record={type(record).__name__} is neither a Record nor a FrequencyResponse; compare "
-            "them one by one"
+            "several one by one, load() a stream"
         )
     fitted, record = met(model, record), in_order_of(as_model(model), record)
     assert isinstance(record, Record)
@@ -173,7 +173,7 @@ def compare(
             )
     percent = 100 * (1 - left / centred)
     shape = (len(residual),) if record.y.ndim == 1 else residual.shape
-    used = record.hold if hold is None or isinstance(hold, str) else hold
+    used = as_hold(hold, record.input_dt, record.hold)
     simulated = (y - residual).reshape(shape)
     return Comparison(record, y, simulated, residual.reshape(shape), percent, used)
 
@@ -193,7 +193,7 @@ def _at_stamps(
     at = record.y_time[0] + record.time
     drawn = np.column_stack([np.interp(at, record.y_time, c) for c in left.T])
     residual = drawn.reshape(record.y.shape)
-    used = record.hold if hold is None or isinstance(hold, str) else hold
+    used = as_hold(hold, record.input_dt, record.hold)
     return Comparison(record, record.outputs, record.y - residual, residual, percent, used)
 
 

@@ -312,6 +312,32 @@ def test_a_response_of_control_is_compared_as_one_of_ours():
     assert own.fit_percent[0] < 95
 
 
+def test_a_sampled_system_of_control_is_one_behind_a_zero_order_hold():
+    """It was taken as measured in continuous time: a fit ended half a sample off."""
+    import control
+
+    plant = fq.first_order(b=50.0, a=20.0)
+    sampled = control.sample_system(plant.to_control(), 0.02, "zoh")
+    frd = control.frequency_response(sampled, np.linspace(1, 150, 60))
+    est = fq.fit(plant, control.FrequencyResponseData(frd.complex, frd.omega, dt=0.02))
+    assert est["a"] == pytest.approx(20, rel=1e-9)
+    assert est["b"] == pytest.approx(50, rel=1e-9)
+
+
+def test_a_response_that_has_been_to_control_remembers_its_hold():
+    record = fq.simulate(fq.first_order(), fq.white_noise(4000), 1e-3)
+    for frf in (fq.etfe(record), fq.etfe(record.decimate(10))):
+        assert fq.FrequencyResponse.from_control(frf.to_control()).hold == frf.hold
+
+
+def test_a_comparison_names_the_hold_that_it_was_made_with():
+    record = fq.simulate(fq.first_order(), fq.white_noise(4000), 1e-3)
+    slow = record.decimate(10)
+    assert fq.compare(fq.first_order(), slow).hold == fq.ZeroOrderHold(1e-3)
+    assert fq.compare(fq.first_order(), slow, hold="foh").hold == fq.FirstOrderHold(1e-2)
+    assert "FirstOrderHold(period=0.01)" in repr(fq.compare(fq.first_order(), slow, hold="foh"))
+
+
 def test_a_notebook_shows_a_comparison_as_a_table():
     two = control.ss([[-5.0]], [[1.0]], [[1.0], [20.0]], [[0.0], [0.0]])
     u = fq.chirp(1, 50, 4, 2e-3)
