@@ -23,7 +23,7 @@ from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
-from freqid.fitting.suspects.late_instead import late_for_a_mode
+from freqid.fitting.suspects.late_instead import late_for_another
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
@@ -218,7 +218,7 @@ class Inquiry:
         turn = turned(self, scene)
         if turn and not outdone(turn[0].number or 0.0, named, scene):
             return turn
-        if not named or (late := late_for_a_mode(self, scene, named[0])):
+        if not named or (late := late_for_another(self, scene, named[0])):
             return late if named else []
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
