@@ -35,7 +35,7 @@ from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, Score, score
 from freqid.fitting.suspects.sentences import sentence, words
-from freqid.fitting.suspects.silence import constant, silent, unheard
+from freqid.fitting.suspects.silence import constant, constant_instead, silent, unheard
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.ticks import late_stamps
 from freqid.fitting.suspects.turned import turned
@@ -199,6 +199,7 @@ class Inquiry:
         if any(f.severity == "serious" for f in leak):
             return leak
         found = [*self._on_suspects(), *leak]
+        found = constant_instead(self, self.scene, self._std, found, self.named) or found
         if any(f.severity == "serious" for f in found):
             return found
         other = [*beyond_noise(self.minimum), *coarse(self.scene, self._std)]
@@ -222,8 +223,7 @@ class Inquiry:
             return late if named else []
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
-        least = evidence(scene, named[0])
-        least *= _WORTH if least > 0 else 1
+        least = (most := evidence(scene, named[0])) * (_WORTH if most > 0 else 1)
         # beside one that is no certainty, what is even less by chance is said as well
         chance = named[0].p_value if named[0].p_value > _SURE else 0.0
         near = [

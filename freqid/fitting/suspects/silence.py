@@ -1,4 +1,4 @@
-"""Whether the input is heard in the output at all."""
+"""Whether the input is heard in the output at all, or a constant is."""
 
 from __future__ import annotations
 
@@ -7,19 +7,29 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
+from freqid.data import DataSet, Record
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.findings import Finding
+from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.offsets import with_offset
 from freqid.fitting.reading import Reading
+from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import eliminate
-from freqid.models import Model
+from freqid.models import GreyBox, Model
 
 # level at which it is, and the part of an output that is but rounding
 _HEARD, _ROUNDING = 1e-3, 1e-16
-# part of an output's power from which on a constant may drown what the input does
-_DROWNS = 0.4
+# part of an output's power from which on a constant may drown what the input does, and of any
+# channel's that is one
+_DROWNS, _CONSTANT = 0.4, 0.1
+# part of what is left that a constant may leave, and of what something else leaves; starts of the
+# fit with it, and the part of a value that its standard error is where nothing tells it
+_BETTER, _AS_GOOD, _STARTS, _VAGUE = 0.5, 1.1, 3, 0.5
 
 
 def silent(scene: Scene, minimum: Minimum, model: Model) -> list[Finding]:
@@ -82,6 +92,58 @@ def constant(scene: Scene, model: Model) -> list[Finding]:
             )
             return [Finding("offset", text, number=float(shares.max()))]
     return []
+
+
+def constant_instead(
+    inquiry: Asking, scene: Scene | None, std: FloatArray, found: Sequence[Finding],
+    named: Sequence[Asked],
+) -> list[Finding]:  # fmt: skip
+    """A finding where a fit in trouble is none with a constant of each output free: sensors whose
+    zero is elsewhere, of inputs too, may drive it so far that no suspect is near.
+
+    A fit is in trouble where what was ``found`` is serious, or a standard error (P,) tells nothing;
+    what is ``named`` must not explain more.
+    """
+    minimum, model = inquiry.minimum, inquiry.model
+    structure = minimum.structure
+    if not plain(structure) or not isinstance(model, GreyBox):
+        return []
+    if minimum.exact or minimum.prior is not None:
+        return []
+    vague = bool((std > _VAGUE * np.abs(minimum.x)).any())
+    serious = [f.kind for f in found if f.severity == "serious"]
+    if not (serious or vague or not minimum.solution.converged) or "offset" in serious[:1]:
+        return []
+    readings = inquiry.readings
+    if any(r.offset for r in readings) or not any(_has_constant(r.data) for r in readings):
+        return []
+    begun = model.with_values(**dict(zip(structure.physical_names, structure.values, strict=False)))
+    try:
+        free = [with_offset(r) for r in readings]
+        best = fitter_of(model)(begun, free, SearchOptions(n_starts=_STARTS)).minimum
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return []
+    told = 0.0 if scene is None else max((a.test.gain for a in named), default=0.0) / scene.cost
+    least = min(_BETTER, _AS_GOOD * (1 - told)) * minimum.cost
+    if not best.solution.converged or best.cost > least:
+        return []
+    energy = max(minimum.objective.energy, 1e-300)
+    before, after = (100 * (1 - np.sqrt(c / energy)) for c in (minimum.cost, best.cost))
+    text = (
+        f"with a constant of each output free {after:.4g} % of the data are explained, not "
+        f"{before:.4g} %: a sensor has its zero elsewhere, of an output or an input; fit with "
+        "offset='estimate', or take off what each shows at rest"
+    )
+    return [Finding("offset", text, number=float(best.cost / energy))]
+
+
+def _has_constant(data: DataSet) -> bool:
+    """Whether any channel of a record is clearly not about zero."""
+    if not isinstance(data, Record):
+        return False
+    every = np.column_stack([data.inputs[: len(data.outputs)], data.outputs])
+    power = np.maximum((every**2).mean(axis=0), 1e-300)
+    return bool((every.mean(axis=0) ** 2 > _CONSTANT * power).any())
 
 
 def unheard(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[Finding]:
