@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -21,14 +22,16 @@ from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.uncertainty.evenness import evenly_spread
 from freqid.fitting.witness import Testimony, groups_of
+from freqid.lti import PeriodicHold
 from freqid.models import GreyBox
 
 # fits with the noise of the one before, how many of them may end on their way, and the part of a
 # standard error that ends them
 _NOISE_ROUNDS, _ROUGH_ROUNDS = 8, 5
 _STANDS = 0.01
-# part of the cost by which another start's end is another minimum
-_DEEPER = 1e-6
+# part of the cost by which another start's end is another minimum, and how often a delay may go on
+# to the next sample
+_DEEPER, _DOORS = 1e-6, 3
 # the same of black boxes, and the lines that these are found on
 _BOX_ROUNDS, _LINES = 3, 3000
 
@@ -94,7 +97,42 @@ def _in_turn(
         # what is noise has changed on the way, and with it perhaps which minimum is the least
         other = fitter_of(model)(model, readings, anew)
         est = other if other.cost < est.cost * (1 - _DEEPER) else est
+    for _ in range(_DOORS):
+        door = _next_door(model, est, readings, options)
+        if door is None:
+            break
+        # its noise is another, if little
+        readings = [_learnt(door, r, options.estimated_hold) for r in readings]
+        est = fitter_of(model)(model, readings, again(door, options))
     return first, est, readings
+
+
+def _next_door(
+    model: object, est: Estimate, readings: Sequence[Reading], options: SearchOptions
+) -> Estimate | None:
+    """A better estimate whose delay ends a sample further or sooner; None where there is none.
+
+    The response to steps of a hold bends where a delay is a whole number of samples, and in noise
+    with memory a walk that begins beyond such a bend does not come back.
+    """
+    if not isinstance(model, GreyBox) or est.message == INTERRUPTED:
+        return None
+    hold, best = readings[0].hold, None
+    if not isinstance(hold, PeriodicHold) or any(r.hold != hold for r in readings):
+        return None
+    for name in dict.fromkeys(str(s) for s in model.delay_sources if s in est.names):
+        cell = np.floor(est[name] / hold.period)
+        for there in (cell - 0.5, cell + 1.5):
+            begun = again(est, options)
+            begun = dataclasses.replace(
+                begun, start={**(begun.start or {}), name: there * hold.period}
+            )
+            with suppress(InputError, np.linalg.LinAlgError, ArithmeticError):
+                found = fitter_of(model)(model, readings, begun)
+                least = est.cost if best is None else best.cost
+                if found.converged and found.cost < least * (1 - _DEEPER):
+                    best = found
+    return best
 
 
 def _stands(est: Estimate, before: Estimate) -> bool:

@@ -1,4 +1,4 @@
-"""Sensors whose zero is elsewhere: a fit that a constant has driven far off says which cure helps."""
+"""Sensors whose zero is elsewhere: a fit that this has driven far off is told which cure helps."""
 
 import numpy as np
 import pytest
