@@ -20,7 +20,7 @@ from freqid.fitting.black_box.refinement import nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.black_box.subspace import inputs_and_cost
 from freqid.fitting.cost.charts import Chart, to_plane
-from freqid.fitting.cost.experiments import thinned_to
+from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.loop_parts import closed_from_parts
 from freqid.fitting.noise_models import MeasuredNoise
@@ -64,7 +64,7 @@ class LoopBox:
         model = first.model
         errors = [errors_of(model, r) for r in readings]
         if all(evenly_spread(e.error) for e in errors):
-            return first
+            return first.on_all()
         weighted = [
             r.with_(noise=MeasuredNoise().learnt(e.error, e.n_samples))
             for r, e in zip(readings, errors, strict=True)
@@ -73,7 +73,15 @@ class LoopBox:
         good = closed if first in closed else tried
         again = [_descended(box.chart.moved(box.found.x), weighted) for box in good]
         known = [box for box in again if box is not None]
-        return _shortest(known if good is closed else known + _least(weighted, orders))
+        best = _shortest(known if good is closed else known + _least(weighted, orders))
+        return best.on_all()
+
+    def on_all(self) -> LoopBox:
+        """The same where its cost on all lines is least: orders are compared on some of them."""
+        every = [r.at_lines().lines(Plane()) for r in self.readings]
+        if sum(e.n_lines for e in every) == sum(e.n_lines for e in thinned_to(every, _LINES)):
+            return self
+        return _ended(self.chart.moved(self.found.x), self.readings, every) or self
 
     @property
     def order(self) -> int:
@@ -174,9 +182,16 @@ def _begun(readings: Sequence[Reading], order: int) -> LoopBox | None:
 
 
 def _descended(chart: Chart, readings: Sequence[Reading]) -> LoopBox | None:
-    """The minimum next to the centre of a chart."""
+    """The minimum next to the centre of a chart, on some of the lines."""
+    return _ended(
+        chart, readings, thinned_to([r.at_lines().lines(Plane()) for r in readings], _LINES)
+    )
+
+
+def _ended(
+    chart: Chart, readings: Sequence[Reading], lines: Sequence[SpectralExperiment]
+) -> LoopBox | None:
     try:
-        lines = thinned_to([r.at_lines().lines(Plane()) for r in readings], _LINES)
         objective = Objective(chart, [e.in_plane(chart.plane) for e in lines])
         found = polish(objective, np.zeros(chart.size), limit=_LIMIT, tolerance=_TOLERANCE)
     except (InputError, np.linalg.LinAlgError):

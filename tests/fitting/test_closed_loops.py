@@ -5,7 +5,10 @@ import pytest
 import scipy.signal
 
 import freqid as fq
+from freqid.fitting.closed_loop import _loop
+from freqid.fitting.cost.objective import Objective
 from freqid.fitting.loop_box import LoopBox
+from freqid.lti import Plane
 
 DT, N, GAIN = 2e-3, 5000, 0.1
 PLANT = fq.two_mass()
@@ -278,3 +281,31 @@ def test_smooth_references_tell_the_plant_through_its_loop(reference, noise, spe
     rms = np.sqrt(np.mean(np.square(z), axis=0))
     assert (rms < (2.3 if seeds < 10 else 1.7)).all(), rms
     assert grades.count("trust") >= 0.8 * seeds, grades
+
+
+def fed_back_lag(seed, n, dt=5e-3, gain=3.0):
+    """A lag (b = 50, a = 20) under feedback, AR(0.95) noise that outweighs a white reference."""
+    rng = np.random.default_rng(seed)
+    r = rng.normal(size=n)
+    e = scipy.signal.lfilter([1], [1, -0.95], rng.normal(size=n))
+    a = np.exp(-20 * dt)
+    x, y, u = 0.0, np.zeros(n), np.zeros(n)
+    for k in range(n):
+        y[k] = x + e[k]
+        u[k] = r[k] - gain * y[k]
+        x = a * x + 50 / 20 * (1 - a) * u[k]
+    return fq.Record(u, y, dt, reference=r)
+
+
+@pytest.mark.parametrize("n", [4000, 16000])
+def test_of_long_records_all_lines_tell_the_loop(n):
+    """Its box ended on 3,000 lines, another place than that of all: of 12 records of 16,000 samples
+    a pole was 33.0 ± 2.3 in the mean where 20 is true, of 16 it is 24.3 ± 2.5, with bars of 8.
+    """
+    box = LoopBox.of([_loop(fed_back_lag(1, n), np.ones(2))], 1, 1)
+    lines = [r.at_lines().lines(Plane()).in_plane(box.chart.plane) for r in box.readings]
+    point = Objective(box.chart, lines).point(box.found.x)
+    J, r = point.jacobian, point.residual
+    # the step that is left, in standard errors of the noise
+    step = np.linalg.lstsq(J, r, rcond=None)[0]
+    assert np.linalg.norm(J @ step) < 0.1 * np.sqrt(point.cost / (2 * n))
