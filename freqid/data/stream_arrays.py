@@ -92,9 +92,18 @@ class _Arrays:
             return at, np.array([stored[i] for i in at]), unit_of(stored.attrs)
 
     def _agreed(self, wanted: Sequence[str], times: Sequence[str], count: int, dt: float) -> None:
-        """ValueError where a time beside the arrays says another sample time than ``dt`` (s)."""
-        for name in _beside(wanted, times):
-            agreed(str(self.path), _leaf(name), partial(self._stamps, name, count), dt)
+        """ValueError where the times beside the arrays say another sample time than ``dt`` (s): of
+        those that differ it says which one to take.
+        """
+        wrong: list[InputError] = []
+        beside = _beside(wanted, times)
+        for name in beside:
+            try:
+                agreed(str(self.path), _leaf(name), partial(self._stamps, name, count), dt)
+            except InputError as error:
+                wrong.append(error)
+        if wrong and len(wrong) == len(beside):
+            raise wrong[0]
 
     def step(self, names: Iterable[str]) -> float | None:
         """The sample time of arrays in s: what their folders say, those around these, or any.

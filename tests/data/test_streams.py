@@ -199,7 +199,9 @@ def test_times_in_other_units_and_conditions(tmp_path):
         stream = fq.open(tmp_path / "ms.parquet")
         assert stream.dt == pytest.approx(DT), name
         assert stream.input_names == ("u",)
-        assert fq.open(tmp_path / "ms.parquet", dt=1.0).dt == 1
+        # as ``read`` does
+        with pytest.raises(ValueError, match=rf"dt=1 s, but the time .* steps by {DT:g} s"):
+            fq.open(tmp_path / "ms.parquet", dt=1.0)
     fq.write(RECORD.with_conditions(q=0.5), tmp_path / "q.parquet")
     stream = fq.open(tmp_path / "q.parquet")
     assert stream.conditions == {"q": 0.5}
