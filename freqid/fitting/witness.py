@@ -32,7 +32,7 @@ from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.search.verdict import RARE, Verdict, Witness
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
-from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, noise_freedom, shared
+from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, chance_of, noise_freedom
 from freqid.lti import tuned
 from freqid.models import observed_order
 
@@ -137,7 +137,7 @@ class Testimony:
         if self.share is not None and structure is self.minimum.structure:
             chance = self.share(structure, grey, boxes, groups_of(structure, readings), readings)
         if chance is None:
-            chance = Chance(shared([(b.objective, b.solution.x) for b in boxes]), top)
+            chance = chance_of([(b.objective, b.solution.x) for b in boxes], top)
         f = excess(structure, readings, boxes, grey) * bottom / top / chance.times
         told = min(bottom / chance.times, noise_freedom([r.data for r in readings]), chance.lines)
         told = max(int(told), 1)

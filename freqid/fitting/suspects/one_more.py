@@ -30,7 +30,7 @@ from freqid.fitting.suspects.lacking_mode import lacking_mode
 from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
 from freqid.fitting.suspects.weighing import LOOSE
-from freqid.fitting.uncertainty.shared_noise import Chance, shared
+from freqid.fitting.uncertainty.shared_noise import chance_of
 from freqid.lti import directions
 from freqid.models import DiscreteModel, GreyBox, observed_order
 
@@ -136,7 +136,7 @@ class _Comparison:
         if inquiry.share is not None and isinstance(structure, GreyStructure):
             chance = inquiry.share(structure, grey, [box], [group], weighted)
         if chance is None:
-            chance = Chance(shared([(box.objective, box.solution.x)]), degrees)
+            chance = chance_of([(box.objective, box.solution.x)], degrees)
         below = int(min(freedom / chance.times, scene.noise_freedom, chance.lines))
         told_by = [
             (min(float(scipy.stats.f.sf(f, chance.degrees, below)) * trials, 1.0), f, more)

@@ -23,7 +23,9 @@ from freqid.fitting.suspects.weighing import LOOSE, Weighing
 from freqid.fitting.uncertainty.evenness import (
     alike,
     channel_power,
+    err_together,
     is_white,
+    line_scores,
     may_be_tied,
     tied,
     together,
@@ -191,15 +193,21 @@ class Scene:
         entries of responses share their lines' noise, or inputs have errors.
         """
         experiments, q = [s.experiment for s in self.seen], len(ways[0])
-        if self.share is None and not any(may_be_tied(e) for e in experiments):
+        left = self.parted(rows)
+        joint = any(err_together(r, e) for r, e in zip(left, experiments, strict=True))
+        if self.share is None and not joint and not any(may_be_tied(e) for e in experiments):
             return Chance(1.0, q)
-        known, left = self.parted(self.variance_of(rows)), self.parted(rows)
+        known = self.parted(self.variance_of(rows))
         alone = sum(np.sum(V**2 * v, axis=1) for V, v in zip(ways, known, strict=True))
         if self.share is not None:
             found = self.share.along(experiments, ways, left)
             size = np.sqrt(np.maximum(alone, 1e-300))[:, None]
             return Chance(1.0, q) if found is None else Chance.of(found / size)
         share, every = len(rows) / max(self.freedom, 1), float(np.sum(alone))
+        if joint:
+            each = zip(left, ways, experiments, strict=True)
+            scores = np.concatenate([line_scores(r, V, e) for r, V, e in each], axis=1)
+            return Chance.of(scores * np.sqrt(share / np.maximum(alone, 1e-300))[:, None])
         plain = [float(np.sum(V**2 * v)) for V, v in zip(ways, known, strict=True)]
         shared = sum(
             tied(r, V, e) * share if may_be_tied(e) else one

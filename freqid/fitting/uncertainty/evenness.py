@@ -12,6 +12,8 @@ from freqid.fitting.cost.experiments import SpectralExperiment
 
 # level below which power that is spread unevenly is no chance
 _LEVEL = 0.01
+# the same below which outputs share their noise
+_SHARED = 1e-4
 
 
 def channel_power(residual: FloatArray, e: SpectralExperiment) -> tuple[FloatArray, FloatArray]:
@@ -86,6 +88,27 @@ def tied(rows: FloatArray, ways: FloatArray, e: SpectralExperiment) -> float:
     """
     each = (ways.view(complex).conj() * rows.view(complex)).reshape(len(ways), -1, e.n_lines)
     return float(np.sum(np.abs(each.sum(axis=1)) ** 2)) / 2
+
+
+def err_together(rows: FloatArray, e: SpectralExperiment) -> bool:
+    """Whether the outputs of a record share noise: phases between what is left of two of them would
+    be any, were they strangers, and their mean over K lines is a complex normal number's then.
+    """
+    each = rows.view(complex).reshape(-1, e.n_lines)
+    if e.response or len(each) < 2:
+        return False
+    unit = each / np.where(np.abs(each) > 0, np.abs(each), np.inf)
+    between = np.abs(unit @ unit.conj().T) ** 2 / e.n_lines
+    largest = float(between[np.triu_indices(len(each), 1)].max())
+    return bool(np.exp(-largest) < _SHARED)
+
+
+def line_scores(rows: FloatArray, ways: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """What ``ways`` (q, rows) tell of rows (rows,) at each line, (q, 2 lines): its outputs' noise
+    together, of which the phase is any.
+    """
+    each = (ways.view(complex).conj() * rows.view(complex)).reshape(len(ways), -1, e.n_lines)
+    return np.ascontiguousarray(each.sum(axis=1)).view(float) / np.sqrt(2)
 
 
 def together(parts: Sequence[tuple[FloatArray, SpectralExperiment]]) -> float:

@@ -14,7 +14,7 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
-from freqid.fitting.uncertainty.noise_spectrum import local_mean, local_power, smoothed_power
+from freqid.fitting.uncertainty.noise_spectrum import local_mean, of_outputs, smoothed_power
 from freqid.lti import Realisation, tuned
 
 # means for each unknown from which they tell their own noise
@@ -72,7 +72,7 @@ def score_covariance(
             total += _of_response(J, left, size, e.reach, e.line_noise)
         else:
             left = left / np.sqrt(1 - leverage(J, Q))
-            total += (J * local_power(left, e)) @ J.T
+            total += of_outputs(J, left, e)
         rows += e.n_rows
         unknown += 0 if delta is None else len(delta)
     for log in stamped:

@@ -7,7 +7,7 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.fitting.uncertainty.evenness import evenly_spread
+from freqid.fitting.uncertainty.evenness import err_together, evenly_spread
 
 # median step of the logarithm of variances from line to line above which they are those of a few
 # averages (of ten 0.3), and by how much one is above its neighbours that is none of theirs
@@ -153,3 +153,19 @@ def local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
     # half of a complex error's power is in each of its parts
     power: FloatArray = np.repeat(local.ravel() / 2, 2)
     return power
+
+
+def of_outputs(J: FloatArray, left: FloatArray, e: SpectralExperiment) -> FloatArray:
+    """J C Jᵀ (P, P), what the noise of a record's outputs makes of the gradient of rows J (P, rows)
+    that leave these (rows,): each output's own colour, and where they share noise what they share.
+    """
+    power = local_power(left, e)
+    if not err_together(left, e):
+        return (J * power) @ J.T
+    size = np.sqrt(power)
+    each = (J * size).view(complex).reshape(len(J), -1, e.n_lines)
+    unit = (left / np.where(size > 0, size, np.inf)).view(complex).reshape(-1, e.n_lines)
+    between = unit @ unit.conj().T
+    own = np.sqrt(np.diag(between).real)
+    between /= np.where(own > 0, np.outer(own, own), 1)
+    return np.einsum("aik,ij,bjk->ab", each.conj(), between, each, optimize=True).real

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import scipy
 
 from freqid.checks import FloatArray
 from freqid.data import PeriodicResponse
@@ -14,7 +15,13 @@ from freqid.fitting.cost.evaluation import projected
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
-from freqid.fitting.uncertainty.evenness import may_be_tied, tied, together
+from freqid.fitting.uncertainty.evenness import (
+    err_together,
+    line_scores,
+    may_be_tied,
+    tied,
+    together,
+)
 from freqid.lti import directions
 
 # directions of unknowns below this part of the largest are none
@@ -46,6 +53,46 @@ class Chance:
         # of Gaussian values the fourth powers are three times the squares of the variances
         told = 3 * total**2 / float(each @ each)
         return cls(max(total / len(scores), 1.0), total**2 / float(variances @ variances), told)
+
+
+def chance_of(boxes: Sequence[tuple[Objective, FloatArray]], degrees: float) -> Chance:
+    """What chance explains on so many ``degrees`` of freedom of black boxes, each an objective and
+    its unknowns: of lines that share noise, and of outputs that do.
+    """
+    plain, scores = Chance(shared(boxes), degrees), [_along_outputs(*box) for box in boxes]
+    if all(told is None for told, _ in scores):
+        return plain
+    every = scipy.linalg.block_diag(*(alone if told is None else told for told, alone in scores))
+    own = Chance.of(every)
+    part = min(own.degrees / len(every), 1.0)
+    return Chance(max(plain.times, own.times), part * degrees, own.lines)
+
+
+def _along_outputs(objective: Objective, x: FloatArray) -> tuple[FloatArray | None, FloatArray]:
+    """What noise tells along all directions of a black box at its minimum, at each line, in units
+    of it, where outputs share it, and else None; and the same as if each had its own.
+    """
+    experiments = [e for e in objective.experiments if isinstance(e, SpectralExperiment)]
+    if len(experiments) < len(objective.experiments) or not any(
+        e.n_channels[0] > 1 for e in experiments
+    ):
+        return None, np.eye(len(x))
+    realisation, left, slopes = objective.structure.realise(x), [], []
+    for e in experiments:
+        evaluation = e.at(realisation)
+        rows, Q, delta = projected(evaluation)
+        J = evaluation.jacobian(delta)
+        left.append(rows)
+        slopes.append(J - (J @ Q.T) @ Q)
+    ways = directions(np.concatenate(slopes, axis=1), _LOOSE)[2]
+    if not any(err_together(rows, e) for rows, e in zip(left, experiments, strict=True)):
+        return None, np.eye(len(ways))
+    count, square = sum(map(len, left)), sum(float(rows @ rows) for rows in left)
+    size = np.sqrt(square / max(count - len(ways), 1))
+    ends = np.cumsum([len(rows) for rows in left])[:-1]
+    parts = zip(left, np.split(ways, ends, axis=1), experiments, strict=True)
+    told = [line_scores(rows, np.ascontiguousarray(own), e) for rows, own, e in parts]
+    return np.concatenate(told, axis=1) / size, np.eye(len(ways))
 
 
 class InputNoise(Protocol):
