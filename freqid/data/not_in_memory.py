@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from html import escape
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from freqid.data.record import Record
 
@@ -11,7 +11,7 @@ from freqid.data.record import Record
 class NotInMemory:
     """A stream where a record is expected: it names ``load``, and shows itself in a notebook."""
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> NoReturn:
         kind = type(self).__name__
         if not name.startswith("_") and (hasattr(Record, name) or name in Record.__annotations__):
             raise AttributeError(
