@@ -24,7 +24,7 @@ FED_BACK = (
     "the noise comes back through a loop, or the input was measured with noise; it was not used"
 )
 # what an input that answers to the noise at once looks like
-_ALIKE = frozenset({"feedback", "delay", "feedthrough", "hold rejected"})
+_ALIKE = frozenset({"feedback", "delay", "lag", "feedthrough", "hold rejected", "high-pass"})
 # standard errors that it may have moved a parameter by: going through the reference costs as much
 _HARMLESS = 0.7
 

@@ -219,7 +219,7 @@ class Inquiry:
         turn = turned(self, scene)
         if turn and not outdone(turn[0].number or 0.0, named, scene):
             return turn
-        if not named or (late := late_for_another(self, scene, named[0])):
+        if not named or (late := late_for_another(self, scene, named)):
             return late if named else []
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]

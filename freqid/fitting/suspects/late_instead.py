@@ -17,6 +17,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.filters import filter_instead
 from freqid.fitting.suspects.order import LACKING
 from freqid.fitting.suspects.refits import held
 from freqid.fitting.suspects.scene import Scene
@@ -33,29 +34,47 @@ _TRIED, _AS_GOOD = 2, 1.1
 _ROWS, _EARLY, _CLEAR = (-1, -2), ("hold rejected", "feedthrough", "feedback"), 12.0
 
 
-def late_for_another(inquiry: Asking, scene: Scene, first: Asked) -> list[Finding]:
-    """A finding where a delay of whole samples leaves no more than what was to be said ``first``,
-    that a mode or the structure lacks something, or than what has the output answer at once.
+def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
+    """A finding where a delay of whole samples leaves no more than what was ``named`` first,
+    that a mode or the structure lacks something, or than what has the output answer at once; and
+    where a filter leaves less than a delay or a hold.
     """
-    structure, model = inquiry.minimum.structure, inquiry.model
-    if first.name not in (*LACKING, *_EARLY) or not isinstance(model, GreyBox):
+    structure, model, first = inquiry.minimum.structure, inquiry.model, named[0]
+    delay = first.name == "delay" and first.test.size > 0 and not model.late
+    if (not delay and first.name not in (*LACKING, *_EARLY)) or not isinstance(model, GreyBox):
         return []
     if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
         return []
-    if first.name in LACKING and scene.cost < _MUCH * scene.energy:
-        return []
-    # what one unknown explains as well is simpler
-    left = _AS_GOOD * (scene.cost - first.test.gain) / max(scene.energy, 1e-300)
+    start = dict(zip(structure.physical_names, structure.values, strict=False))
+    begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
+    energy = max(scene.energy, 1e-300)
+    left, rest = ((scene.cost - gain) / energy for gain in (first.test.gain, _most(named)))
+    clearly = float(np.exp(-_CLEAR / scene.freedom))
+    if delay:
+        # beside what leaves even less a filter is not all
+        left = min(clearly * left, _AS_GOOD * rest)
+        return filter_instead(inquiry, scene, begun, first.test.size, left)
     if first.name == "hold rejected":
         # a score says how far, not whether there is such a hold
         hold = held(inquiry.minimum, inquiry.readings)
-        left = min(left, np.inf if hold is None else hold.cost / max(scene.energy, 1e-300))
-        left *= np.exp(-_CLEAR / scene.freedom)
-    start = dict(zip(structure.physical_names, structure.values, strict=False))
-    asked = inquiry, model.with_values(**start), SearchOptions(n_starts=_STARTS), left
-    found = None if first.name in _EARLY else late_instead(*asked)
-    found = found or early_instead(*asked)
+        left = clearly * min(_AS_GOOD * left, np.inf if hold is None else hold.cost / energy)
+    elif first.name == "feedthrough":
+        # one unknown explains as much, but by chance
+        left /= clearly
+    else:
+        # what one unknown explains as well is simpler
+        left *= _AS_GOOD
+    found = None
+    if first.name in _EARLY or scene.cost >= _MUCH * scene.energy:
+        late = None if first.name in _EARLY else late_instead(inquiry, begun, options, left)
+        found = late or early_instead(inquiry, begun, options, left)
+    if found is None and any(a.name == "hold rejected" for a in named):
+        return filter_instead(inquiry, scene, begun, 0.0, left)
     return [] if found is None else [found]
+
+
+def _most(named: Sequence[Asked]) -> float:
+    return max(a.test.gain for a in named)
 
 
 def late_instead(

@@ -15,6 +15,7 @@ from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.offsets import with_offset
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.order import BENT
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
@@ -113,6 +114,9 @@ def constant_instead(
     vague = bool((std > _VAGUE * np.abs(minimum.x)).any())
     serious = [f.kind for f in found if f.severity == "serious"]
     if not (serious or vague or not minimum.solution.converged) or "offset" in serious[:1]:
+        return []
+    if any(a.name in BENT for a in named[:1]):
+        # about a level that is not zero what bends is a constant beside a gain
         return []
     readings = inquiry.readings
     if any(r.offset for r in readings) or not any(_has_constant(r.data) for r in readings):
