@@ -40,8 +40,11 @@ if TYPE_CHECKING:
 _UNEVEN = 100.0
 # what an output that is not met may look like: what is added to one would be taken for its noise
 _LIKENESSES = {
-    "nonlinear", "friction", "spikes", "jump", "delay", "feedthrough", "hold rejected",
+    "nonlinear", "friction", "spikes", "jump", "delay", "lag", "feedthrough", "hold rejected",
+    "high-pass",
 }  # fmt: skip
+# the suspects that have led to what is said under another name
+_LED = {"hold rejected": HOLDS, "high-pass": HOLDS, "lag": ("delay",)}
 # chance below which a suspect has not gone
 _HINT = 0.05
 # rounds in which the noise is learnt, and evaluations of each
@@ -111,9 +114,7 @@ class EvenInquiry:
         """Whether one of those that spoke is hardly chance where all outputs are met: what bends
         may be taken for noise.
         """
-        named = {
-            name for kind in serious for name in (HOLDS if kind == "hold rejected" else (kind,))
-        }
+        named = {name for kind in serious for name in _LED.get(kind, (kind,))}
         return any(a.name in named and a.p_value < _HINT for a in other.asked)
 
     @cached_property
