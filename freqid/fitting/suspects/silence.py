@@ -14,6 +14,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.offsets import with_offset
 from freqid.fitting.reading import Reading
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.order import BENT
 from freqid.fitting.suspects.refits import plain
@@ -109,7 +110,7 @@ def constant_instead(
     structure = minimum.structure
     if not plain(structure) or not isinstance(model, GreyBox):
         return []
-    if minimum.exact or minimum.prior is not None:
+    if minimum.exact or minimum.prior is not None or minimum.solution.message == INTERRUPTED:
         return []
     vague = bool((std > _VAGUE * np.abs(minimum.x)).any())
     serious = [f.kind for f in found if f.severity == "serious"]
