@@ -32,6 +32,8 @@ _STANDS = 0.01
 # part of the cost by which another start's end is another minimum, and how often a delay may go on
 # to the next sample
 _DEEPER, _DOORS = 1e-6, 3
+# part of a sample that is none
+_BENT = 1e-3
 # the same of black boxes, and the lines that these are found on
 _BOX_ROUNDS, _LINES = 3, 3000
 
@@ -122,7 +124,9 @@ def _next_door(
         return None
     for name in dict.fromkeys(str(s) for s in model.delay_sources if s in est.names):
         cell = np.floor(est[name] / hold.period)
-        for there in (cell - 0.5, cell + 1.5):
+        # at a bend, or at a bound that is one, a walk has not been inside of its own sample
+        bent = abs(est[name] / hold.period - round(est[name] / hold.period)) < _BENT
+        for there in (cell - 0.5, cell + 1.5, *([cell + 0.5] if bent else [])):
             begun = again(est, options)
             begun = dataclasses.replace(
                 begun, start={**(begun.start or {}), name: there * hold.period}

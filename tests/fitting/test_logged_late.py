@@ -59,3 +59,21 @@ def test_straight_lines_between_the_samples_are_still_a_hold(plant):
     record = fq.simulate(plant, u, DT, hold="foh").with_noise(0.002, seed=4)
     est = fq.fit(plant, fq.Record(record.u, record.y, DT), hold="zoh")
     assert est.warnings[0].kind == "hold rejected"
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("rows", [2, 1])
+def test_of_two_inputs_the_one_that_is_logged_late_is_named(rows):
+    two = fq.GreyBox(
+        lambda T, g, h: ([[-1 / T]], [[g / T, h / T]], [[1.0]], None),
+        [fq.Parameter("T", 0.2), fq.Parameter("g", 1.0), fq.Parameter("h", 2.0)],
+        inputs=["valve", "heater"],
+    )
+    u = np.random.default_rng(5).standard_normal((2000, 2))
+    record = fq.simulate(two, u, DT).with_noise(0.005, seed=5)
+    late = u.copy()
+    late[rows:, 0], late[:rows, 0] = u[:-rows, 0], 0
+    est = fq.fit(two, fq.Record(late, record.y, DT, input_names=["valve", "heater"]))
+    assert est.warnings[0].kind == "delay", est.warnings
+    assert "input 'valve' acts" in est.warnings[0]
+    assert f"logged {rows} sample" in est.warnings[0]

@@ -4,6 +4,7 @@ are one mode more, and an input that is logged a sample late is a hold that look
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,6 +19,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.filters import filter_instead
+from freqid.fitting.suspects.late_inputs import called
 from freqid.fitting.suspects.order import LACKING
 from freqid.fitting.suspects.refits import held
 from freqid.fitting.suspects.scene import Scene
@@ -87,10 +89,11 @@ def late_instead(
     if record is None:
         return None
     lags = likely_lags(record, len(begun.state_space().A), 1, farthest(record.n_samples))
-    best = _best(inquiry, begun, options, left, lags[:_TRIED])
+    every = (1,) * begun.n_inputs
+    best = _best(inquiry, begun, options, left, [every], lags[:_TRIED])
     if best is None:
         return None
-    share, lag = best
+    share, lag, _ = best
     text = (
         f"{words('delay', lag * record.dt, 's', 'the input')}, to a sample or two: {_so(share)}; "
         f"{CURES['delay']}"
@@ -101,19 +104,23 @@ def late_instead(
 def early_instead(
     inquiry: Asking, begun: GreyBox, options: SearchOptions, left: float
 ) -> Finding | None:
-    """The same where outputs answer to inputs that the record has some samples later."""
+    """The same where outputs answer to inputs, all or one of them, that the record has later."""
     record = _in_step(inquiry, begun)
     if record is None:
         return None
     lags = likely_lags(record, len(begun.state_space().A), -farthest(record.n_samples), 0)
     near = [lags[0] + step for step in (-1, 0, 1)] if lags else []
-    best = _best(inquiry, begun, options, left, sorted(q for q in {*_ROWS, *near} if q < 0))
+    lags = sorted((q for q in {*_ROWS, *near} if q < 0), reverse=True)
+    m = begun.n_inputs
+    ways = [(1,) * m, *(tuple(int(i == k) for i in range(m)) for k in range(m if m > 1 else 0))]
+    best = _best(inquiry, begun, options, left, ways, lags)
     if best is None:
         return None
-    share, lag = best
+    share, lag, way = best
     rows = f"{-lag} sample{'s' if lag < -1 else ''}"
+    which = called(None if all(way) else way.index(1), inquiry.readings) if m > 1 else "the input"
     text = (
-        f"{words('delay', lag * record.dt, 's', 'the input')}, as where its channel is logged "
+        f"{words('delay', lag * record.dt, 's', which)}, as where its channel is logged "
         f"{rows} late: {_so(share)}; move that channel up by {rows}, or give the model an "
         "input_delay that may be negative, by lower= and physical="
     )
@@ -136,17 +143,24 @@ def _in_step(inquiry: Asking, begun: GreyBox) -> Record | None:
 
 
 def _best(
-    inquiry: Asking, begun: GreyBox, options: SearchOptions, left: float, lags: Sequence[int]
-) -> tuple[float, int] | None:
-    """The part of the data's energy that the best of these lags leaves, below ``left``, and it."""
-    best: tuple[float, int] | None = None
-    for lag in lags:
+    inquiry: Asking,
+    begun: GreyBox,
+    options: SearchOptions,
+    left: float,
+    ways: Sequence[tuple[int, ...]],
+    lags: Sequence[int],
+) -> tuple[float, int, tuple[int, ...]] | None:
+    """The part of the data's energy that the best of these lags leaves, below ``left``, and it, and
+    of the ``ways``, which inputs have it (1) and which do not, the one.
+    """
+    best: tuple[float, int, tuple[int, ...]] | None = None
+    for way, lag in itertools.product(ways, lags):
         try:
-            moved = [in_step(r, (lag,) * begun.n_inputs) for r in inquiry.readings]
+            moved = [in_step(r, [lag * one for one in way]) for r in inquiry.readings]
             minimum = fitter_of(begun)(begun, moved, options).minimum
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             continue
         share = float(minimum.cost / max(minimum.objective.energy, 1e-300))
         if share < left and (best is None or share < best[0]):
-            best = share, lag
+            best = share, lag, way
     return best
