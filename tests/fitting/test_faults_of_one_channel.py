@@ -133,7 +133,7 @@ def test_the_witness_counts_the_output_that_outweighs_the_others(unit):
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("side", ["outputs 'angle' and 'speed'", "inputs 'force 1' and 'force 2'"])
+@pytest.mark.parametrize("side", ["inputs 'force 1' and 'force 2'", "outputs 'angle' and 'speed'"])
 def test_two_channels_exchanged_are_named(side):
     """They were another mode, and a doubt only, with parameters 84 to 89 % off."""
     u, y = measured(1)
