@@ -26,6 +26,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution
+from freqid.fitting.uncertainty.at_rest import score_at_rest
 from freqid.fitting.uncertainty.gradient_noise import leverage
 from freqid.fitting.uncertainty.shared_noise import Chance
 from freqid.lti import Plane, Realisation
@@ -72,9 +73,12 @@ class _Stage:
     scale: FloatArray
 
     @classmethod
-    def of(cls, e: SpectralExperiment, evaluation: object, duration: float) -> _Stage:
+    def of(
+        cls, e: SpectralExperiment, evaluation: object, duration: float, moving: bool = True
+    ) -> _Stage:
         r, Q, delta = projected(evaluation)  # type: ignore[arg-type]
-        J = evaluation.jacobian(delta)  # type: ignore[attr-defined]
+        started = delta if moving or delta is None else np.zeros_like(delta)
+        J = evaluation.jacobian(started)  # type: ignore[attr-defined]
         J = np.ascontiguousarray(J - (J @ Q.T) @ Q)
         # few lines that tell a parameter leave less than their noise
         return cls.along(e, J, r / np.sqrt(1 - leverage(J, Q)), duration)
@@ -103,13 +107,17 @@ class _Fitted:
     response: ComplexArray
 
     @classmethod
-    def of(cls, e: Experiment, at: Realisation, model: Model, reading: Reading) -> _Fitted | None:
-        """None where the data are no lines of a record."""
+    def of(
+        cls, e: Experiment, at: Realisation, model: Model, reading: Reading, moving: bool = True
+    ) -> _Fitted | None:
+        """None where the data are no lines of a record; ``moving`` counts what the free motion from
+        its start tells of the plant.
+        """
         record = reading.data
         if not isinstance(e, SpectralExperiment) or not isinstance(record, Record):
             return None
         G = model.responses_at(e.lines.omega, None if model.dt else reading.hold)
-        return cls(_Stage.of(e, e.at(at), record.n_samples * record.dt), G)
+        return cls(_Stage.of(e, e.at(at), record.n_samples * record.dt, moving), G)
 
 
 def loop_scores(
@@ -120,13 +128,18 @@ def loop_scores(
     """
     minimum = est.minimum
     plant = minimum.structure.realise(minimum.x)
-    fitted = [
-        _Fitted.of(e, plant, met_by(est, r), r)
-        for e, r in zip(minimum.experiments, readings, strict=True)
-    ]
+    fitted, still = (
+        [
+            _Fitted.of(e, plant, met_by(est, r), r, moving)
+            for e, r in zip(minimum.experiments, readings, strict=True)
+        ]
+        for moving in (True, False)
+    )
     found = _scores(dict(enumerate(fitted)), loops)
     share = LoopShare(loops, [f.response for f in fitted if f is not None])
-    return None if found is None else found[0] @ found[0].T, share
+    if found is None:
+        return None, share
+    return score_at_rest(found, _scores(dict(enumerate(still)), loops)), share
 
 
 @dataclass(frozen=True, eq=False)

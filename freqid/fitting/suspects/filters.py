@@ -23,6 +23,8 @@ from freqid.models import GreyBox, Parameter
 # the filter's own unknown, a time in s; times of a lag, in those of the delay that it looks like,
 # and of a high-pass, in the period of the slowest line
 _NAME, _TIMES, _SLOW = "time of a filter", (1.0, 0.3), (1.0, 10.0)
+# how far below the slowest line a high-pass may lie
+_SEEN = 2.0
 
 
 @dataclass(frozen=True)
@@ -88,13 +90,13 @@ def filter_instead(
     """
     names = inquiry.readings[0].data.output_names
     each = range(len(names)) if len(names) > 1 else range(0)
+    slowest = min(float(s.omega_input[s.omega_input > 0].min()) for s in scene.seen)
     if seconds > 0:
         # of one output a lag before it is one behind the input
         filters = [_Filter(), _Filter(2), *(_Filter(output=i) for i in each)]
         times = [seconds * part for part in _TIMES]
     else:
         filters = [_Filter(high=True, output=i) for i in range(len(names))]
-        slowest = min(float(s.omega_input[s.omega_input > 0].min()) for s in scene.seen)
         times = [2 * np.pi / slowest * part for part in _SLOW]
     best: tuple[float, float, _Filter] | None = None
     for one in filters:
@@ -109,6 +111,9 @@ def filter_instead(
             except (InputError, np.linalg.LinAlgError, ArithmeticError):
                 continue
             share = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
+            if one.high and slowest * est[_NAME] > _SEEN:
+                # it passes all that there is
+                continue
             if share < left and (best is None or share < best[0]):
                 best = share, est[_NAME], one
     if best is None:

@@ -27,8 +27,9 @@ from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import CURES, words
 from freqid.models import GreyBox
 
-# starts of a fit to data that are moved, and part of the data's energy that is worth one
-_STARTS, _MUCH = 3, 0.01
+# starts of a fit to data that are moved, part of the data's energy that is worth one, and standard
+# errors by which what was to be said moves no parameter
+_STARTS, _MUCH, _SMALL = 3, 0.01, 0.3
 # lags of the first record that are tried, and what one may leave beside what a mode does
 _TRIED, _AS_GOOD = 2, 1.1
 # samples by which a channel may be logged late that are tried anyway, what looks like that, and the
@@ -47,36 +48,43 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
         return []
     if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
         return []
+    if first.test.largest_shift < _SMALL:
+        return []
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
     energy = max(scene.energy, 1e-300)
-    left, rest = ((scene.cost - gain) / energy for gain in (first.test.gain, _most(named)))
+    left = (scene.cost - first.test.gain) / energy
+    # beside what leaves even less a filter is not all; what is fitted again counts as that
+    gains = [a.test.gain for a in named if a.name not in ("delay", "hold rejected")]
+    rest = (scene.cost - max(gains, default=0.0)) / energy
     clearly = float(np.exp(-_CLEAR / scene.freedom))
     if delay:
-        # beside what leaves even less a filter is not all
         left = min(clearly * left, _AS_GOOD * rest)
         return filter_instead(inquiry, scene, begun, first.test.size, left)
-    if first.name == "hold rejected":
+    held_left = np.inf
+    if any(a.name == "hold rejected" for a in named):
         # a score says how far, not whether there is such a hold
         hold = held(inquiry.minimum, inquiry.readings)
-        left = clearly * min(_AS_GOOD * left, np.inf if hold is None else hold.cost / energy)
+        held_left = scene.cost / energy if hold is None else hold.cost / energy
+    if first.name == "hold rejected":
+        left = clearly * min(_AS_GOOD * left, held_left)
     elif first.name == "feedthrough":
         # one unknown explains as much, but by chance
         left /= clearly
     else:
         # what one unknown explains as well is simpler
         left *= _AS_GOOD
+    # and more than the model itself
+    left = min(left, clearly * scene.cost / energy)
     found = None
     if first.name in _EARLY or scene.cost >= _MUCH * scene.energy:
         late = None if first.name in _EARLY else late_instead(inquiry, begun, options, left)
         found = late or early_instead(inquiry, begun, options, left)
-    if found is None and any(a.name == "hold rejected" for a in named):
+    if found is None and np.isfinite(held_left):
+        # one that passes nearly all is a slow motion more, which noise has, too
+        left = min(clearly**2 * held_left, _AS_GOOD * rest)
         return filter_instead(inquiry, scene, begun, 0.0, left)
     return [] if found is None else [found]
-
-
-def _most(named: Sequence[Asked]) -> float:
-    return max(a.test.gain for a in named)
 
 
 def late_instead(

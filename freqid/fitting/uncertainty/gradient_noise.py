@@ -159,10 +159,10 @@ def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
         at += n
     if not (np.isfinite(one).all() and np.isfinite(some).all()):
         return None
-    return _larger(one, some, J @ J.T)
+    return larger(one, some, J @ J.T)
 
 
-def _larger(one: FloatArray, other: FloatArray, H: FloatArray) -> FloatArray:
+def larger(one: FloatArray, other: FloatArray, H: FloatArray) -> FloatArray:
     """The least matrix that is no less than either of two (P, P), in coordinates where H is one."""
     unit = np.sqrt(np.maximum(np.diag(H), 1e-300))
     sizes, ways = np.linalg.eigh(H / unit / unit[:, None])
