@@ -55,3 +55,16 @@ def test_a_sample_time_that_the_times_contradict_is_refused(tmp_path, kind):
     with pytest.raises(ValueError, match=r"dt=1 s, but the time 'time'.*steps by 0.0005 s"):
         fq.open(path, inputs="u", outputs="y", dt=1.0)
     assert fq.open(path, inputs="u", outputs="y", dt=0.5e-3).dt == 0.5e-3
+
+
+def test_beside_a_gap_a_sample_time_may_be_told(tmp_path):
+    """Without one it is refused, and that told to give one, which was refused by the mean step."""
+    pytest.importorskip("pyarrow")
+    path = tmp_path / "gap.parquet"
+    time = RECORD.time + np.where(np.arange(4000) < 1500, 0, 0.8)
+    pd.DataFrame({"time": time, "u": RECORD.u, "y": RECORD.y}).to_parquet(path)
+    with pytest.raises(ValueError, match="is not even"):
+        fq.open(path, inputs="u", outputs="y")
+    assert fq.open(path, inputs="u", outputs="y", dt=0.5e-3).dt == 0.5e-3
+    with pytest.raises(ValueError, match="dt=1 s"):
+        fq.open(path, inputs="u", outputs="y", dt=1.0)

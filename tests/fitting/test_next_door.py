@@ -1,5 +1,7 @@
 """Delays in noise with memory: the response bends at whole samples, beyond which a walk stays."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -60,3 +62,14 @@ def test_delays_in_noise_with_memory_end_in_the_right_sample(first):
         )
         # the noise is not known to it, which costs a little of each parameter
         assert 2 * (own.cost - best.cost) / variance < 3.5, seed
+
+
+@pytest.mark.parametrize("bounds", [(8.0, 9.0), (7.0, 9.0)])
+def test_a_bound_at_a_whole_sample_keeps_no_delay_there(bounds):
+    """With its neighbours out of bounds it stayed at 8.000, at the edge of its bound."""
+    low, high = bounds
+    delay = fq.Parameter("Td", 8.5, lower=low, upper=high)
+    plant = dataclasses.replace(TANK, parameters=[*TANK.parameters[:2], delay])
+    est = fq.fit(plant, record_of(0), weights="noise")
+    assert est["Td"] == pytest.approx(8.3, abs=4 * est.parameters["std"]["Td"])
+    assert "edge of a bound" not in [w.kind for w in est.warnings]

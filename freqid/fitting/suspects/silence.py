@@ -146,9 +146,10 @@ def _has_constant(data: DataSet) -> bool:
     """Whether any channel of a record is clearly not about zero."""
     if not isinstance(data, Record):
         return False
-    every = np.column_stack([data.inputs[: len(data.outputs)], data.outputs])
-    power = np.maximum((every**2).mean(axis=0), 1e-300)
-    return bool((every.mean(axis=0) ** 2 > _CONSTANT * power).any())
+    return any(
+        (x.mean(axis=0) ** 2 > _CONSTANT * np.maximum((x**2).mean(axis=0), 1e-300)).any()
+        for x in (data.inputs, data.outputs)
+    )
 
 
 def unheard(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list[Finding]:

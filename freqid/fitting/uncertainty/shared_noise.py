@@ -77,7 +77,22 @@ def _along_outputs(objective: Objective, x: FloatArray) -> tuple[FloatArray | No
         e.n_channels[0] > 1 for e in experiments
     ):
         return None, np.eye(len(x))
-    realisation, left, slopes = objective.structure.realise(x), [], []
+    left, ways, variance = _along(objective, x, experiments)
+    alone = np.eye(len(ways[0]))
+    if not any(err_together(rows, e) for rows, e in zip(left, experiments, strict=True)):
+        return None, alone
+    told = [line_scores(r, own, e) for r, own, e in zip(left, ways, experiments, strict=True)]
+    return np.concatenate(told, axis=1) / np.sqrt(variance), alone
+
+
+def _along(
+    objective: Objective, x: FloatArray, experiments: Sequence[SpectralExperiment]
+) -> tuple[list[FloatArray], list[FloatArray], float]:
+    """What is left of each experiment (rows,), the directions of all unknowns there (q, rows), and
+    the variance of a value.
+    """
+    realisation = objective.structure.realise(x)
+    left, slopes = [], []
     for e in experiments:
         evaluation = e.at(realisation)
         rows, Q, delta = projected(evaluation)
@@ -85,14 +100,11 @@ def _along_outputs(objective: Objective, x: FloatArray) -> tuple[FloatArray | No
         left.append(rows)
         slopes.append(J - (J @ Q.T) @ Q)
     ways = directions(np.concatenate(slopes, axis=1), _LOOSE)[2]
-    if not any(err_together(rows, e) for rows, e in zip(left, experiments, strict=True)):
-        return None, np.eye(len(ways))
-    count, square = sum(map(len, left)), sum(float(rows @ rows) for rows in left)
-    size = np.sqrt(square / max(count - len(ways), 1))
     ends = np.cumsum([len(rows) for rows in left])[:-1]
-    parts = zip(left, np.split(ways, ends, axis=1), experiments, strict=True)
-    told = [line_scores(rows, np.ascontiguousarray(own), e) for rows, own, e in parts]
-    return np.concatenate(told, axis=1) / size, np.eye(len(ways))
+    freedom = max(sum(map(len, left)) - len(ways), 1)
+    variance = sum(float(rows @ rows) for rows in left) / freedom
+    each = [np.ascontiguousarray(own) for own in np.split(ways, ends, axis=1)]
+    return left, each, variance
 
 
 class InputNoise(Protocol):
@@ -134,28 +146,18 @@ def shared(boxes: Sequence[tuple[Objective, FloatArray]]) -> float:
         entries = any(may_be_tied(e) for e in experiments)
         if not (entries or any(e.reach for e in experiments)):
             continue
-        realisation = objective.structure.realise(x)
-        left, slopes = [], []
-        for e in experiments:
-            evaluation = e.at(realisation)
-            rows, Q, delta = projected(evaluation)
-            left.append(rows)
-            if entries:
-                J = evaluation.jacobian(delta)
-                slopes.append(J - (J @ Q.T) @ Q)
-        parts += zip(left, experiments, strict=True)
         if not entries:
+            realisation = objective.structure.realise(x)
+            parts += [(projected(e.at(realisation))[0], e) for e in experiments]
             continue
-        ways = directions(np.concatenate(slopes, axis=1), _LOOSE)[2]
-        ends = np.cumsum([len(rows) for rows in left])[:-1]
-        count = sum(len(rows) for rows in left)
-        freedom = max(count - len(ways), 1)
-        even = sum(float(rows @ rows) for rows in left) / freedom
-        for rows, e, own in zip(left, experiments, np.split(ways, ends, axis=1), strict=True):
+        left, ways, even = _along(objective, x, experiments)
+        parts += zip(left, experiments, strict=True)
+        count = sum(map(len, left))
+        share = count / max(count - len(ways[0]), 1)
+        for rows, e, own in zip(left, experiments, ways, strict=True):
             plain = even * float(np.sum(own**2))
             alone += plain
-            own = np.ascontiguousarray(own)
-            joined += tied(rows, own, e) * count / freedom if may_be_tied(e) else plain
+            joined += tied(rows, own, e) * share if may_be_tied(e) else plain
     wider = together(parts) if parts else 1.0
     return wider * max(joined / alone if alone > 0 else 1.0, 1.0)
 
