@@ -113,3 +113,21 @@ def test_a_lag_of_one_output_is_named_with_the_output():
     assert not est.verdict.trusted
     assert est.warnings[0].kind == "lag"
     assert "at output 'speed'" in est.warnings[0]
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_a_filter_that_is_tried_in_vain_warns_of_nothing(seed):
+    """Its time had gone to zero: numpy warned of a cast from matrices that were not finite."""
+    servo = fq.GreyBox(
+        lambda J, f: ([[0, 1], [0, -f / J]], [[0], [1 / J]], [[1.0, 0]], None),
+        [fq.Parameter("J", 0.02), fq.Parameter("f", 0.1)],
+    )
+    rng = np.random.default_rng(1000 * seed + 7)
+    b, a = scipy.signal.butter(2, 0.1)
+    u = scipy.signal.lfilter(b, a, rng.standard_normal(3000))
+    u = u / u.std()
+    fine = np.interp((np.arange(60000) + 0.5) / 20, np.arange(3000), u)
+    y = fq.simulate(servo, fine, 5e-3 / 20).y[::20]
+    y = y + 0.02 * y.std() * rng.standard_normal(3000)
+    est = fq.fit(servo, fq.Record(u, y, 5e-3))
+    assert est.warnings[0].kind == "hold rejected"

@@ -23,8 +23,9 @@ from freqid.models import GreyBox, Parameter
 # the filter's own unknown, a time in s; times of a lag, in those of the delay that it looks like,
 # and of a high-pass, in the period of the slowest line
 _NAME, _TIMES, _SLOW = "time of a filter", (1.0, 0.3), (1.0, 10.0)
-# how far below the slowest line a high-pass may lie
-_SEEN = 2.0
+# how far below the slowest line a high-pass may lie, and any filter from where it begins: beyond it
+# is none, and its matrices are not finite
+_SEEN, _WIDE = 2.0, 1e3
 
 
 @dataclass(frozen=True)
@@ -102,10 +103,10 @@ def filter_instead(
     for one in filters:
         for time in times:
             try:
-                parameters = [*begun.parameters, Parameter(_NAME, time, "s", lower=0)]
+                own = Parameter(_NAME, time, "s", lower=time / _WIDE, upper=time * _WIDE)
                 model = dataclasses.replace(
-                    begun, matrices=one.around(begun.matrices), parameters=parameters,
-                    vectorized=False, jacobian=None,
+                    begun, matrices=one.around(begun.matrices),
+                    parameters=[*begun.parameters, own], vectorized=False, jacobian=None,
                 )  # fmt: skip
                 est = fitter_of(model)(model, inquiry.readings, SearchOptions(n_starts=1))
             except (InputError, np.linalg.LinAlgError, ArithmeticError):
