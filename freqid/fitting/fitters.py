@@ -11,12 +11,18 @@ import numpy as np
 from freqid.checks import ComplexArray, InputError
 from freqid.data import Record
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
+from freqid.fitting.search.descent import UncomputableError
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.lti import Hold, PeriodicHold
-from freqid.models import GreyBox
+from freqid.models import GreyBox, Model
 
-# a sampled pole this near to one is an integrator's to rounding
-_ON_LINE = 1e-10
+# a sampled pole this near to one is an integrator's to rounding, and one that lets a motion fade by
+# less than this part within a record is for all that the record can tell; the same of data without
+# noise, of which a fit leaves no more than this part
+_ON_LINE, _STILL = 1e-10, 1e-5
+_STILL_EXACT, _EXACT = 1e-2, 1e-8
 
 
 class OnLineError(InputError):
@@ -117,14 +123,38 @@ def fitted(
 ) -> tuple[Estimate, Sequence[Reading]]:
     """The estimate, and the readings that it is of.
 
-    A black box that finds an integrator without noise has a pole on the line at zero, which then
-    says nothing of the plant and is left out, as where a grey box is known to integrate.
+    A fit that finds an integrator without noise has a pole on the line at zero, where its response
+    is rounding: that line says nothing of the plant then and is left out, as where a model is known
+    to integrate.
     """
     fit = fitter_of(model)
-    try:
+    if _apart_from_zero(readings):
         return fit(model, readings, options), readings
-    except (OnLineError, np.linalg.LinAlgError):
-        if isinstance(model, GreyBox) or _apart_from_zero(readings):
+    try:
+        est = fit(model, readings, options)
+        if not any(_on_line(est, r) for r in readings):
+            return est, readings
+    except (OnLineError, UncomputableError, np.linalg.LinAlgError):
+        if isinstance(model, GreyBox):
             raise
     less = [r.with_(skip_zero=True) for r in readings]
     return fit(model, less, options), less
+
+
+def _on_line(est: Estimate, reading: Reading) -> bool:
+    if est.message == INTERRUPTED:
+        return False
+    exact = est.minimum.solution.cost <= _EXACT * est.minimum.objective.energy
+    return stands_still(met_by(est, reading), reading, _STILL_EXACT if exact else _STILL)
+
+
+def stands_still(model: Model, reading: Reading, part: float = _STILL) -> bool:
+    """Whether a motion fades by less than a ``part`` within a record whose line at zero is read."""
+    poles, record = np.asarray(model.poles, complex), reading.data
+    if reading.skip_zero or not isinstance(record, Record) or not len(poles):
+        return False
+    # of outputs that rest nothing else is left
+    if not np.ptp(record.outputs, axis=0).any():
+        return False
+    rates = np.log(np.where(poles == 0, 1e-300, poles)) / model.dt if model.dt else poles
+    return bool(np.abs(rates).min() * record.duration < part)

@@ -273,6 +273,7 @@ def _estimate(
             )
         ),
         tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
+        exact=minimum.exact,
         # what rounding leaves wants nothing
         wanted=values[:count] if minimum.exact else (minimum.unbounded * structure.scale)[:count],
     )

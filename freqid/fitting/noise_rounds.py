@@ -13,7 +13,7 @@ from freqid.data import FrequencyResponse, Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fitted, fitter_of
+from freqid.fitting.fitters import SearchOptions, fitted, fitter_of, stands_still
 from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
 from freqid.fitting.noise_models import ModelNoise, ResponseNoise, as_noise_model, tells_variance
@@ -32,6 +32,8 @@ _STANDS = 0.01
 # part of the cost by which another start's end is another minimum, and how often a delay may go on
 # to the next sample
 _DEEPER, _DOORS = 1e-6, 3
+# part of the data that is but rounding
+_NOTHING = 1e-16
 # part of a sample that is none
 _BENT = 1e-3
 # the same of black boxes, and the lines that these are found on
@@ -57,7 +59,7 @@ def noise_weighted(
         if _lack(other[1]) < lack:
             first, est, seen = other
     if known and est.message != INTERRUPTED:
-        est = fitter_of(model)(model, seen, again(est, options))
+        est, seen = fitted(model, seen, again(est, options))
     testimony, problem = est.testimony, est.problem
     if problem is not None and first.problem is not None and first.problem.others:
         # later rounds walk from the minimum that the first has chosen
@@ -82,7 +84,7 @@ def _in_turn(
     est, readings = fitted(model, readings, options)
     first, whole, rough = est, est, True
     for i in range(_NOISE_ROUNDS):
-        if est.message == INTERRUPTED:
+        if est.message == INTERRUPTED or _leaves_nothing(est):
             return first, est, readings
         readings = [_learnt(est, r, options.estimated_hold) for r in readings]
         before, anew = est, again(est, options)
@@ -97,15 +99,16 @@ def _in_turn(
         rough = i + 1 < _ROUGH_ROUNDS and not _stands(est, before)
     if not _stands(est, whole):
         # what is noise has changed on the way, and with it perhaps which minimum is the least
-        other = fitter_of(model)(model, readings, anew)
-        est = other if other.cost < est.cost * (1 - _DEEPER) else est
+        other, left = fitted(model, readings, anew)
+        if other.cost < est.cost * (1 - _DEEPER):
+            est, readings = other, left
     for _ in range(_DOORS):
         door = _next_door(model, est, readings, options)
         if door is None:
             break
         # its noise is another, if little
         readings = [_learnt(door, r, options.estimated_hold) for r in readings]
-        est = fitter_of(model)(model, readings, again(door, options))
+        est, readings = fitted(model, readings, again(door, options))
     return first, est, readings
 
 
@@ -137,6 +140,11 @@ def _next_door(
                 if found.converged and found.cost < least * (1 - _DEEPER):
                     best = found
     return best
+
+
+def _leaves_nothing(est: Estimate) -> bool:
+    """Whether what is left is but rounding, of which no noise can be learnt."""
+    return est.minimum.cost <= _NOTHING * est.minimum.objective.energy
 
 
 def _stands(est: Estimate, before: Estimate) -> bool:
@@ -186,8 +194,11 @@ def _left_by_boxes(
                     else before.on(own, count=_LINES)
                 )
                 boxes[group[0]] = box
+                model = box.model(plant, one.hold)
+                if any(stands_still(model, seen[i]) for i in group):
+                    return None
                 for i in group:
-                    left = errors_of(box.model(plant, one.hold), seen[i])
+                    left = errors_of(model, seen[i])
                     even = even and evenly_spread(left.error)
                     if seen[i].noise.to_be_learnt:
                         noise = seen[i].noise.learnt(left.error, left.n_samples)

@@ -24,6 +24,8 @@ from freqid.fitting.uncertainty.minimum import Spread
 _CUT, _FAR = 1.5, 3.0
 # steps at the most, and the part of a standard error that ends them
 _STEPS, _STANDS = 30, 0.01
+# part of the data that is but rounding, in which no sample is off
+_NOTHING = 1e-16
 # the median of |e| in standard deviations of a normal variable
 _MEDIAN = 0.6744897501960817
 
@@ -42,12 +44,14 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     if any(r.band is not None for r in readings):
         raise InputError("loss='huber' needs all lines: a band spreads a spike over the record")
     est, seen = work(readings, None)
-    # a black box that integrates leaves out the line at zero
-    readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
-    cut, inside, count = list(readings), 1.0, 0
+    cut, inside, count = list(seen), 1.0, 0
     for _ in range(_STEPS):
+        # what integrates without noise leaves out the line at zero
+        readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
+        if est.minimum.cost <= _NOTHING * est.minimum.objective.energy:
+            break
         cut, inside, count = _cut(est, readings)
-        before, est = est, work(cut, est)[0]
+        before, (est, seen) = est, work(cut, est)
         std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break

@@ -23,6 +23,8 @@ _AT_BOUND = 1e-6
 _INSIDE = 5.0
 # beyond its physical range by so many standard errors a value is unphysical for certain
 _CERTAIN = 2.0
+# part of where a value began that is rounding, in data without noise
+_ROUNDED = 1e-6
 # standard deviations between data and prior that are chance once in two thousand fits, and part of
 # a prior's own that is the least which data can be seen to have taken off
 _CONTRADICTED, _LEAST_TAKEN = 3.5, 0.05
@@ -46,7 +48,7 @@ class Evidence:
     ``aliased`` is the part of the input's power that decimation has folded; ``rounding`` is how far
     rounding of the matrices moves the response, with the sentence on it. ``tied`` are parameters of
     which an expression decides, with that and their values; ``units`` are those of the channels,
-    each with its name.
+    each with its name. ``exact`` are fits that leave nothing but rounding.
     """
 
     parameters: Sequence[Parameter]
@@ -67,6 +69,7 @@ class Evidence:
     tied: Sequence[tuple[Parameter, str, float]] = ()
     wanted: FloatArray | None = None
     units: Collection[tuple[str, str]] = ()
+    exact: bool = False
 
 
 Sign = Callable[[Evidence], Iterable[Finding]]
@@ -107,6 +110,8 @@ def not_physical(e: Evidence) -> Iterator[Finding]:
         if low <= value <= high or p.upper <= low or p.lower >= high:
             continue
         beyond = low - value if value < low else value - high
+        if e.exact and beyond <= _ROUNDED * abs(p.value):
+            continue
         why, severity = "check the hold that was assumed and the band", "serious"
         if p.physical == (0, np.inf):
             why += f"; if it may be negative, {p.name} is Parameter(…, physical=(-inf, inf))"

@@ -117,7 +117,8 @@ def test_other_values_that_explain_the_data_as_well_are_a_doubt(seed, angle, noi
     """Trusted with springs 6 to 9.5 error bars off: another minimum, half a variance of the noise
     below the one next to the truth, or bars of 37 % of a damping that hold for half of their way.
     """
-    est = fq.fit(*moved(seed, angle, noise, pole))
+    # the first start alone may come to either, as a processor rounds
+    est = fq.fit(*moved(seed, angle, noise, pole), n_starts=13)
     assert est.verdict.grade == "doubt"
     assert words in est.verdict.reasons[0]
 

@@ -133,7 +133,7 @@ def told(omega: FloatArray, smooth: Smooth, count: int) -> FloatArray:
     few = omega[np.unique(np.append(even, np.minimum(ratios, len(omega) - 1)).astype(int))]
     G, error = smooth(few)
     # channels that do not hear one another have nothing to tell
-    told_of = error < _KNOWN
+    told_of = (error < _KNOWN) & (G != 0)
     known = told_of.any(axis=(0, 1))
     if known.sum() < 2:
         return few[known]

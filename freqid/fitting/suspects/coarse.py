@@ -23,6 +23,8 @@ from freqid.fitting.suspects.sentences import farthest
 
 # terms of the series, and those that are none, in steps
 _TERMS, _NONE = 6, 1e-3
+# part of a step that is left where values are told to more digits than steps have
+_EXPLAINED = 1e-3
 # part of a step that values are off whole numbers of it, and samples that are looked at first
 _EVEN, _SHOWN = 1e-3, 10_000
 # standard errors, and part of itself, by which a parameter may be off without a word: where all of
@@ -67,7 +69,12 @@ def _rounded(s: Seen) -> Iterator[tuple[float, FloatArray]]:
         step = _step(signal)
         if not step:
             continue
-        variance = max(float(2 * np.sum(np.abs(left[o]) ** 2)) / N**2 - step**2 / 12, 0.0)
+        power = float(2 * np.sum(np.abs(left[o]) ** 2)) / N**2
+        # a signal that moves through many steps of a sensor would leave a part of one there
+        many = len(np.unique(signal)) > 2 * (len(s.jacobian) + len(s.free))
+        if many and power < (_EXPLAINED * step) ** 2:
+            continue
+        variance = max(power - step**2 / 12, 0.0)
         terms = [k for k, size in enumerate(_series(step, variance), 1) if size >= _NONE * step]
         if not terms:
             continue

@@ -13,7 +13,7 @@ from freqid.data import Record, StampedRecord, as_band
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.fitters import SearchOptions, fitted
 from freqid.fitting.noise_models import BiasIntegral, GivenWeights
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.scene import Scene
@@ -153,7 +153,7 @@ def fitted_apart(
     for part in parts:
         try:
             numbered = [r.with_(place=i) for i, r in enumerate(part)]
-            est = fitter_of(spec)(spec, numbered, options)
+            est, _ = fitted(spec, numbered, options)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             found.append(None)
             continue
