@@ -25,6 +25,8 @@ _MOVED, _FREQUENCIES = np.log(1.3), 16
 _LOOKS, _MATCHED = 25, 1e-7
 # looks from points scattered so many nepers around an answer, and nepers by which answers differ
 _SCATTERED, _SPREAD, _OTHER = 5, np.log(4), 0.01
+# part of a start that is nothing
+_NOTHING = 1e-6
 
 
 @np.errstate(all="ignore")
@@ -66,8 +68,9 @@ def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
         other = look.end(begin)
         if other is None or not physical(structure, other):
             continue
-        # a value that is zero is no other
-        each = [np.abs(other - y) > _OTHER * np.maximum(np.abs(y), 1e-300) for y in (x, *found)]
+        # a value that is zero, or is so but for rounding, is no other
+        small = np.maximum(_NOTHING * np.abs(structure.start), 1e-300)
+        each = [np.abs(other - y) > np.maximum(_OTHER * np.abs(y), small) for y in (x, *found)]
         if all(some.any() for some in each):
             found.append(other)
     return found

@@ -57,7 +57,9 @@ def test_dampings_and_springs_that_are_none_come_out_as_none(n, way):
     than on another: next to zero the response at the line there is rounding.
     """
     brakeless = fq.GreyBox(lag, [fq.Parameter("d", 0.3), fq.Parameter("b", 0.5)])
-    springless = fq.GreyBox(spring, [fq.Parameter(k, v) for k, v in {"k": 0.1, "d": 2.5, "b": 3.0}.items()])
+    springless = fq.GreyBox(
+        spring, [fq.Parameter(k, v) for k, v in {"k": 0.1, "d": 2.5, "b": 3.0}.items()]
+    )
     for seed in range(2):
         est = fq.fit(brakeless, record("integrator", n, seed), **way)
         assert est.verdict.grade == "trust", est.verdict
