@@ -14,6 +14,9 @@ from freqid.lti import BandLimited, PeriodicHold, Realisation, eliminate, sum_ru
 if TYPE_CHECKING:
     from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 
+# part of the way between two lines at which a pole lies on one of them
+_ON_LINE = 1e-6
+
 
 class SpectralEvaluation:
     """Lines of a record or a response at one trial point: see ``Evaluation``."""
@@ -36,10 +39,10 @@ class SpectralEvaluation:
             self.plant, self.z, self.moving = realisation.seen_through(
                 hold, e.lift, omega, e.points.z
             )
-        self.inverse = self.plant.resolvent(self.z)
+        self.inverse, self._kept = self._off_poles(realisation)
         self.x = self._states(self.U_state)
         y = sum_runs(self.plant.output(self.x, self.U), e.lines.aliases)
-        self.residual = e.lines.rows(y - e.lines.Y)
+        self.residual = self._rows(y - e.lines.Y)
         self.transient: FloatArray | None = None
         self._w: ComplexArray | None = None
         # a plant without states has no free motion
@@ -53,12 +56,37 @@ class SpectralEvaluation:
             # (outputs, states, K) to one column for each physical state
             seen = sum_runs(self._w * t.factor, t.aliases)
             columns = (basis.to_basis.T @ seen).swapaxes(0, 1)
-            self.transient = e.lines.rows(columns[:, :, None, :])
+            self.transient = self._rows(columns[:, :, None, :])
         # what the plant does not move
         still = [rows for rows in (ends, e.added) if rows is not None]
         if still:
             free = [] if self.transient is None else [self.transient]
             self.transient = np.concatenate([*free, *still])
+
+    def _off_poles(self, realisation: Realisation) -> tuple[ComplexArray | None, FloatArray | None]:
+        """1/(z − λ), zero at lines on which a pole lies, and which are kept (K,); None for all.
+
+        There the free motion of that pole is the line's, and what is left of it rounding, which
+        would keep a descent from where the pole belongs.
+        """
+        t = self.motion
+        if t is None or not t.shared or realisation.period is not None or not self.plant.phi.size:
+            return self.plant.resolvent(self.z), None
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = self.plant.resolvent(self.z)
+        if inverse is None:
+            return None, None
+        near = _ON_LINE * self.experiment.points.spacing
+        far, parts = (1 / near if near else np.inf), inverse.view(float)
+        # NaN, as of a pole that a line meets exactly, is in no range
+        if -far < parts.min() and parts.max() < far:
+            return inverse, None
+        kept = (np.abs(inverse) < far).all(axis=0)
+        return np.where(kept, inverse, 0), kept.astype(float)
+
+    def _rows(self, error: ComplexArray) -> FloatArray:
+        """Errors (…, K) of the lines that are kept as rows."""
+        return self.experiment.lines.rows(error if self._kept is None else error * self._kept)
 
     def _states(self, U: ComplexArray) -> ComplexArray:
         return self.plant.solve(self.z, self.plant.drive(self.z, U), self.inverse)
@@ -69,7 +97,7 @@ class SpectralEvaluation:
         ``initial`` (q,) are the unknowns of the initial state, (q, channels) where each channel
         has its own.
         """
-        rows, t = self.experiment.lines.rows, self.motion
+        rows, t = self._rows, self.motion
         if initial is None or self._w is None or t is None:
             return rows(self._forced_change(self.plant.output_rows(self.z, self.inverse), self.x))
         # of all that is free the state alone is moved by the plant

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -150,6 +151,11 @@ class Points:
 
     z: ComplexArray
     U: ComplexArray
+
+    @cached_property
+    def spacing(self) -> float:
+        """The least distance from one point to the next; 0 where there is one alone."""
+        return float(np.abs(np.diff(self.z)).min(initial=np.inf)) if len(self.z) > 1 else 0.0
 
     def some(self, inputs: IntArray, factor: FloatArray) -> Points:
         """At some of the input's lines, each multiplied."""
