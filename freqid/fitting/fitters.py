@@ -16,13 +16,14 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import UncomputableError
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.lti import Hold, PeriodicHold
-from freqid.models import GreyBox, Model
+from freqid.models import GreyBox
 
-# a sampled pole this near to one is an integrator's to rounding, and one that lets a motion fade by
-# less than this part within a record is for all that the record can tell; the same of data without
-# noise, of which a fit leaves no more than this part
-_ON_LINE, _STILL = 1e-10, 1e-5
-_STILL_EXACT, _EXACT = 1e-2, 1e-8
+# a sampled pole nearer to one than this, over the samples, is an integrator's: a line on which a
+# pole lies is left out of the cost, which holds it there
+_ON_LINE = 1e-5
+# and so is one that lets a motion fade by less than this part within a record without noise, of
+# which a fit leaves no more than this part
+_STILL, _EXACT = 1e-2, 1e-8
 
 
 class OnLineError(InputError):
@@ -31,7 +32,10 @@ class OnLineError(InputError):
 
 def refuse_on_line(poles: ComplexArray, readings: Sequence[Reading]) -> None:
     """OnLineError where one of the sampled poles is an integrator's, and the line at zero read."""
-    if len(poles) and np.abs(poles - 1).min() < _ON_LINE and not _apart_from_zero(readings):
+    if not len(poles) or _apart_from_zero(readings):
+        return
+    samples = min(r.data.n_samples for r in readings if isinstance(r.data, Record))
+    if np.abs(poles - 1).min() < _ON_LINE / samples:
         raise OnLineError(f"of the poles {poles} one lies on the line at zero")
 
 
@@ -128,7 +132,7 @@ def fitted(
     to integrate.
     """
     fit = fitter_of(model)
-    if _apart_from_zero(readings):
+    if _apart_from_zero(readings) or any(_rests(r) for r in readings):
         return fit(model, readings, options), readings
     try:
         est = fit(model, readings, options)
@@ -141,20 +145,22 @@ def fitted(
     return fit(model, less, options), less
 
 
+def _rests(reading: Reading) -> bool:
+    """Whether nothing is left of inputs, or of outputs, beside the line at zero."""
+    record = reading.data
+    return isinstance(record, Record) and not all(
+        np.ptp(signals, axis=0).any() for signals in (record.inputs, record.outputs)
+    )
+
+
 def _on_line(est: Estimate, reading: Reading) -> bool:
-    if est.message == INTERRUPTED:
+    """Whether a motion hardly fades within a record without noise whose line at zero is read."""
+    record = reading.data
+    # beside noise what a pole on a line leaves there is nothing
+    exact = est.minimum.cost <= _EXACT * est.minimum.objective.energy
+    if est.message == INTERRUPTED or not exact or not isinstance(record, Record):
         return False
-    exact = est.minimum.solution.cost <= _EXACT * est.minimum.objective.energy
-    return stands_still(met_by(est, reading), reading, _STILL_EXACT if exact else _STILL)
-
-
-def stands_still(model: Model, reading: Reading, part: float = _STILL) -> bool:
-    """Whether a motion fades by less than a ``part`` within a record whose line at zero is read."""
-    poles, record = np.asarray(model.poles, complex), reading.data
-    if reading.skip_zero or not isinstance(record, Record) or not len(poles):
-        return False
-    # of outputs that rest nothing else is left
-    if not np.ptp(record.outputs, axis=0).any():
-        return False
+    model = met_by(est, reading)
+    poles = np.asarray(model.poles, complex)
     rates = np.log(np.where(poles == 0, 1e-300, poles)) / model.dt if model.dt else poles
-    return bool(np.abs(rates).min() * record.duration < part)
+    return bool(np.abs(rates).min(initial=np.inf) * record.duration < _STILL)

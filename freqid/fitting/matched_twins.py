@@ -69,7 +69,7 @@ def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
         if other is None or not physical(structure, other):
             continue
         # a value that is zero, or is so but for rounding, is no other
-        small = np.maximum(_NOTHING * np.abs(structure.start), 1e-300)
+        small = np.maximum(_NOTHING * np.abs(meant / structure.scale), 1e-300)
         each = [np.abs(other - y) > np.maximum(_OTHER * np.abs(y), small) for y in (x, *found)]
         if all(some.any() for some in each):
             found.append(other)

@@ -13,7 +13,7 @@ from freqid.data import FrequencyResponse, Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fitters import SearchOptions, fitted, fitter_of, stands_still
+from freqid.fitting.fitters import SearchOptions, fitted, fitter_of
 from freqid.fitting.grey_box import structure_of
 from freqid.fitting.met import met_by
 from freqid.fitting.noise_models import ModelNoise, ResponseNoise, as_noise_model, tells_variance
@@ -195,8 +195,6 @@ def _left_by_boxes(
                 )
                 boxes[group[0]] = box
                 model = box.model(plant, one.hold)
-                if any(stands_still(model, seen[i]) for i in group):
-                    return None
                 for i in group:
                     left = errors_of(model, seen[i])
                     even = even and evenly_spread(left.error)

@@ -13,7 +13,7 @@ from freqid.fitting.black_box.channel_units import Descent
 from freqid.fitting.black_box.order_minimum import HIGH, Orders, descended, within_circle
 from freqid.fitting.black_box.refinement import LINES, first_model, nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.black_box.stability_edge import at_the_edge, held_back, pressed
+from freqid.fitting.black_box.stability_edge import STILL, at_the_edge, held_back, pressed
 from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
@@ -33,9 +33,7 @@ from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 
 # evaluations of a start on lines that are kept
 _STEPS = 80
-# a motion that grows e-fold this often within the data is no integrator's, whose pole noise moved
-_STILL = 3.0
-# and by how much rounding makes an integrator's grow there
+# by how much rounding makes the motion of an integrator grow within the data
 _ROUNDED = 1e-6
 # part of the data's energy that is no noise
 _EXACT = 1e-11
@@ -97,7 +95,7 @@ def fit_output_error(
         aliased_part(readings),
     )
     if edge is not None:
-        est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution)])
+        est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution, objective)])
     return dataclasses.replace(est, n_starts=asked or 1)
 
 
@@ -217,7 +215,7 @@ def _growth(minimum: Minimum, spread: Spread, duration: float) -> float:
     poles, scatter = pole_scatter(minimum.structure, minimum.x, spread)
     grows = poles.real > 0
     rate, std = poles.real[grows], np.sqrt(np.maximum(scatter[grows, 0, 0], 0))
-    if not len(rate) or not duration or rate.max() * duration > _STILL:
+    if not len(rate) or not duration or rate.max() * duration > STILL:
         return np.inf
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.max(rate / std))

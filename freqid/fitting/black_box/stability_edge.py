@@ -19,6 +19,7 @@ from freqid.fitting.cost.held_charts import RADIUS, HeldChart, radial
 from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.findings import Finding
 from freqid.fitting.search.descent import Solution, polish
+from freqid.fitting.uncertainty.minimum import Minimum, Spread
 
 # a pole this near to the circle may be held there
 _NEAR = 1e-3
@@ -28,6 +29,11 @@ _MET = 1e-6
 _ROUNDS, _STEPS, _GAIN = 12, 80, 1e-9
 # how far rounding takes a pole that is held from its radius
 _ROUNDED = 1e-9
+# e-folds of a motion that grows within the data, beyond which it is none of an integrator, whose
+# pole noise moved; standard errors by which one grows for certain
+STILL, _CERTAIN = 3.0, 2.0
+# how much louder noise may be at a pole than on average, in standard deviations
+_LOUDER = 2.0
 # part of the cost that a round gains at the least while it goes on
 _CREEPS = 1e-7
 
@@ -88,17 +94,56 @@ def _leaving(chart: Chart, point: Point) -> BoolArray:
     return leaving
 
 
-def held_back(chart: Chart, solution: Solution) -> list[Finding]:
-    """What is said of the poles that are held."""
+def held_back(chart: Chart, solution: Solution, objective: Objective) -> list[Finding]:
+    """What is said of the poles that are held: little of those that noise takes out."""
     if not isinstance(chart, HeldChart):
         return []
     frequency = chart.held_frequencies(solution.x)
     which = ", ".join(f"{f:.4g}" for f in frequency)
     one = len(frequency) == 1
+    does = f"{'a motion' if one else 'motions'} at {which} Hz {'does' if one else 'do'} not fade"
+    if _wanted(chart, solution, objective) < _CERTAIN:
+        text = (
+            f"{does}: the data want more, which stable=True forbids, by less than two standard "
+            "errors"
+        )
+        return [Finding("edge of a bound", text, "minor", number=float(len(frequency)))]
     found = Finding(
         "edge of a bound",
-        f"{'a motion' if one else 'motions'} at {which} Hz {'does' if one else 'do'} not fade: the "
-        "data want more, which stable=True forbids, as noise of few lines does; fit a lower order",
+        f"{does}: the data want more, which stable=True forbids, as noise of few lines does; fit "
+        "a lower order",
         number=float(len(frequency)),
     )
     return [found]
+
+
+def _wanted(chart: Chart, solution: Solution, objective: Objective) -> float:
+    """By how many standard errors a pole wants out of the circle, by the next step or by what is
+    gained where it may leave; infinite where its motion grows by so much within the data that it is
+    no pole on the circle, however badly it is known.
+    """
+    free = chart.around(chart.matrices(solution.x))
+    free.stable = False
+    cost = Objective(free, objective.experiments)
+    point = cost.point(np.zeros(free.size))
+    if point is None or not np.isfinite(point.triangle).all():
+        return np.inf
+    P = free.size
+    step = -np.linalg.lstsq(point.triangle[:P, :P], point.triangle[:P, P])[0]
+    minimum = Minimum(cost, Solution(np.zeros(P), point, True, ""))
+    _, slope = radial(free.centre.A, free.derivative.A)
+    wanted = (slope @ step)[_leaving(free, point)]
+    if wanted.max(initial=0.0) * cost.n_rows > STILL:
+        return np.inf
+    scatter = slope @ Spread(np.eye(P), minimum).of_unknowns @ slope.T
+    std = np.sqrt(np.maximum(np.diag(scatter), 0))[_leaving(free, point)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        certain = float(np.max(wanted / std, initial=0.0))
+    if certain >= _CERTAIN:
+        return certain
+    # far from its place a step tells less than the way there, on which noise that is more at the
+    # pole than elsewhere gains more as well
+    left = polish(cost, np.zeros(P), limit=_STEPS, tolerance=_GAIN)
+    own = Minimum(cost, left).noise_variance
+    gained = np.sqrt(max(point.cost - left.cost, 0.0) / max(own, 1e-300))
+    return max(certain, float(gained) / _LOUDER)

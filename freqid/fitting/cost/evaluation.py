@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # part of the way between two lines at which a pole lies on one of them
 _ON_LINE = 1e-6
+# part of the data's largest line that is none
+_RESTS = 1e-12
 
 
 class SpectralEvaluation:
@@ -82,6 +84,10 @@ class SpectralEvaluation:
         if -far < parts.min() and parts.max() < far:
             return inverse, None
         kept = (np.abs(inverse) < far).all(axis=0)
+        Y = np.abs(self.experiment.lines.Y)
+        if (Y * kept).max() <= _RESTS * Y.max():
+            # of outputs that rest nothing else is left
+            return inverse, None
         return np.where(kept, inverse, 0), kept.astype(float)
 
     def _rows(self, error: ComplexArray) -> FloatArray:
