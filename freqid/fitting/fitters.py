@@ -18,24 +18,27 @@ from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.lti import Hold, PeriodicHold
 from freqid.models import GreyBox
 
-# a sampled pole nearer to one than this, over the samples, is an integrator's: a line on which a
-# pole lies is left out of the cost, which holds it there
-_ON_LINE = 1e-5
+# a sampled pole this near to one is an integrator's to rounding
+_ON_LINE = 1e-10
 # and so is one that lets a motion fade by less than this part within a record without noise, of
 # which a fit leaves no more than this part
-_STILL, _EXACT = 1e-2, 1e-8
+_STILL, _EXACT = 1e-2, 1e-15
 
 
 class OnLineError(InputError):
     """A pole of a black box lies on a line, where a model that keeps it is infinite."""
 
 
-def refuse_on_line(poles: ComplexArray, readings: Sequence[Reading]) -> None:
-    """OnLineError where one of the sampled poles is an integrator's, and the line at zero read."""
+def refuse_on_line(poles: ComplexArray, readings: Sequence[Reading], exact: bool) -> None:
+    """OnLineError where one of the sampled poles is an integrator's, and the line at zero read.
+
+    Beside noise that is one which rounding has put there, and of ``exact`` data any whose motion
+    does not fade within the records.
+    """
     if not len(poles) or _apart_from_zero(readings):
         return
     samples = min(r.data.n_samples for r in readings if isinstance(r.data, Record))
-    if np.abs(poles - 1).min() < _ON_LINE / samples:
+    if np.abs(poles - 1).min() < (_STILL / samples if exact else _ON_LINE):
         raise OnLineError(f"of the poles {poles} one lies on the line at zero")
 
 

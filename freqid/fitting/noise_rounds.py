@@ -194,6 +194,8 @@ def _left_by_boxes(
                     else before.on(own, count=_LINES)
                 )
                 boxes[group[0]] = box
+                if box.solution.cost <= _NOTHING * box.objective.energy:
+                    return None
                 model = box.model(plant, one.hold)
                 for i in group:
                     left = errors_of(model, seen[i])

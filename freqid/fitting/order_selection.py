@@ -24,6 +24,7 @@ from freqid.data import Bar, FrequencyResponse, Record, as_data_sets, channel_co
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.fitters import OnLineError
 from freqid.fitting.reading import Reading
 from freqid.lti import Hold, Plane, tuned
 from freqid.models import OutputError
@@ -101,9 +102,16 @@ def select_order(
     through = [False, True] if feedthrough is None else [feedthrough]
     processes(n_jobs)
     each = list(product(late, through, wanted))
-    with Bar(progress, len(each), 0, "orders") as advance:
-        work = partial(_row_of, reading, (n_inputs, max(late)), stable)
-        table = pd.DataFrame(in_turn(work, each, n_jobs, lambda _: advance(1)))
+
+    def tabled(reading: Reading) -> pd.DataFrame:
+        with Bar(progress, len(each), 0, "orders") as advance:
+            work = partial(_row_of, reading, (n_inputs, max(late)), stable)
+            return pd.DataFrame(in_turn(work, each, n_jobs, lambda _: advance(1)))
+
+    table = tabled(reading)
+    if table.pop("on_line").any():
+        # an integrator without noise: all orders are asked without the line on which its pole lies
+        table = tabled(reading.with_(skip_zero=True)).drop(columns="on_line")
     scores = table[criterion].to_numpy()
     if np.isnan(scores).all():
         raise InputError(f"no order can be fitted: {table['error'].iloc[0]}")
@@ -146,10 +154,13 @@ def _row(spec: OutputError, delay: int, reading: Reading) -> dict[str, object]:
         "order": spec.order, "feedthrough": spec.feedthrough, "delay": delay, "parameters": 0,
         "cost": np.nan, "fit_percent": np.nan, "aic": np.nan, "mdl": np.nan,
         "cross_validation": np.nan, "converged": False, "error": "", "growing": False,
+        "on_line": False,
     }  # fmt: skip
     try:
         est = fit_output_error(spec, [reading])
         held_out = _cross_validation(est, reading)
+    except OnLineError as error:
+        return {**row, "error": str(error), "on_line": True}
     except (InputError, np.linalg.LinAlgError) as error:
         return {**row, "error": str(error)}
     n, parameters = est.n_rows, len(est.values)

@@ -35,8 +35,8 @@ from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 _STEPS = 80
 # by how much rounding makes the motion of an integrator grow within the data
 _ROUNDED = 1e-6
-# part of the data's energy that is no noise
-_EXACT = 1e-11
+# part of the data's energy that is no noise, and what a descent along the circle leaves
+_EXACT, _EXACT_INSIDE = 1e-15, 1e-11
 
 
 @fits(OutputError, black_box=True)
@@ -67,7 +67,8 @@ def fit_output_error(
             raise OnLineError(str(error)) from error
     if not spec.stable:
         # those that are held at the edge of the circle lie next to the line, too
-        refuse_on_line(np.linalg.eigvals(chart.in_z(solution.x).A), readings)
+        exact = solution.cost <= _EXACT * objective.energy
+        refuse_on_line(np.linalg.eigvals(chart.in_z(solution.x).A), readings, exact)
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
         samples = read_for(shape, readings, Plane())
@@ -76,13 +77,16 @@ def fit_output_error(
         centre = Chart(at, spec.feedthrough, Plane(), dt, stable=spec.stable)
         chart, solution, objective = descended(centre, samples)
     edge = None
-    if spec.stable and solution.cost <= _EXACT * objective.energy:
-        # an integrator's pole lies on the circle, and nothing but rounding asks for more
-        solution = dataclasses.replace(solution, converged=True)
-    elif spec.stable and (not solution.converged or pressed(chart, solution.x)):
+    nothing = _EXACT_INSIDE * objective.energy
+    unsure = not solution.converged or pressed(chart, solution.x)
+    if spec.stable and unsure and solution.cost > nothing:
         edge = at_the_edge(chart, solution.x, objective.experiments)
     if edge is not None:
         chart, solution, objective = edge
+    if spec.stable and solution.cost <= nothing:
+        # an integrator's pole lies on the circle, and nothing but rounding asks for more
+        refuse_on_line(np.linalg.eigvals(chart.in_z(solution.x).A), readings, True)
+        solution, edge = dataclasses.replace(solution, converged=True), None
     at = chart.in_z(solution.x)
     model = DiscreteModel(at, dt, first.hold, *common_names([first.data]), spec.stable)
     est = coefficient_estimate(

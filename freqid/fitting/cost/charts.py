@@ -27,6 +27,9 @@ from freqid.lti import (
     response_and_derivatives,
 )
 
+# how far from a pole its response is asked
+_ASIDE = 1e-6
+
 
 class Chart:
     """Models near a state space (Φ̃, Γ, C, D) of a plane, by unknowns x that are zero there."""
@@ -139,9 +142,13 @@ class Chart:
 def response_in_plane(
     at: Realisation, plane: Plane, dt: float, omega: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response of a model in a plane at exp(jω·dt), and its derivatives."""
+    """Response of a model in a plane at exp(jω·dt), beside a pole that lies there, and its
+    derivatives.
+    """
     w = plane.points(on_circle(omega * dt))
     through = at.basis.through(BandLimited())
+    poles = np.diagonal(through.phi) if through.triangular else through.phi
+    w = np.where((w[:, None] == poles).any(axis=1), w + _ASIDE, w)
     return response_and_derivatives(through, w, factor=plane.input_factor(w))
 
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _ON_LINE = 1e-6
 # part of the data's largest line that is none
 _RESTS = 1e-12
+# part of the cost that is too much rounding
+_DROWNED = 1e-4
 
 
 class SpectralEvaluation:
@@ -41,7 +43,21 @@ class SpectralEvaluation:
             self.plant, self.z, self.moving = realisation.seen_through(
                 hold, e.lift, omega, e.points.z
             )
-        self.inverse, self._kept = self._off_poles(realisation)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            every = self.plant.resolvent(self.z)
+        self._kept = self._off_poles(every, realisation)
+        self.inverse = every
+        if every is not None and self._kept is not None:
+            self.inverse = np.where(self._kept, every, 0)
+        self._meet(realisation, ends)
+        if every is not None and self._kept is not None and not self._drowns(every):
+            # beside what is left rounding is nothing, and the line tells what it tells
+            self.inverse, self._kept = every, None
+            self._meet(realisation, ends)
+
+    def _meet(self, realisation: Realisation, ends: FloatArray | None) -> None:
+        """The residual, and what is free in it."""
+        e, basis = self.experiment, self.basis
         self.x = self._states(self.U_state)
         y = sum_runs(self.plant.output(self.x, self.U), e.lines.aliases)
         self.residual = self._rows(y - e.lines.Y)
@@ -65,30 +81,44 @@ class SpectralEvaluation:
             free = [] if self.transient is None else [self.transient]
             self.transient = np.concatenate([*free, *still])
 
-    def _off_poles(self, realisation: Realisation) -> tuple[ComplexArray | None, FloatArray | None]:
-        """1/(z − λ), zero at lines on which a pole lies, and which are kept (K,); None for all.
+    def _off_poles(
+        self, inverse: ComplexArray | None, realisation: Realisation
+    ) -> FloatArray | None:
+        """Which lines are kept (K,), those on which no pole lies by 1/(z − λ); None for all.
 
         There the free motion of that pole is the line's, and what is left of it rounding, which
         would keep a descent from where the pole belongs.
         """
         t = self.motion
-        if t is None or not t.shared or realisation.period is not None or not self.plant.phi.size:
-            return self.plant.resolvent(self.z), None
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = self.plant.resolvent(self.z)
-        if inverse is None:
-            return None, None
+        shared = t is not None and t.shared and realisation.period is None
+        if inverse is None or not shared or not inverse.size:
+            return None
         near = _ON_LINE * self.experiment.points.spacing
         far, parts = (1 / near if near else np.inf), inverse.view(float)
         # NaN, as of a pole that a line meets exactly, is in no range
         if -far < parts.min() and parts.max() < far:
-            return inverse, None
-        kept = (np.abs(inverse) < far).all(axis=0)
+            return None
+        kept = (np.abs(inverse) < far).all(axis=0).astype(float)
         Y = np.abs(self.experiment.lines.Y)
-        if (Y * kept).max() <= _RESTS * Y.max():
-            # of outputs that rest nothing else is left
-            return inverse, None
-        return np.where(kept, inverse, 0), kept.astype(float)
+        # of outputs that rest nothing else is left
+        return kept if (Y * kept).max() > _RESTS * Y.max() else None
+
+    def _drowns(self, inverse: ComplexArray) -> bool:
+        """Whether rounding at the lines that are left out shows beside what the others leave."""
+        out = self._kept == 0
+        drive = np.abs(self.plant.drive(self.z, self.U_state)[..., out])
+        y = np.tensordot(np.abs(self.plant.C), drive * np.abs(inverse)[:, None, out], 1)
+        rounded = np.finfo(float).eps * y * np.abs(self.experiment.lines.scale[..., out])
+        left, T = self.residual[None], self.transient
+        if T is not None:
+            if T.shape[-1] < left.size:
+                # channels that share their free motions
+                outputs, channels = self.experiment.lines.Y.shape[:2]
+                left = left.reshape(outputs, channels, -1).swapaxes(0, 1).reshape(channels, -1)
+            Q, _ = eliminate(T, left.T)
+            left = left - (left @ Q.T) @ Q
+        # NaN is more than anything
+        return not np.sum(rounded**2) < _DROWNED * np.sum(left**2)
 
     def _rows(self, error: ComplexArray) -> FloatArray:
         """Errors (…, K) of the lines that are kept as rows."""

@@ -163,7 +163,10 @@ def unheard(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list
     heard = 0.0
     for s in scene.seen:
         own, hold = s.own(model), s.reading.hold
-        rows = s.answered(own.responses_at(s.omega_input, None if own.dt else hold))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            G = own.responses_at(s.omega_input, None if own.dt else hold)
+        # at a line on which a pole lies any motion is free
+        rows = s.answered(np.where(np.isfinite(G), G, 0))
         # a constant is a motion of an integrator as much as its answer to the input's mean
         rows = s.without_free(rows[None])[0]
         heard += float(rows @ rows)
