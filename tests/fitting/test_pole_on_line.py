@@ -53,8 +53,8 @@ WAYS = [{}, {"weights": "noise"}, {"loss": "huber"}, {"domain": "time"}]
 @pytest.mark.parametrize("way", WAYS, ids=str)
 @pytest.mark.parametrize("n", [60, 300])
 def test_dampings_and_springs_that_are_none_come_out_as_none(n, way):
-    """Of 120 fits of such plants 40 were doubted, errors, or let numpy warn, on one machine more
-    than on another: next to zero the response at the line there is rounding.
+    """Of 160 fits of such plants 46 were doubted, errors, or let numpy warn, on one machine other
+    ones than on another: next to zero the response at the line there is rounding.
     """
     brakeless = fq.GreyBox(lag, [fq.Parameter("d", 0.3), fq.Parameter("b", 0.5)])
     springless = fq.GreyBox(

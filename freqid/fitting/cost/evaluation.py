@@ -103,6 +103,7 @@ class SpectralEvaluation:
         # of outputs that rest nothing else is left
         return kept if (Y * kept).max() > _RESTS * Y.max() else None
 
+    @np.errstate(all="ignore")
     def _drowns(self, inverse: ComplexArray) -> bool:
         """Whether rounding at the lines that are left out shows beside what the others leave."""
         out = self._kept == 0

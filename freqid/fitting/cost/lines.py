@@ -145,6 +145,10 @@ class Lines:
         )
 
 
+# points that tell how far one is from the next: they are even, or closest at the beginning
+_SOME = 1000
+
+
 @dataclass(frozen=True)
 class Points:
     """Where the resolvent of the forced response is taken, (K·M,), and the input it meets there."""
@@ -154,8 +158,9 @@ class Points:
 
     @cached_property
     def spacing(self) -> float:
-        """The least distance from one point to the next; 0 where there is one alone."""
-        return float(np.abs(np.diff(self.z)).min(initial=np.inf)) if len(self.z) > 1 else 0.0
+        """The least distance from one of the first points to the next; 0 of one alone."""
+        some = self.z[:_SOME]
+        return float(np.abs(np.diff(some)).min()) if len(some) > 1 else 0.0
 
     def some(self, inputs: IntArray, factor: FloatArray) -> Points:
         """At some of the input's lines, each multiplied."""

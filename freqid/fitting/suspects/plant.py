@@ -26,8 +26,12 @@ _AHEAD, _BEFORE = 6, 12
 
 
 def responses(model: Model, hold: Hold, omega: FloatArray) -> ComplexArray:
-    """Of a model as a hold samples it at omega (rad/s), (outputs, inputs, K)."""
-    return model.responses_at(omega, None if model.dt else hold)
+    """Of a model as a hold samples it at omega (rad/s), (outputs, inputs, K); none at a line on
+    which a pole lies, where any motion is free.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        G = model.responses_at(omega, None if model.dt else hold)
+    return np.where(np.isfinite(G), G, 0)
 
 
 @suspect("delay")

@@ -17,6 +17,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.order import BENT
+from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
@@ -162,11 +163,7 @@ def unheard(minimum: Minimum, model: Model, readings: Sequence[Reading]) -> list
         return []
     heard = 0.0
     for s in scene.seen:
-        own, hold = s.own(model), s.reading.hold
-        with np.errstate(divide="ignore", invalid="ignore"):
-            G = own.responses_at(s.omega_input, None if own.dt else hold)
-        # at a line on which a pole lies any motion is free
-        rows = s.answered(np.where(np.isfinite(G), G, 0))
+        rows = s.answered(responses(s.own(model), s.reading.hold, s.omega_input))
         # a constant is a motion of an integrator as much as its answer to the input's mean
         rows = s.without_free(rows[None])[0]
         heard += float(rows @ rows)
