@@ -10,6 +10,8 @@ from freqid.lti.double_double import Doubled
 
 # terms of a series, and the size of its argument, that give all digits of a sum of two doubles
 _TERMS, _SMALL = 14, 2.0**-6
+# size of an argument whose approximant keeps its digits whatever the kernels of BLAS
+_NEAR = 1.0
 
 
 def exponential(X: Array) -> Array:
@@ -25,12 +27,24 @@ def exponential(X: Array) -> Array:
     # what grows beyond numbers is infinite
     with np.errstate(over="ignore", invalid="ignore"):
         full = "full" in kinds.values()
-        E = np.asarray(scipy.linalg.expm(X)) if full else np.empty(X.shape, X.dtype)
+        E = _squared(X) if full else np.empty(X.shape, X.dtype)
         for at, kind in kinds.items():
             if kind == "upper":
                 E[at] = _upper(X[at])
             elif kind == "lower":
                 E[at] = _upper(X[at].T).T
+    return E
+
+
+def _squared(X: Array) -> Array:
+    """exp(X) of any: for arguments of five, where scipy begins to square, its approximant (1.18)
+    loses a digit and a half on some processors.
+    """
+    size = float(np.linalg.norm(X, 1, axis=(-2, -1)).max(initial=0))
+    squarings = max(int(np.ceil(np.log2(size / _NEAR))), 0) if size > 0 else 0
+    E = np.asarray(scipy.linalg.expm(X / 2.0**squarings))
+    for _ in range(squarings):
+        E = E @ E
     return E
 
 
