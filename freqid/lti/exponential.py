@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy
 
@@ -10,8 +12,6 @@ from freqid.lti.double_double import Doubled
 
 # terms of a series, and the size of its argument, that give all digits of a sum of two doubles
 _TERMS, _SMALL = 14, 2.0**-6
-# size of an argument whose approximant keeps its digits whatever the kernels of BLAS
-_NEAR = 1.0
 
 
 def exponential(X: Array) -> Array:
@@ -33,18 +33,6 @@ def exponential(X: Array) -> Array:
                 E[at] = _upper(X[at])
             elif kind == "lower":
                 E[at] = _upper(X[at].T).T
-    return E
-
-
-def _squared(X: Array) -> Array:
-    """exp(X) of any: for arguments of five, where scipy begins to square, its approximant (1.18)
-    loses a digit and a half on some processors.
-    """
-    size = float(np.linalg.norm(X, 1, axis=(-2, -1)).max(initial=0))
-    squarings = max(int(np.ceil(np.log2(size / _NEAR))), 0) if size > 0 else 0
-    E = np.asarray(scipy.linalg.expm(X / 2.0**squarings))
-    for _ in range(squarings):
-        E = E @ E
     return E
 
 
@@ -76,20 +64,36 @@ def doubled_exponential(X: Doubled) -> Doubled:
     return E
 
 
+def _squared(X: Array, mended: Callable[[Array, int], None] = lambda E, i: None) -> Array:
+    """exp(X) of matrices (…, n, n) by scaling and squaring, after each of which exp(X / 2ⁱ) may be
+    ``mended``; NaN where X is beyond that.
+
+    Scaled to a size of one: at one of five, where scipy begins to square, its approximant (1.18)
+    loses a digit and a half under the kernels of some processors.
+    """
+    size = float(np.linalg.norm(X, 1, axis=(-2, -1)).max(initial=0))
+    if not np.isfinite(size):
+        return np.full(X.shape, np.nan, X.dtype)
+    squarings = max(int(np.ceil(np.log2(size))), 0) if size > 0 else 0
+    E = np.asarray(scipy.linalg.expm(X * 2.0**-squarings))
+    for i in range(squarings - 1, -1, -1):
+        E = E @ E
+        mended(E, i)
+    return E
+
+
 def _upper(X: Array) -> Array:
-    """exp(X) of an upper triangular matrix by scaling and squaring, its two diagonals exact.
+    """exp(X) of an upper triangular matrix, its two diagonals exact.
 
     Source: Al-Mohy and Higham, SIAM J. Matrix Analysis 31, 2009, code fragment 2.1.
     """
-    size = float(np.linalg.norm(X, 1))
-    squarings = max(int(np.ceil(np.log2(size))), 0) if size > 0 else 0
-    E = np.asarray(scipy.linalg.expm(X / 2**squarings))
-    for i in range(squarings - 1, -1, -1):
-        E = E @ E
+
+    def mended(E: Array, i: int) -> None:
         d, above = X.diagonal() / 2**i, X.diagonal(1) / 2**i
         np.fill_diagonal(E, np.exp(d))
         np.fill_diagonal(E[:, 1:], above * _mean_exponential(d[:-1], d[1:]))
-    return E
+
+    return _squared(X, mended)
 
 
 def _mean_exponential(a: Array, b: Array) -> Array:

@@ -152,3 +152,9 @@ def test_a_line_far_below_the_largest_response_is_told_too():
     told = rounding(both, fq.BandLimited(), far)
     assert told > 100 * rounding(both, fq.BandLimited(), near)
     assert rounding(both, fq.BandLimited(), np.concatenate([near, far])) > 0.5 * told
+
+
+@pytest.mark.parametrize("size", [1e200, 1e308])
+def test_what_is_beyond_numbers_is_no_error(size):
+    for X in (np.full((2, 2), size), np.array([[size, size], [0.0, 0.5 * size]])):
+        assert not np.isfinite(exponential(X)).all()
