@@ -49,7 +49,7 @@ json.dump(said, sys.stdout)
 
 def said(**environment):
     told = subprocess.run(
-        [sys.executable, "-W", "error::RuntimeWarning:freqid", "-c", FITS],
+        [sys.executable, "-W", "error::RuntimeWarning", "-c", FITS],
         capture_output=True, text=True, check=True, env=os.environ | environment,
     )  # fmt: skip
     return json.loads(told.stdout)
