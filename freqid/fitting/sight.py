@@ -9,12 +9,23 @@ import numpy as np
 from freqid.checks import ComplexArray, InputError
 from freqid.data import DataSet, Record
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
-from freqid.models import GreyBox, Parameter
+from freqid.models import GreyBox, Model, Parameter
 
 # nepers in a sample of a motion that no sample can show
 _GONE = 1e6
 # output samples of an input that are looked at first
 _FEW = 100
+
+
+def poles_of(model: Model) -> ComplexArray:
+    """Poles in rad/s of a model, sampled or not."""
+    return in_s(model.poles, model.dt) if model.dt else model.poles
+
+
+def in_s(z: ComplexArray, dt: float) -> ComplexArray:
+    """Sampled poles in rad/s."""
+    found: ComplexArray = np.log(np.where(z == 0, 1e-300, z).astype(complex)) / dt
+    return found
 
 
 def out_of_sight(poles: ComplexArray, hold: Hold) -> list[float]:

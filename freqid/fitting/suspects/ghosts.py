@@ -17,8 +17,9 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
 from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.search.descent import polish
+from freqid.fitting.sight import poles_of
 from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.halves import poles_of, weakly_damped
+from freqid.fitting.suspects.halves import weakly_damped
 from freqid.fitting.suspects.one_more import lines_beside
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.shared_noise import shared

@@ -15,6 +15,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
+from freqid.fitting.sight import in_s, poles_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.bent_modes import DAMPED, pulled
 from freqid.fitting.suspects.order import BENT
@@ -24,7 +25,6 @@ from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import CURES
 from freqid.fitting.suspects.spread import ELSEWHERE, LEVEL, compared, loudest
 from freqid.lti import Plane
-from freqid.models import Model
 
 # standard errors between two values that are no chance, and relative change of a mode that is none
 _APART, HOLDS_GOOD = 4.0, 0.01
@@ -95,7 +95,7 @@ def _as_good(inquiry: Asking, part: Sequence[Reading], half: Estimate) -> Comple
         with contextlib.suppress(InputError, ArithmeticError):
             found = polish(objective, inquiry.minimum.x, limit=_LIMIT)
             if found.cost - half.cost < LITTLE * objective.energy:
-                return _in_s(np.linalg.eigvals(chart.in_z(found.x).A), chart.dt)
+                return in_s(np.linalg.eigvals(chart.in_z(found.x).A), chart.dt)
     return poles_of(half.model)
 
 
@@ -143,16 +143,6 @@ def _elsewhere(est: Estimate, part: Sequence[Reading], half: Estimate) -> bool:
     P = len(est.values)
     f = (point.cost - half.cost) / P / loudest(half.minimum)
     return bool(scipy.stats.f.sf(max(f, 0.0), P, half.minimum.freedom) < ELSEWHERE)
-
-
-def poles_of(model: Model) -> ComplexArray:
-    """Poles of a black box in rad/s."""
-    return _in_s(model.poles, model.dt) if model.dt else model.poles
-
-
-def _in_s(z: ComplexArray, dt: float) -> ComplexArray:
-    found: ComplexArray = np.log(np.where(z == 0, 1e-300, z).astype(complex)) / dt
-    return found
 
 
 def weakly_damped(poles: ComplexArray) -> FloatArray:

@@ -23,9 +23,10 @@ from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
+from freqid.fitting.sight import poles_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.behind_delay import InStep, without_delay
-from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved, poles_of
+from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved
 from freqid.fitting.suspects.lacking_mode import lacking_mode
 from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
@@ -38,10 +39,9 @@ from freqid.models import DiscreteModel, GreyBox, observed_order
 _LINES = 3000
 # level of a gain that is worth a way to its end, and the part of it that a short way has to show
 _RARE, _PART = 1e-3, 0.6
-# part of a larger box's gain that one of the plant's own order has to make to be as good
-_AS_MUCH = 0.9
-# part of a line's noise that is left at least
-_KEPT = 0.1
+# part of a larger box's gain that one of the plant's own order has to make to be as good, and of a
+# line's noise that is left at least
+_AS_MUCH, _KEPT = 0.9, 0.1
 
 
 def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
