@@ -15,14 +15,15 @@ from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import UncomputableError
 from freqid.fitting.search.interrupted import INTERRUPTED
+from freqid.fitting.sight import poles_of
 from freqid.lti import Hold, PeriodicHold
 from freqid.models import GreyBox
 
 # a sampled pole this near to one is an integrator's to rounding
 _ON_LINE = 1e-10
 # and so is one that lets a motion fade by less than this part within a record without noise, of
-# which a fit leaves no more than this part
-_STILL, _EXACT = 1e-2, 1e-15
+# which a descent that ends next to the line may leave this part
+_STILL, _LEFT = 1e-2, 1e-7
 
 
 class OnLineError(InputError):
@@ -135,17 +136,21 @@ def fitted(
     to integrate.
     """
     fit = fitter_of(model)
-    if _apart_from_zero(readings) or any(_rests(r) for r in readings):
+    if _apart_from_zero(readings):
         return fit(model, readings, options), readings
+    near: Estimate | None = None
     try:
         est = fit(model, readings, options)
-        if not any(_on_line(est, r) for r in readings):
+        if not any(_on_line(est, r) for r in readings) or any(_rests(r) for r in readings):
             return est, readings
+        near = None if _exact(est) else est
     except (OnLineError, UncomputableError, np.linalg.LinAlgError):
-        if isinstance(model, GreyBox):
+        if isinstance(model, GreyBox) or any(_rests(r) for r in readings):
             raise
     less = [r.with_(skip_zero=True) for r in readings]
-    return fit(model, less, options), less
+    est = fit(model, less, options)
+    # whether a descent ended next to the line, or there is noise, shows where it is left out
+    return (near, readings) if near is not None and not _exact(est) else (est, less)
 
 
 def _rests(reading: Reading) -> bool:
@@ -156,14 +161,19 @@ def _rests(reading: Reading) -> bool:
     )
 
 
+def _exact(est: Estimate) -> bool:
+    """Whether nothing is left but rounding."""
+    return est.minimum.objective.noiseless(est.minimum.cost)
+
+
 def _on_line(est: Estimate, reading: Reading) -> bool:
-    """Whether a motion hardly fades within a record without noise whose line at zero is read."""
+    """Whether a motion hardly fades within a record all but without noise whose line at zero is
+    read.
+    """
     record = reading.data
     # beside noise what a pole on a line leaves there is nothing
-    exact = est.minimum.cost <= _EXACT * est.minimum.objective.energy
-    if est.message == INTERRUPTED or not exact or not isinstance(record, Record):
+    little = est.minimum.cost <= _LEFT * est.minimum.objective.energy
+    if est.message == INTERRUPTED or not little or not isinstance(record, Record):
         return False
-    model = met_by(est, reading)
-    poles = np.asarray(model.poles, complex)
-    rates = np.log(np.where(poles == 0, 1e-300, poles)) / model.dt if model.dt else poles
-    return bool(np.abs(rates).min(initial=np.inf) * record.duration < _STILL)
+    poles = poles_of(met_by(est, reading))
+    return bool(np.abs(poles).min(initial=np.inf) * record.duration < _STILL)

@@ -32,8 +32,6 @@ _STANDS = 0.01
 # part of the cost by which another start's end is another minimum, and how often a delay may go on
 # to the next sample
 _DEEPER, _DOORS = 1e-6, 3
-# part of the data that is but rounding
-_NOTHING = 1e-16
 # part of a sample that is none
 _BENT = 1e-3
 # the same of black boxes, and the lines that these are found on
@@ -84,7 +82,8 @@ def _in_turn(
     est, readings = fitted(model, readings, options)
     first, whole, rough = est, est, True
     for i in range(_NOISE_ROUNDS):
-        if est.message == INTERRUPTED or _leaves_nothing(est):
+        if est.message == INTERRUPTED or est.minimum.objective.noiseless(est.minimum.cost):
+            # of rounding no noise can be learnt
             return first, est, readings
         readings = [_learnt(est, r, options.estimated_hold) for r in readings]
         before, anew = est, again(est, options)
@@ -142,11 +141,6 @@ def _next_door(
     return best
 
 
-def _leaves_nothing(est: Estimate) -> bool:
-    """Whether what is left is but rounding, of which no noise can be learnt."""
-    return est.minimum.cost <= _NOTHING * est.minimum.objective.energy
-
-
 def _stands(est: Estimate, before: Estimate) -> bool:
     """Whether a round has moved nothing."""
     std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
@@ -194,11 +188,10 @@ def _left_by_boxes(
                     else before.on(own, count=_LINES)
                 )
                 boxes[group[0]] = box
-                if box.solution.cost <= _NOTHING * box.objective.energy:
+                if box.objective.noiseless(box.solution.cost):
                     return None
-                model = box.model(plant, one.hold)
                 for i in group:
-                    left = errors_of(model, seen[i])
+                    left = errors_of(box.model(plant, one.hold), seen[i])
                     even = even and evenly_spread(left.error)
                     if seen[i].noise.to_be_learnt:
                         noise = seen[i].noise.learnt(left.error, left.n_samples)

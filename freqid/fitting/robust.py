@@ -24,8 +24,6 @@ from freqid.fitting.uncertainty.minimum import Spread
 _CUT, _FAR = 1.5, 3.0
 # steps at the most, and the part of a standard error that ends them
 _STEPS, _STANDS = 30, 0.01
-# part of the data that is but rounding, in which no sample is off
-_NOTHING = 1e-16
 # the median of |e| in standard deviations of a normal variable
 _MEDIAN = 0.6744897501960817
 
@@ -48,7 +46,8 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     for _ in range(_STEPS):
         # what integrates without noise leaves out the line at zero
         readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
-        if est.minimum.cost <= _NOTHING * est.minimum.objective.energy:
+        if est.minimum.objective.noiseless(est.minimum.cost):
+            # of what is but rounding no sample is off
             break
         cut, inside, count = _cut(est, readings)
         before, (est, seen) = est, work(cut, est)

@@ -195,3 +195,18 @@ def test_halves_of_what_is_stable_by_request_are_asked_for_the_same():
     assert back.spec == est.model.spec
     for half in est.inquiry.apart(confirming(est.inquiry.readings)):
         assert np.abs(half.model.poles).max() <= 1
+
+
+def test_a_pole_that_is_let_go_and_meets_the_circle_again_is_held():
+    """It had not converged: a step inwards was predicted, and the minimum lay outside by 2e-7."""
+    rng = np.random.default_rng(15)
+    numerator, denominator, _ = scipy.signal.cont2discrete(([100.0], [1, 3.0, 0]), 0.01)
+    u = np.sign(rng.standard_normal(400))
+    y = scipy.signal.lfilter(numerator.ravel(), denominator, u)
+    e = scipy.signal.lfilter([np.sqrt(1 - 0.9**2)], [1, -0.9], rng.standard_normal(600))[200:]
+    data = fq.Record(u, y + 0.01 * y.std() * e, 0.01, hold="zoh")
+    est = fq.fit(fq.OutputError(2, stable=True), data)
+    assert est.verdict.grade == "trust", est.verdict
+    free = fq.fit(fq.OutputError(2), data)
+    assert free.cost < est.cost < 1.001 * free.cost
+    assert np.abs(est.model.poles).max() < 1

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from freqid.fitting.black_box.channel_units import Descent, begun_alike
+from freqid.fitting.black_box.pole_on_line import moved_onto_lines
 from freqid.fitting.black_box.refinement import identified_models, nested_model, scattered_model
 from freqid.fitting.black_box.stability_edge import at_the_edge, pressed
 from freqid.fitting.black_box.subspace import inputs_of
@@ -36,6 +37,8 @@ _CHARTS = 5
 _EDGE = 1e-9
 # a first descent that ends at so many times the cost of another is not followed
 _AWAY = 1.2
+# part of the data that a descent may leave that ends next to a line
+_LEFT = 1e-7
 
 Lines = Sequence[SpectralExperiment]
 
@@ -154,6 +157,18 @@ def _unstable(found: Descent) -> bool:
     """Whether a pole lies outside of the unit circle."""
     chart, solution, _ = found
     return bool((np.abs(np.linalg.eigvals(chart.in_z(solution.x).A)) > 1).any())
+
+
+def with_poles_on_lines(found: Descent, experiments: Sequence[Experiment]) -> Descent:
+    """The minimum, of data all but without noise, where the poles that all but meet a line lie on
+    it: a descent towards them ends before it is there.
+    """
+    chart, solution, objective = found
+    if objective.noiseless(solution.cost) or solution.cost > _LEFT * objective.energy:
+        return found
+    at = moved_onto_lines(chart.matrices(solution.x), experiments)
+    other = found if at is None else descended(chart.around(at), experiments)
+    return other if other[1].cost < solution.cost else found
 
 
 def within_circle(start: StateSpace, inside: float = _EDGE) -> StateSpace:

@@ -10,10 +10,22 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
 from freqid.fitting.black_box.channel_units import Descent
-from freqid.fitting.black_box.order_minimum import HIGH, Orders, descended, within_circle
+from freqid.fitting.black_box.order_minimum import (
+    HIGH,
+    Orders,
+    descended,
+    with_poles_on_lines,
+    within_circle,
+)
 from freqid.fitting.black_box.refinement import LINES, first_model, nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.black_box.stability_edge import STILL, at_the_edge, held_back, pressed
+from freqid.fitting.black_box.stability_edge import (
+    STILL,
+    at_the_edge,
+    held_back,
+    on_the_circle,
+    pressed,
+)
 from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
@@ -35,8 +47,6 @@ from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 _STEPS = 80
 # by how much rounding makes the motion of an integrator grow within the data
 _ROUNDED = 1e-6
-# part of the data's energy that is no noise, and what a descent along the circle leaves
-_EXACT, _EXACT_INSIDE = 1e-15, 1e-11
 
 
 @fits(OutputError, black_box=True)
@@ -66,8 +76,9 @@ def fit_output_error(
         except (UncomputableError, ArithmeticError) as error:
             raise OnLineError(str(error)) from error
     if not spec.stable:
+        chart, solution, objective = with_poles_on_lines((chart, solution, objective), lines)
         # those that are held at the edge of the circle lie next to the line, too
-        exact = solution.cost <= _EXACT * objective.energy
+        exact = objective.noiseless(solution.cost)
         refuse_on_line(np.linalg.eigvals(chart.in_z(solution.x).A), readings, exact)
     if first.own_cost:
         # the same model in the z plane, against the samples themselves
@@ -77,16 +88,13 @@ def fit_output_error(
         centre = Chart(at, spec.feedthrough, Plane(), dt, stable=spec.stable)
         chart, solution, objective = descended(centre, samples)
     edge = None
-    nothing = _EXACT_INSIDE * objective.energy
-    unsure = not solution.converged or pressed(chart, solution.x)
-    if spec.stable and unsure and solution.cost > nothing:
-        edge = at_the_edge(chart, solution.x, objective.experiments)
+    if spec.stable and (not solution.converged or pressed(chart, solution.x)):
+        edge = on_the_circle(chart, solution.x, objective.experiments)
+        if edge is not None:
+            refuse_on_line(np.linalg.eigvals(edge[0].in_z(edge[1].x).A), readings, exact=True)
+        edge = edge or at_the_edge(chart, solution.x, objective.experiments)
     if edge is not None:
         chart, solution, objective = edge
-    if spec.stable and solution.cost <= nothing:
-        # an integrator's pole lies on the circle, and nothing but rounding asks for more
-        refuse_on_line(np.linalg.eigvals(chart.in_z(solution.x).A), readings, True)
-        solution, edge = dataclasses.replace(solution, converged=True), None
     at = chart.in_z(solution.x)
     model = DiscreteModel(at, dt, first.hold, *common_names([first.data]), spec.stable)
     est = coefficient_estimate(

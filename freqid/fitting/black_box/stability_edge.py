@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import BoolArray, FloatArray, InputError
+from freqid.fitting.black_box.pole_on_line import moved_onto_lines
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment
 from freqid.fitting.cost.held_charts import RADIUS, HeldChart, radial
@@ -20,6 +21,7 @@ from freqid.fitting.cost.objective import Objective, Point
 from freqid.fitting.findings import Finding
 from freqid.fitting.search.descent import Solution, polish
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
+from freqid.lti import StateSpace
 
 # a pole this near to the circle may be held there
 _NEAR = 1e-3
@@ -29,6 +31,9 @@ _MET = 1e-6
 _ROUNDS, _STEPS, _GAIN = 12, 80, 1e-9
 # how far rounding takes a pole that is held from its radius
 _ROUNDED = 1e-9
+# the last digit of a radius, and the part of the data that one next to the circle may leave of what
+# has no noise
+_LAST, _EXACT = 2.0**-52, 1e-11
 # e-folds of a motion that grows within the data, beyond which it is none of an integrator, whose
 # pole noise moved; standard errors by which one grows for certain
 STILL, _CERTAIN = 3.0, 2.0
@@ -46,19 +51,19 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
     """
     centre, before, held_before = chart.matrices(x), np.inf, -1
     edge: Edge | None = None
+    held_there: Edge | None = None
     for _ in range(_ROUNDS):
-        free = chart.around(centre)
-        free.stable = False
-        point = Objective(free, experiments).point(np.zeros(free.size))
-        if point is None or not np.isfinite(point.triangle).all():
+        free, _, point = _let_go(chart, centre, experiments)
+        if point is None:
             return None
         leaving = _leaving(free, point)
         count = int(leaving.sum())
         if edge is not None and (leaving == _at_radius(free)).all():
             return edge
         if count == held_before == 0:
-            # what is free inside of the circle met it again
-            return None
+            # what is free inside of the circle met it again: held it was as good, or it is none
+            worth = held_there is not None and held_there[1].cost * (1 - _CREEPS) <= before
+            return held_there if worth else None
         held = HeldChart(free, leaving) if count else chart.around(centre)
         objective = Objective(held, experiments)
         try:
@@ -70,7 +75,55 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
             found = dataclasses.replace(found, converged=True)
         centre, held_before, before = held.matrices(found.x), count, found.cost
         edge = (held, found, objective) if found.converged else None
+        held_there = edge if count else held_there
     return None
+
+
+def on_the_circle(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) -> Edge | None:
+    """A stable model that leaves nothing of data without noise, though a descent to a point of its
+    chart met the circle, as an integrator's does; None where there is none there.
+
+    Steps that keep inside of the circle are short next to it: a way that may leave it comes closer,
+    and one that begins with the pole on a line on which it may lie.
+    """
+    free, cost, point = _let_go(chart, chart.matrices(x), experiments)
+    if point is None:
+        return None
+    here, found = np.zeros(free.size), None
+    starts = [free, free]
+    on_line = moved_onto_lines(free.centre, experiments)
+    if on_line is not None:
+        starts.append(_let_go(chart, on_line, experiments)[0])
+    least = _EXACT * cost.energy
+    for i, start in enumerate(starts):
+        centre = start.centre
+        if i > 0:
+            centre = start.matrices(polish(Objective(start, experiments), here, limit=_STEPS).x)
+        radius = float(np.abs(np.linalg.eigvals(centre.A)).max(initial=0.0))
+        if radius > 1 + _MET:
+            continue
+        inside = chart.around(centre._replace(A=centre.A / max(radius * (1 + _LAST), 1.0)))
+        objective = Objective(inside, experiments)
+        there = objective.point(np.zeros(inside.size))
+        if there is not None and there.cost <= least:
+            solution = Solution(np.zeros(inside.size), there, True, "nothing is left")
+            found, least = (inside, solution, objective), there.cost
+        if cost.noiseless(least):
+            break
+    return found
+
+
+def _let_go(
+    chart: Chart, centre: StateSpace, experiments: Sequence[Experiment]
+) -> tuple[Chart, Objective, Point | None]:
+    """A chart about a point whose poles may leave the circle, its cost, and that point in it; None
+    where it cannot be computed.
+    """
+    free = chart.around(centre)
+    free.stable = False
+    cost = Objective(free, experiments)
+    point = cost.point(np.zeros(free.size))
+    return free, cost, point if point and np.isfinite(point.triangle).all() else None
 
 
 def pressed(chart: Chart, x: FloatArray) -> bool:
@@ -122,21 +175,19 @@ def _wanted(chart: Chart, solution: Solution, objective: Objective) -> float:
     gained where it may leave; infinite where its motion grows by so much within the data that it is
     no pole on the circle, however badly it is known.
     """
-    free = chart.around(chart.matrices(solution.x))
-    free.stable = False
-    cost = Objective(free, objective.experiments)
-    point = cost.point(np.zeros(free.size))
-    if point is None or not np.isfinite(point.triangle).all():
+    free, cost, point = _let_go(chart, chart.matrices(solution.x), objective.experiments)
+    if point is None:
         return np.inf
     P = free.size
     step = -np.linalg.lstsq(point.triangle[:P, :P], point.triangle[:P, P])[0]
     minimum = Minimum(cost, Solution(np.zeros(P), point, True, ""))
     _, slope = radial(free.centre.A, free.derivative.A)
-    wanted = (slope @ step)[_leaving(free, point)]
+    leaving = _leaving(free, point)
+    wanted = (slope @ step)[leaving]
     if wanted.max(initial=0.0) * cost.n_rows > STILL:
         return np.inf
     scatter = slope @ Spread(np.eye(P), minimum).of_unknowns @ slope.T
-    std = np.sqrt(np.maximum(np.diag(scatter), 0))[_leaving(free, point)]
+    std = np.sqrt(np.maximum(np.diag(scatter), 0))[leaving]
     with np.errstate(divide="ignore", invalid="ignore"):
         certain = float(np.max(wanted / std, initial=0.0))
     if certain >= _CERTAIN:

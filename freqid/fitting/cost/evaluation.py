@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
+from freqid.checks import BoolArray, ComplexArray, FloatArray
 from freqid.fitting.cost.delays import open_ends
 from freqid.lti import BandLimited, PeriodicHold, Realisation, eliminate, sum_runs, transition
 
@@ -45,15 +45,15 @@ class SpectralEvaluation:
             )
         with np.errstate(divide="ignore", invalid="ignore"):
             every = self.plant.resolvent(self.z)
-        self._kept = self._off_poles(every, realisation)
-        self.inverse = every
+        self.inverse, self._kept = every, self._off_poles(every, realisation)
         if every is not None and self._kept is not None:
             self.inverse = np.where(self._kept, every, 0)
-        self._meet(realisation, ends)
-        if every is not None and self._kept is not None and not self._drowns(every):
+            self._meet(realisation, ends)
+            if self._drowns(every, self._kept):
+                return
             # beside what is left rounding is nothing, and the line tells what it tells
             self.inverse, self._kept = every, None
-            self._meet(realisation, ends)
+        self._meet(realisation, ends)
 
     def _meet(self, realisation: Realisation, ends: FloatArray | None) -> None:
         """The residual, and what is free in it."""
@@ -83,7 +83,7 @@ class SpectralEvaluation:
 
     def _off_poles(
         self, inverse: ComplexArray | None, realisation: Realisation
-    ) -> FloatArray | None:
+    ) -> BoolArray | None:
         """Which lines are kept (K,), those on which no pole lies by 1/(z − λ); None for all.
 
         There the free motion of that pole is the line's, and what is left of it rounding, which
@@ -98,15 +98,15 @@ class SpectralEvaluation:
         # NaN, as of a pole that a line meets exactly, is in no range
         if -far < parts.min() and parts.max() < far:
             return None
-        kept = (np.abs(inverse) < far).all(axis=0).astype(float)
+        kept: BoolArray = np.asarray((np.abs(inverse) < far).all(axis=0))
         Y = np.abs(self.experiment.lines.Y)
         # of outputs that rest nothing else is left
         return kept if (Y * kept).max() > _RESTS * Y.max() else None
 
     @np.errstate(all="ignore")
-    def _drowns(self, inverse: ComplexArray) -> bool:
+    def _drowns(self, inverse: ComplexArray, kept: BoolArray) -> bool:
         """Whether rounding at the lines that are left out shows beside what the others leave."""
-        out = self._kept == 0
+        out = ~kept
         drive = np.abs(self.plant.drive(self.z, self.U_state)[..., out])
         y = np.tensordot(np.abs(self.plant.C), drive * np.abs(inverse)[:, None, out], 1)
         rounded = np.finfo(float).eps * y * np.abs(self.experiment.lines.scale[..., out])

@@ -25,6 +25,8 @@ from freqid.lti import Hold, Realisation, triangle, triangle_of
 
 # squares of what is larger leave the range of numbers
 _HUGE = 1e150
+# part of the data's energy that no sensor's noise is below: 150 dB
+_NOISELESS = 1e-15
 
 
 # derivatives that are held before they are folded to a triangle: what a fit takes of memory is that
@@ -144,6 +146,10 @@ class Objective:
         other = Objective(structure, self.experiments, prior)
         other.n_evaluations = self.n_evaluations
         return other
+
+    def noiseless(self, cost: float) -> bool:
+        """Whether a cost is so small a part of the data that no sensor's noise is in it."""
+        return cost <= _NOISELESS * self.energy
 
     def point(self, x: FloatArray) -> Point | None:
         """Everything at x; None where the model cannot be computed there."""
