@@ -23,7 +23,6 @@ from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
-from freqid.fitting.suspects.late_instead import late_for_another
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
@@ -32,6 +31,7 @@ from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
+from freqid.fitting.suspects.scales import instead
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, Score, score
 from freqid.fitting.suspects.sentences import sentence, words
@@ -219,8 +219,8 @@ class Inquiry:
         turn = turned(self, scene)
         if turn and not outdone(turn[0].number or 0.0, named, scene):
             return turn
-        if not named or (late := late_for_another(self, scene, named)):
-            return late if named else []
+        if not named or (other := instead(self, scene, named)):
+            return other if named else []
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
         least = (most := evidence(scene, named[0])) * (_WORTH if most > 0 else 1)
