@@ -196,7 +196,7 @@ for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_mo
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point: 0 done, 1 the fit did not converge, 2 bad arguments or bad input."""
-    _end_tidily_when_told_to()
+    ended = _end_tidily_when_told_to()
     try:
         with plain_warnings():
             status = app(arguments, exit_on_error=False, print_error=False)
@@ -214,18 +214,25 @@ def main(arguments: list[str] | None = None) -> None:
         _fail(str(error))
     except KeyboardInterrupt:
         _fail("interrupted", _INTERRUPTED)
-    sys.exit(status if isinstance(status, int) else 0)
+    sys.exit(ended[0] if ended else status if isinstance(status, int) else 0)
 
 
-def _end_tidily_when_told_to() -> None:
-    """A signal to end is an exit like another, which leaves no half-written file behind."""
+def _end_tidily_when_told_to() -> list[int]:
+    """A signal to end is an exit like another, which leaves no half-written file behind.
+
+    The exit codes that were told are returned as they come: a library's callback that is running
+    then may drop the exit on its way, and what goes on to its end says still that it was told to.
+    """
+    told: list[int] = []
 
     def end(number: int, frame: object) -> None:
-        sys.exit(128 + number)
+        told.append(128 + number)
+        sys.exit(told[0])
 
     with contextlib.suppress(ValueError):
         # only the main thread may say so
         signal.signal(signal.SIGTERM, end)
+    return told
 
 
 # as shells tell it

@@ -127,6 +127,28 @@ def test_a_wrong_gain_lacks_no_mode(weights, channel, number, factor):
     assert est.verdict.grade != "trust"
 
 
+@pytest.mark.parametrize(("factor", "number"), [(180 / np.pi, 0), (180 / np.pi, 1), (1.05, 1)])
+def test_an_axis_whose_angle_is_in_degrees_is_told_the_factor(factor, number):
+    model = fq.GreyBox(
+        lambda J, d, k: ([[0, 1.0], [-k / J, -d / J]], [[0], [1 / J]], [[1, 0], [0, 1.0]], None),
+        [fq.Parameter("J", 0.12, lower=0), fq.Parameter("d", 0.6, lower=0),
+         fq.Parameter("k", 45.0, lower=0)],
+        inputs=["torque"], outputs=["angle", "speed"],
+    )  # fmt: skip
+    u = fq.chirp(0.5, 20, 10, DT)
+    y = fq.simulate(model.with_values(J=0.1, d=0.5, k=40.0), u, DT).y.copy()
+    y[:, number] *= factor
+    y += 0.02 * y.std(axis=0) * np.random.default_rng(1).standard_normal(y.shape)
+    names = {"input_names": ["torque"], "output_names": ["angle", "speed"]}
+    est = fq.fit(model, fq.Record(u, y, DT, **names))
+    assert est.warnings[0].kind == "scale"
+    name = ("angle", "speed")[number]
+    said = re.search(rf"output '{name}' is ([0-9.]+) times as large", est.warnings[0])
+    assert said, est.warnings[0]
+    assert float(said[1]) == pytest.approx(factor, rel=0.02)
+    assert est.verdict.grade != "trust"
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("unit", [1.0, 1000.0])
 def test_the_witness_counts_the_output_that_outweighs_the_others(unit):

@@ -232,6 +232,24 @@ def test_told_to_end_it_ends_tidily(day):
     assert all(p.stat().st_size > 0 for p in figures.iterdir())
 
 
+def test_an_exit_that_a_callback_drops_is_said_at_the_end():
+    """It was 0 where the signal came while a library called back."""
+    run = subprocess.run(
+        [sys.executable, "-c", """
+import os, signal, freqid.cli.commands as commands
+def work(*arguments, **options):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    except SystemExit:
+        pass
+commands.app = work
+commands.main([])
+"""],
+        check=False, timeout=100,
+    )  # fmt: skip
+    assert run.returncode == 128 + signal.SIGTERM
+
+
 def test_a_full_disk_leaves_no_file(day, tmp_path):
     if os.geteuid():
         pytest.skip("needs the right to mount a small disk")

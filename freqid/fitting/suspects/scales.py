@@ -32,6 +32,8 @@ _NAME, _WIDE = "scale of a channel", 1e4
 _LOOKS_LIKE = (*LACKING, *BENT, "unsteady", "feedthrough", "jump", "tone")
 # how near to one a scale is none, and the part of the gain at which another channel's is as likely
 _NONE, _AS_LIKELY = 1e-3, 0.98
+# how near to the end of that range a scale is none that the data tell
+_END = 1.1
 # starts of each fit, and the part of a mode's evidence that one unknown needs
 _STARTS, _AS_MUCH = 1, 0.8
 
@@ -156,4 +158,7 @@ def _fitted(begun: GreyBox, channel: _Channel, readings: Sequence[Reading]) -> E
         est = fitter_of(model)(model, readings, SearchOptions(n_starts=_STARTS))
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return None
-    return None if abs(est[_NAME] - 1) < _NONE else est
+    scale = float(est[_NAME])
+    # at the end of the range the noise of a faulty fit has let the channel count for nothing
+    found = abs(scale - 1) >= _NONE and _END / _WIDE < scale < _WIDE / _END
+    return est if found else None
