@@ -148,7 +148,13 @@ def fitted(
         if isinstance(model, GreyBox) or any(_rests(r) for r in readings):
             raise
     less = [r.with_(skip_zero=True) for r in readings]
-    est = fit(model, less, options)
+    try:
+        est = fit(model, less, options)
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        # lines may be too few without it
+        if near is None:
+            raise
+        return near, readings
     # whether a descent ended next to the line, or there is noise, shows where it is left out
     return (near, readings) if near is not None and not _exact(est) else (est, less)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from freqid.checks import InputError
 from freqid.fitting.black_box.channel_units import Descent, begun_alike
 from freqid.fitting.black_box.pole_on_line import moved_onto_lines
 from freqid.fitting.black_box.refinement import identified_models, nested_model, scattered_model
@@ -167,7 +168,10 @@ def with_poles_on_lines(found: Descent, experiments: Sequence[Experiment]) -> De
     if objective.noiseless(solution.cost) or solution.cost > _LEFT * objective.energy:
         return found
     at = moved_onto_lines(chart.matrices(solution.x), experiments)
-    other = found if at is None else descended(chart.around(at), experiments)
+    try:
+        other = found if at is None else descended(chart.around(at), experiments)
+    except (InputError, ArithmeticError):
+        return found
     return other if other[1].cost < solution.cost else found
 
 

@@ -93,7 +93,8 @@ def on_the_circle(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]
     starts = [free, free]
     on_line = moved_onto_lines(free.centre, experiments)
     if on_line is not None:
-        starts.append(_let_go(chart, on_line, experiments)[0])
+        moved, _, computed = _let_go(chart, on_line, experiments)
+        starts += [moved] if computed else []
     least = _EXACT * cost.energy
     for i, start in enumerate(starts):
         centre = start.centre

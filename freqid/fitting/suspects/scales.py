@@ -132,7 +132,10 @@ def _better_by_noise(
     own = _fitted(begun, channel, weighed)
     if own is None:
         return 0.0
-    without = fitter_of(begun)(begun, weighed, SearchOptions(n_starts=_STARTS))
+    try:
+        without = fitter_of(begun)(begun, weighed, SearchOptions(n_starts=_STARTS))
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return 0.0
     return _better(without.minimum.cost, own.minimum.cost)
 
 
