@@ -68,3 +68,13 @@ def test_a_profile_of_what_has_no_error(plant):
     exact = fq.simulate(fq.first_order(b=50, a=20), fq.white_noise(300), 0.01)
     ends = fq.fit(plant, exact).intervals("profile")
     assert np.allclose(ends.to_numpy(), [[50, 50], [20, 20]], rtol=1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-12])
+def test_a_profile_of_data_without_noise_is_the_linear_interval(noise):
+    axis = fq.two_mass()
+    record = fq.simulate(axis, fq.chirp(10, 80, 1.0, 5e-4), 5e-4)
+    record = record.with_noise(noise * record.y.std(), seed=0) if noise else record
+    ends = fq.fit(axis, record).intervals("profile").to_numpy()
+    true = np.array([p.value for p in axis.free_parameters])
+    assert np.allclose(ends, true[:, None], rtol=1e-6)

@@ -119,6 +119,9 @@ def _linear(minimum: Minimum, own: FloatArray, level: float) -> tuple[float, dic
     """The quantile of a level, and of each unknown, with its standard error ``own`` (P,), by how
     much the cost rises to its interval's end; an error that is down to rounding has no profile.
     """
+    if minimum.exact:
+        # what rounding leaves is no noise, and its cost no parabola
+        return quantile(values_that_tell(minimum), level), {}
     noise = minimum.noise_variance
     white = noise * np.diag(minimum.determined.inverse)
     half = quantile(values_that_tell(minimum), level)
