@@ -83,6 +83,11 @@ class Beside:
         box = self.box.deepened(structure.at(x), readings)
         return None if box is None else dataclasses.replace(self, box=box)
 
+    def on(self, readings: Sequence[Reading], lines: int) -> Beside:
+        """The same black box followed to its minimum on about so many lines."""
+        seen = [in_step(r, self.shifts) for r in readings]
+        return dataclasses.replace(self, box=self.box.on(seen, count=lines))
+
     def begun(self, structure: GreyStructure, start: FloatArray) -> FloatArray:
         """The start with its unknown delays within the samples in which the black box has them."""
         return _with_delays(structure, start, self.shifts, self.period)

@@ -9,8 +9,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import cast
 
+import numpy as np
+
 from freqid.checks import FloatArray, InputError
-from freqid.fitting.beside import Beside, begun_slowly, beside_of, guide_of
+from freqid.fitting.beside import (
+    Beside,
+    BesidePlaces,
+    begun_slowly,
+    beside_of,
+    bound_of,
+    guide_of,
+)
 from freqid.fitting.black_box.late import description_length, whole_samples
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
@@ -24,7 +33,7 @@ from freqid.fitting.search.interrupted import best_so_far
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.scatter import around
 from freqid.fitting.search.stages import Search
-from freqid.fitting.search.stopping import Found
+from freqid.fitting.search.stopping import Found, StopRule
 from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.lti import Hold
 
@@ -89,7 +98,8 @@ def _search(
         every = sum(e.n_lines for e in spectral)
         share = sum(e.n_lines for e in few) / every
         part = share < 1 and options.n_starts is None
-        found = _searched(Surveyed(structure, at_lines, floor, lines, share, part), scout, options)
+        survey = Surveyed(structure, at_lines, floor, lines, share, part)
+        found, beside = _searched(survey, scout, options)
         if part and (not found.sure or (not in_time and _misled(objective, found))):
             # what so many lines leave open more of them may tell
             more = thinned_to(spectral, _MORE * lines)
@@ -98,7 +108,9 @@ def _search(
             wide.n_evaluations = scout.n_evaluations
             share = sum(e.n_lines for e in more) / every
             data = Surveyed(structure, at_lines, floor, _MORE * lines, share)
-            again = _searched(data, wide, options, found.solution.x)
+            again = None if found.sure else _followed(data, wide, beside, found)
+            if again is None:
+                again, _ = _searched(data, wide, options, found.solution.x)
             starts = found.n_starts + again.n_starts - 1
             found, scout = dataclasses.replace(again, n_starts=starts), wide
     # those on all lines were counted as they were made
@@ -134,10 +146,28 @@ class Surveyed:
     part: bool = False
 
 
+def _followed(
+    data: Surveyed, wide: Objective, beside: Beside | BesidePlaces | None, found: Found
+) -> Found | None:
+    """A minimum and the black box beside it on more lines; None unless these tell all unknowns and
+    nothing of another minimum.
+    """
+    if not isinstance(beside, Beside):
+        return None
+    try:
+        there = beside.on(data.readings, data.lines)
+        end = Found(polish(wide, found.solution.x), found.n_starts, found.n_agreed)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    bound = bound_of(there, data.structure, data.share)
+    rule = StopRule(None, wide.rounding, data.floor, bound)
+    return end if bound is not None and rule.convinced(end) else None
+
+
 def _searched(
     data: Surveyed, scout: Objective, options: SearchOptions, known: FloatArray | None = None
-) -> Found:
-    """The minimum on these lines, aimed at black boxes on the same, no worse than what is known."""
+) -> tuple[Found, Beside | BesidePlaces | None]:
+    """The minimum on these lines, no worse than what is known, and the black boxes it aimed at."""
     structure, readings, start = data.structure, data.readings, data.structure.start
     beside = beside_of(structure, readings, data.lines)
     if isinstance(beside, Beside) and structure.model.delay_sources:
@@ -167,8 +197,8 @@ def _searched(
         search.most = _ALONE
     found = search.run(start, options.n_starts, options.seed, known)
     if isinstance(beside, Beside) and structure.model.delay_sources:
-        return _without_hiding(found, scout, readings, start)
-    return found
+        found = _without_hiding(found, scout, readings, start)
+    return found, beside
 
 
 def _without_hiding(
