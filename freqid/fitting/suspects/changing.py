@@ -30,6 +30,9 @@ def unsteady(scene: Scene, model: Model) -> Columns | None:
     if any(s.record is None for s in scene.seen):
         return None
     free = ~scene.held
+    if not free.any():
+        # all of them lie at a bound
+        return None
     size = np.abs(scene.x[free]) if isinstance(model, GreyBox) else np.ones(free.sum())
     drawn = [_from_middle(scene, model, s, free) * size[:, None] for s in scene.seen]
     return Columns(drawn, "of it" if isinstance(model, GreyBox) else "")

@@ -31,7 +31,7 @@ from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
 from freqid.fitting.suspects.register import SUSPECTS, Columns
 from freqid.fitting.suspects.rest import begun_in_motion
-from freqid.fitting.suspects.scales import instead
+from freqid.fitting.suspects.scales import instead, instead_of_swapped
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, Score, score
 from freqid.fitting.suspects.sentences import sentence, words
@@ -218,7 +218,7 @@ class Inquiry:
             return found
         turn = turned(self, scene)
         if turn and not outdone(turn[0].number or 0.0, named, scene):
-            return turn
+            return instead_of_swapped(self, turn) or turn
         if not named or (other := instead(self, scene, named)):
             return other if named else []
         # a change beside a fault of a sensor is another thing, however weak

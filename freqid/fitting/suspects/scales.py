@@ -7,6 +7,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.late_instead import late_for_another
-from freqid.fitting.suspects.order import BENT, LACKING, evidence
+from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
@@ -29,7 +30,7 @@ from freqid.models import GreyBox, Parameter
 # the channel's own unknown, and how far from one it is looked for
 _NAME, _WIDE = "scale of a channel", 1e4
 # what a wrong scale looks like
-_LOOKS_LIKE = (*LACKING, *BENT, "unsteady", "feedthrough", "jump", "tone")
+_LOOKS_LIKE = (*LACKING, *BENT, *LIKELY, "unsteady", "feedback", "jump", "tone")
 # how near to one a scale is none, and the part of the gain at which another channel's is as likely
 _NONE, _AS_LIKELY = 1e-3, 0.98
 # how near to the end of that range a scale is none that the data tell
@@ -79,40 +80,68 @@ def on_another_scale(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
     """A finding where one of several channels on another scale explains the data better than what
     speaks, each unknown counted.
     """
-    model, structure = inquiry.model, inquiry.minimum.structure
-    if not isinstance(model, GreyBox) or not plain(structure):
-        return []
     if named[0].name not in _LOOKS_LIKE:
         return []
-    channels = _channels(inquiry, model)
-    start = dict(zip(structure.physical_names, structure.values, strict=False))
-    begun = model.with_values(**start)
-    tried = [(f, c) for c in channels if (f := _fitted(begun, c, inquiry.readings)) is not None]
+    begun, tried = _tried(inquiry)
     if not tried:
         return []
-    tried.sort(key=lambda each: each[0].minimum.cost)
     best, channel = tried[0]
     gain = scene.cost - best.minimum.cost
     n, better = max(scene.freedom, 2), _better(scene.cost, best.minimum.cost)
     if not scene.even:
         # an output that hardly counts in the fit is what tells of its scale
         better = max(better, _better_by_noise(begun, best, channel, inquiry.readings))
-    told = n * better - np.log(n) - 2 * np.log(len(channels))
+    told = n * better - np.log(n) - 2 * np.log(len(_channels(inquiry, begun)))
     # one unknown is simpler than a mode
     enough = [
         (_AS_MUCH if a.name in LACKING else 1.0) * max(evidence(scene, a), 0.0) for a in named
     ]
-    if gain <= 0 or told <= max(enough):
+    # what leaves nothing of data without noise is it
+    if gain <= 0 or (told <= max(enough) and not best.minimum.exact):
         return []
-    least = _AS_LIKELY * gain
-    likely = [(est, c) for est, c in tried if scene.cost - est.minimum.cost >= least]
+    return [_finding(tried, scene.cost)]
+
+
+def instead_of_swapped(inquiry: Asking, turn: Sequence[Finding]) -> list[Finding]:
+    """A finding where one channel on another scale explains more than channels exchanged."""
+    if turn[0].kind != "swapped channels":
+        return []
+    _, tried = _tried(inquiry)
+    if not tried or not _left(tried[0][0]) < (turn[0].number or 0.0):
+        return []
+    return [_finding(tried, inquiry.minimum.cost)]
+
+
+def _tried(inquiry: Asking) -> tuple[GreyBox, list[tuple[Estimate, _Channel]]]:
+    """The plant at its start, and fits with the scale of one channel free, the best first; none
+    where the data tell none.
+    """
+    model, structure = inquiry.model, inquiry.minimum.structure
+    if not isinstance(model, GreyBox) or not plain(structure):
+        return cast(GreyBox, model), []
+    start = dict(zip(structure.physical_names, structure.values, strict=False))
+    begun = model.with_values(**start)
+    fits = [(_fitted(begun, c, inquiry.readings), c) for c in _channels(inquiry, model)]
+    found = [(f, c) for f, c in fits if f is not None]
+    return begun, sorted(found, key=lambda each: each[0].minimum.cost)
+
+
+def _finding(tried: Sequence[tuple[Estimate, _Channel]], cost: float) -> Finding:
+    """The first of them in words, and those that gain about as much of a ``cost``."""
+    best = tried[0][0]
+    least = _AS_LIKELY * (cost - best.minimum.cost)
+    likely = [(est, c) for est, c in tried if cost - est.minimum.cost >= least]
     words = ", or ".join(c.words(float(est[_NAME])) for est, c in likely)
-    left = best.minimum.cost / max(best.minimum.objective.energy, 1e-300)
     text = (
-        f"{words}: so {100 * (1 - np.sqrt(left)):.4g} % of the data are explained; check its unit, "
-        "gear ratio and calibration, or give it a scale in the model"
+        f"{words}: so {100 * (1 - np.sqrt(_left(best))):.4g} % of the data are explained; check "
+        "its unit, gear ratio and calibration, or give it a scale in the model"
     )
-    return [Finding("scale", text, number=float(best[_NAME]))]
+    return Finding("scale", text, number=float(best[_NAME]))
+
+
+def _left(est: Estimate) -> float:
+    """What is left of the data's energy."""
+    return est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
 
 
 def _better(before: float, after: float) -> float:
