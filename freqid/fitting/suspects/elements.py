@@ -17,7 +17,7 @@ from freqid.lti import Hold, InputHolds, StateSpace
 from freqid.models import GreyBox, Model, SystemModel
 
 # second singular value, as a part of the first, of a derivative that is of one force and one motion
-_ONE = 1e-9
+ONE = 1e-9
 # part of its change by which A is off a straight line in a parameter
 _BENT = 1e-6
 # part of its own size by which a force is not along an input
@@ -104,7 +104,7 @@ def elements(model: Model, heard: bool = False) -> list[Element]:
             continue
         scale = np.maximum(np.abs(dA).max(axis=1, keepdims=True), 1e-300)
         U, sizes, Vt = np.linalg.svd(dA / scale)
-        if (len(sizes) > 1 and sizes[1] > _ONE * sizes[0]) or not _straight(model, name, at.A, dA):
+        if (len(sizes) > 1 and sizes[1] > ONE * sizes[0]) or not _straight(model, name, at.A, dA):
             continue
         most = Vt[0][np.argmax(np.abs(Vt[0]))]
         force, motion = U[:, 0] * sizes[0] * scale[:, 0] * most, Vt[0] / most

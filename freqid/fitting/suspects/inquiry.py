@@ -13,8 +13,8 @@ import numpy as np
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.findings import Finding, Severity, between_parts, suspects_table
 from freqid.fitting.reading import Reading
-from freqid.fitting.suspects import changing, jumps, measurement, nonlinear, plant
 from freqid.fitting.suspects.absorbed import asked_again
+from freqid.fitting.suspects.all_suspects import SUSPECTS
 from freqid.fitting.suspects.asking import equally_weighted
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
@@ -29,7 +29,7 @@ from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, ou
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
-from freqid.fitting.suspects.register import SUSPECTS, Columns
+from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.rest import begun_in_motion
 from freqid.fitting.suspects.scales import instead, instead_of_swapped
 from freqid.fitting.suspects.scene import Scene
@@ -58,8 +58,6 @@ _SMALL, _HARMLESS = 0.3, 1e-3
 _NOTHING, _QUIET = 1e-5, 1e-4
 # part of what is left that is most of it, and that is hardly any
 _MOST, _HARDLY = 0.5, 0.1
-# the files whose suspects are known
-_KNOWN = (changing, jumps, measurement, nonlinear, plant)
 # level at which all suspects together speak of good data
 LEVEL = 0.0065
 

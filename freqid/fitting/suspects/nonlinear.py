@@ -25,7 +25,7 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.models import GreyBox, Model
 
-Part = TypeVar("Part", Element, FarEnd)
+Part = TypeVar("Part", bound=Element | FarEnd)
 
 # inputs times outputs that are asked at the most
 _PAIRS = 9
@@ -73,11 +73,11 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     has its own. Beside each damper, with what that one answers to; on masses that springs alone
     hold; at the far end of a black box.
     """
-    if not _asked(scene, model):
+    if not can_bend(scene, model):
         return []
     dampers = [each for each in _elements(scene, model) if each[0].damps]
-    dampers += _same([masses(s.own(model)) for s in scene.seen])
-    ends = _same([[*far_ends(s.own(model))] for s in scene.seen])
+    dampers += same([masses(s.own(model)) for s in scene.seen])
+    ends = same([[*far_ends(s.own(model))] for s in scene.seen])
     count = 2 + len(dampers) + len(ends)
     ways: dict[str, Callable[[FloatArray], FloatArray]] = {
         "of the input turns round with the output": _direction,
@@ -122,17 +122,17 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
     """A gain that bends: the drive's, the sensor's, a spring's at the output, or that of any spring
     or damper of a grey box, or of a mode of a black one.
     """
-    if not _asked(scene, model):
+    if not can_bend(scene, model):
         return []
     kinds: dict[_Bend, list[tuple[FloatArray, FloatArray]]] = {}
     springs = _elements(scene, model)
-    pairs, alike = _pairs(model), [(i, i) for i in range(model.n_inputs)]
+    pairs = _pairs(model)
     for s in scene.seen:
         u = s.record.inputs[: s.grid[0]].T  # type: ignore[union-attr]
         y = _fitted(s)
         bent = s.lines_of(_cube(s.signals(y)))
-        if all(_more_than_levels(each) for each in u):
-            drive = _onto(s, model, alike, s.lines_of(_cube(u)), s.lines_of_input)
+        if all(more_than_levels(each) for each in u):
+            drive = of_inputs(s, model, s.lines_of(_cube(u)), s.lines_of_input)
             kinds.setdefault(_DRIVE, []).append((drive[0], drive[1]))
         if not isinstance(model, GreyBox) or all(each[0].damps for each in springs):
             forces = _onto(s, model, pairs, bent, y)
@@ -160,7 +160,7 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
     ]  # fmt: skip
 
 
-def _asked(scene: Scene, model: Model) -> bool:
+def can_bend(scene: Scene, model: Model) -> bool:
     """Whether the data can show it: records whose outputs are as fast as their inputs.
 
     Where decimation has folded an input what it did between the samples is as good as bent.
@@ -174,10 +174,10 @@ def _asked(scene: Scene, model: Model) -> bool:
 def _elements(scene: Scene, model: Model) -> list[tuple[Element, ...]]:
     """Springs and dampers, those of the modes of a black box, each as every experiment met it."""
     parts = elements if isinstance(model, GreyBox) else modal_elements
-    return _same([parts(s.own(model)) for s in scene.seen])
+    return same([parts(s.own(model)) for s in scene.seen])
 
 
-def _same(met: Sequence[Sequence[Part]]) -> list[tuple[Part, ...]]:
+def same(met: Sequence[Sequence[Part]]) -> list[tuple[Part, ...]]:
     """Each part of a plant as every experiment met it, where all met the same parts."""
     same = all([e.rubs for e in found] == [e.rubs for e in met[0]] for found in met)
     return list(zip(*met, strict=True)) if same else []
@@ -222,6 +222,11 @@ def _onto(
     return rows
 
 
+def of_inputs(s: Seen, model: Model, *signals: ComplexArray) -> list[FloatArray]:
+    """Rows (inputs, rows) of each input with its own of several signals (inputs, K) beside it."""
+    return _onto(s, model, [(i, i) for i in range(model.n_inputs)], *signals)
+
+
 def _cube(signal: FloatArray) -> FloatArray:
     """The cube, of which the part that goes with the signal is the signal itself."""
     size = np.sqrt(np.mean(signal**2, axis=-1, keepdims=True))
@@ -231,7 +236,7 @@ def _cube(signal: FloatArray) -> FloatArray:
     return found
 
 
-def _more_than_levels(signal: FloatArray) -> bool:
+def more_than_levels(signal: FloatArray) -> bool:
     """Whether a signal has more than so few levels that a straight line meets all cubes."""
     low, step = signal.min(), max(_LEVEL * float(np.ptp(signal)), 1e-300)
     # most have within a few samples, next to one another or far apart

@@ -21,7 +21,7 @@ _CLEAR = 1e-3
 _AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
-BENT, _HALF = ("friction", "nonlinear"), 0.5
+BENT, _HALF = ("friction", "nonlinear", "asymmetric"), 0.5
 # part of what jumps explain from which a plant that bends makes them, for at many places they
 # imitate all else; and the same where they explain less than the last part of what is left
 _FIFTH, _TWELFTH, _THIRD = 0.2, 0.08, 0.35

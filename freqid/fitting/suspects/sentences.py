@@ -33,6 +33,14 @@ CURES = {
         "or move the plant so that it does not turn round"
     ),
     "nonlinear": "lower the excitation, or identify at the level at which the plant will work",
+    "backlash": (
+        "measure behind the play, keep a load on it so that one side always pushes, or give what "
+        "it takes off as an input of its own (record.with_input)"
+    ),
+    "asymmetric": (
+        "give the model both values in a simulation of your own, or keep a bias on the motion so "
+        "that it does not turn round"
+    ),
     "feedback": (
         "the record is of a closed loop: give it its reference, with reference=True where a note "
         "says that it was left out, or excite it by one"
@@ -84,6 +92,8 @@ def words(name: str, size: float, unit: str, detail: str, channel: str = "") -> 
         # a sensor that looks the other way makes it negative
         "friction": f"a friction of {abs(size):.3g}{unit} {detail}",
         "nonlinear": f"the plant is not linear: {detail}{level}",
+        "backlash": f"{detail} has play: what acts is {number} behind it, on either side",
+        "asymmetric": f"the plant is not linear: {detail}, by about {2 * abs(size):.2g} %",
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": (
             f"separate fits of the experiments differ by {100 * size:.3g} %{parameter}"
