@@ -103,6 +103,11 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         held = [a for a in ranked[1:] if a.name == "hold rejected" and evidence(scene, a) >= sure]
         simple += [a for a in held if a not in simple]
         ranked = [*simple, *(a for a in ranked if a not in simple)]
+    if ranked[0].name == "asymmetric":
+        # what acts more one way has a mean, and where the plant integrates a slope
+        enough = _AS_MUCH * ranked[0].test.gain
+        added = [a for a in ranked if a.name in _SENSOR and a.test.gain >= enough]
+        ranked = [*added, *(a for a in ranked if a not in added)]
     if ranked[0].name == "unsteady":
         # to a sweep whatever the model lacks is a change between its halves
         first = ranked[0]
