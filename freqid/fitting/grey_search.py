@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import cast
 
 import numpy as np
@@ -31,11 +30,11 @@ from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.interrupted import best_so_far
 from freqid.fitting.search.noise_floor import noise_floor
+from freqid.fitting.search.rounds import LIMIT
 from freqid.fitting.search.scatter import around
 from freqid.fitting.search.stages import Search
 from freqid.fitting.search.stopping import Found, StopRule
 from freqid.fitting.sight import hold_that_changes, out_of_sight
-from freqid.lti import Hold
 
 # lines on which the minimum is looked for, and how many times more for noise as large as the signal
 _LINES, _NOISY = 600, 10
@@ -145,6 +144,14 @@ class Surveyed:
     share: float
     part: bool = False
 
+    def hidden(self, x: FloatArray) -> bool:
+        """Whether a mode lies above every hold's Nyquist frequency, where it looks like another."""
+        if self.structure.unknown:
+            return False
+        poles = self.structure.at(x).poles
+        holds = [hold_that_changes(r.hold, r.data) for r in self.readings]
+        return all(out_of_sight(poles, hold) for hold in holds)
+
 
 def _followed(
     data: Surveyed, wide: Objective, beside: Beside | BesidePlaces | None, found: Found
@@ -156,12 +163,15 @@ def _followed(
         return None
     try:
         there = beside.on(data.readings, data.lines)
-        end = Found(polish(wide, found.solution.x), found.n_starts, found.n_agreed)
+        end = polish(wide, found.solution.x, limit=LIMIT)
     except (InputError, np.linalg.LinAlgError):
         return None
     bound = bound_of(there, data.structure, data.share)
     rule = StopRule(None, wide.rounding, data.floor, bound)
-    return end if bound is not None and rule.convinced(end) else None
+    again = Found(end, found.n_starts, found.n_agreed)
+    if bound is None or not rule.convinced(again) or data.hidden(end.x):
+        return None
+    return again
 
 
 def _searched(
@@ -188,8 +198,7 @@ def _searched(
         return guide_of(beside, structure, few, data.share)
 
     # who begins with a mode out of sight means it
-    hidden = partial(_hidden, structure, [hold_that_changes(r.hold, r.data) for r in readings])
-    aliased = (lambda x: False) if hidden(start) else hidden
+    aliased = (lambda x: False) if data.hidden(start) else data.hidden
     guide = guide_of(beside, structure, few, data.share)
     search = Search(scout, guide, data.floor, aliased, deepened, data.part)
     if beside is None and isinstance(structure, PlacedStructure):
@@ -231,14 +240,6 @@ def _without_hiding(
     if left(best) < left(found.solution):
         return dataclasses.replace(found, solution=best, n_agreed=1)
     return found
-
-
-def _hidden(structure: GreyStructure, holds: Sequence[Hold], x: FloatArray) -> bool:
-    """Whether a mode lies above every hold's Nyquist frequency, where it looks like another."""
-    if structure.unknown:
-        return False
-    poles = structure.at(x).poles
-    return all(out_of_sight(poles, hold) for hold in holds)
 
 
 def _without_noise(
