@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import freqid as fq
+from freqid.fitting import grey_search
 from freqid.fitting.search.interrupted import INTERRUPTED, best_so_far
 from freqid.fitting.search.scatter import around, promising
 
@@ -77,3 +79,23 @@ def test_an_interrupted_search_tells_the_first_cost_at_the_best_point():
         assert (found.converged, found.message) == (False, INTERRUPTED)
     lost = SimpleNamespace(least=None, point=lambda x: None)
     assert best_so_far([lost], start) is None
+
+
+def test_a_minimum_that_few_lines_leave_open_is_followed_to_more(monkeypatch):
+    """The friction shows on more of the lines: no black box is looked for anew there."""
+    plant = fq.two_mass()
+    record = fq.simulate(plant, fq.chirp(10, 80, 10, 5e-4), 5e-4)
+    record = record.with_noise(0.05 * record.y.std(), seed=1)
+    asked = []
+    looked_for = grey_search.beside_of
+    monkeypatch.setattr(
+        grey_search, "beside_of", lambda *given: asked.append(given[2]) or looked_for(*given)
+    )
+    start = {p.name: 1.2 * p.value for p in plant.free_parameters}
+    est = fq.fit(plant, record, start=start)
+    assert len(asked) == 1
+    assert est.n_starts == 1
+    assert est.witness.verdict == "complete"
+    # the minimum is that of all lines
+    many = fq.fit(plant, record, start=start, n_starts=8)
+    assert est.cost == pytest.approx(many.cost, rel=1e-10)
