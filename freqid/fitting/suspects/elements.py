@@ -57,7 +57,7 @@ class Element:
         """The lines (K,) of the motion as the fit has it."""
         A, B, _, _ = self.matrices(model)
         plant = StateSpace(A, B, self.motion[None], 0 * B[:1])
-        return s.moved(self._response(s, plant, s.reading.hold))[0]
+        return s.moved(inner_response(s, plant, s.reading.hold))[0]
 
     def answers(self, s: Seen, model: Model, shape: ComplexArray) -> FloatArray:
         """Rows (1, rows) of a force of another shape, by its lines (K,), in units of the
@@ -76,16 +76,17 @@ class Element:
         # what acts inside is held as the first input is
         hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
         plant = StateSpace(A, at[:, None], C, self._at_once(A, C, at)[:, None])
-        return s.driven(self._response(s, plant, hold), shape[None, None])
+        return s.driven(inner_response(s, plant, hold), shape[None, None])
 
     def _at_once(self, A: FloatArray, C: FloatArray, at: FloatArray) -> FloatArray:
         """What of a force outputs show at once, (outputs,)."""
         return np.zeros(len(C))
 
-    @staticmethod
-    def _response(s: Seen, plant: StateSpace, hold: Hold) -> ComplexArray:
-        names = [f"u{i}" for i in range(plant.B.shape[1])], [f"y{i}" for i in range(len(plant.C))]
-        return responses(SystemModel(plant, *names), hold, s.omega_input)
+
+def inner_response(s: Seen, plant: StateSpace, hold: Hold) -> ComplexArray:
+    """Of what lies inside a plant at the lines, (outputs, inputs, K)."""
+    names = [f"u{i}" for i in range(plant.B.shape[1])], [f"y{i}" for i in range(len(plant.C))]
+    return responses(SystemModel(plant, *names), hold, s.omega_input)
 
 
 def elements(model: Model, heard: bool = False) -> list[Element]:

@@ -8,18 +8,17 @@ plant has; where by the sign of w and the state bᵀx on which it acts, b |w| si
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray
-from freqid.fitting.suspects.elements import ONE, Element, parallel
-from freqid.fitting.suspects.nonlinear import can_bend, same
+from freqid.checks import FloatArray
+from freqid.fitting.suspects.elements import ONE, inner_response, parallel
+from freqid.fitting.suspects.nonlinear import can_bend
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
-from freqid.lti import StateSpace
+from freqid.lti import InputHolds, StateSpace
 from freqid.models import GreyBox, Model
 
 # parameters that are asked at the most, and the part of a motion's energy that both signs have
@@ -27,28 +26,41 @@ _MOST, _TURNS = 16, 1e-4
 
 
 @dataclass(frozen=True)
-class _Part(Element):
-    """A parameter's force b by its motion cᵀx + eᵀu; ``direct`` is e (inputs,)."""
+class _Parts:
+    """Parameters by ``names`` and values ``whole`` (P,), each a force in ``forces`` (n, P) by a
+    motion of the states in ``motions`` (P, n) and of the inputs in ``direct`` (P, inputs).
+    """
 
-    direct: FloatArray = dataclasses.field(default_factory=lambda: np.zeros(0))
+    names: list[str]
+    whole: FloatArray
+    forces: FloatArray
+    motions: FloatArray
+    direct: FloatArray
 
-    def moves(self, s: Seen, model: Model) -> ComplexArray:
-        """The lines (K,) of the motion as the fit has it."""
-        A, B, _, _ = self.matrices(model)
-        plant = StateSpace(A, B, self.motion[None], self.direct[None])
-        return s.moved(self._response(s, plant, s.reading.hold))[0]
-
-    def state(self, s: Seen, model: Model) -> ComplexArray:
-        """The lines (K,) of the state on which the force acts."""
-        A, B, _, _ = self.matrices(model)
-        along = self.force / np.linalg.norm(self.force)
-        plant = StateSpace(A, B, along[None], 0 * B[:1])
-        return s.moved(self._response(s, plant, s.reading.hold))[0]
-
-    @property
-    def per_cent(self) -> float:
-        """Of the parameter."""
-        return self.whole / 100
+    def drawn(self, s: Seen, model: Model) -> list[tuple[FloatArray, ...]]:
+        """Rows (1, rows) for each parameter: of what acts by the sign of its motion, of what acts
+        by that of its state, too, and of what is linear in the state, which damping looks like.
+        """
+        A, B, C, _ = model.state_space()
+        along = (self.forces / np.linalg.norm(self.forces, axis=0)).T
+        seen = StateSpace(
+            A,
+            B,
+            np.concatenate([self.motions, along]),
+            np.concatenate([self.direct, 0 * self.direct]),
+        )
+        lines = s.moved(inner_response(s, seen, s.reading.hold))
+        # what acts inside is held as the first input is
+        hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
+        acting = StateSpace(A, self.forces, C, np.zeros((len(C), len(self.names))))
+        G = inner_response(s, acting, hold)
+        signals = s.signals(lines)
+        found = []
+        for i, (w, x) in enumerate(zip(signals[: len(G[0])], signals[len(G[0]) :], strict=True)):
+            shapes = np.stack([np.abs(w) * _turns(w), np.abs(w) * np.sign(x) * _turns(w * x)])
+            each = [*(self.whole[i] / 100 * s.lines_of(shapes)), lines[len(G[0]) + i]]
+            found.append(tuple(s.driven(G[:, [i]], shape[None, None]) for shape in each))
+        return found
 
 
 @suspect("asymmetric")
@@ -58,23 +70,18 @@ def asymmetric(scene: Scene, model: Model) -> list[Columns]:
     """
     if not can_bend(scene, model):
         return []
-    found = []
-    each = same([_parts(s.own(model)) for s in scene.seen])
-    for part in each:
-        signs, ways, linear = [], [], []
-        for one, s in zip(part, scene.seen, strict=True):
-            own = s.own(model)
-            motion, state = one.moves(s, own), one.state(s, own)
-            w, x = s.signals(motion), s.signals(state)
-            signs.append(one.answers(s, own, one.per_cent * s.lines_of(np.abs(w))) * _turns(w))
-            shape = s.lines_of(np.abs(w) * np.sign(x))
-            ways.append(one.answers(s, own, one.per_cent * shape) * _turns(w * x))
-            # damping looks so
-            linear.append(one.answers(s, own, state))
-        told = f"{part[0].name} differs between"
+    met = [_parts(s.own(model)) for s in scene.seen]
+    parts = [each for each in met if each is not None]
+    if len(parts) < len(scene.seen) or any(each.names != parts[0].names for each in parts):
+        return []
+    drawn = [each.drawn(s, s.own(model)) for each, s in zip(parts, scene.seen, strict=True)]
+    found, trials = [], 2 * len(parts[0].names)
+    for i, name in enumerate(parts[0].names):
+        signs, ways, linear = ([rows[i][kind] for rows in drawn] for kind in range(3))
+        told = f"{name} differs between"
         found += [
-            Columns(signs, "%", 2 * len(each), f"{told} one direction of its motion and the other"),
-            Columns(ways, "%", 2 * len(each), f"{told} motion away from rest and back", linear),
+            Columns(signs, "%", trials, f"{told} one direction of its motion and the other"),
+            Columns(ways, "%", trials, f"{told} motion away from rest and back", linear),
         ]
     return found
 
@@ -85,13 +92,13 @@ def _turns(motion: FloatArray) -> bool:
     return min(power) > _TURNS * max(power)
 
 
-def _parts(model: Model) -> list[_Part]:
+def _parts(model: Model) -> _Parts | None:
     """The parameters of a grey box in continuous time that act through one force on one motion."""
     if not isinstance(model, GreyBox) or model.dt or model.late:
-        return []
+        return None
     names = [p.name for p in model.free_parameters]
     _, by = model.linearise(model.values, names)
-    found: list[_Part] = []
+    found: list[tuple[str, FloatArray, FloatArray]] = []
     for name, dA, dB, dC, dD in zip(names, *by, strict=True):
         change = np.concatenate([dA, dB], axis=1)
         if not change.any() or dC.any() or dD.any():
@@ -102,11 +109,13 @@ def _parts(model: Model) -> list[_Part]:
             continue
         # more of it where the largest part of the motion is positive
         side = np.sign(Vt[0][np.argmax(np.abs(Vt[0]))])
-        force, motion, n = side * U[:, 0] * sizes[0] * rows[:, 0], side * Vt[0], len(dA)
+        force, motion = side * U[:, 0] * sizes[0] * rows[:, 0], side * Vt[0]
         # two that act alike are one here
-        known = (parallel(force, f.force) and parallel(motion, np.append(f.motion, f.direct))
-                 for f in found)  # fmt: skip
-        if not any(known):
-            whole = model.values[name]
-            found.append(_Part(name, force, motion[:n], False, None, whole, motion[n:]))
-    return found if len(found) <= _MOST else []
+        if not any(parallel(force, b) and parallel(motion, w) for _, b, w in found):
+            found.append((name, force, motion))
+    if not 0 < len(found) <= _MOST:
+        return None
+    called, forces, motions = zip(*found, strict=True)
+    c, n = np.array(motions), len(by.A[0])
+    whole = np.array([model.values[name] for name in called])
+    return _Parts(list(called), whole, np.array(forces).T, c[:, :n], c[:, n:])
