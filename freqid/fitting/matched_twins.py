@@ -8,21 +8,20 @@ mean the other.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-import scipy
 
-from freqid.checks import BoolArray, ComplexArray, FloatArray
+from freqid.checks import Array, BoolArray, ComplexArray, FloatArray
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.search.batched import descend
 from freqid.fitting.uncertainty.rivals import physical
 from freqid.lti import in_doubles
 
 # nepers that a value has moved where another answer is looked for, and frequencies in a look
 _MOVED, _FREQUENCIES = np.log(1.3), 16
 # evaluations of a look, and relative errors of a response that is matched
-_LOOKS, _MATCHED = 25, 1e-7
+_LOOKS, _MATCHED = 40, 1e-7
 # looks from points scattered so many nepers around an answer, and nepers by which answers differ
 _SCATTERED, _SPREAD, _OTHER = 5, np.log(4), 0.01
 # part of a start that is nothing
@@ -43,7 +42,7 @@ def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
     if min(np.sum(np.abs(way) > _MOVED) for way in (moved, walked)) < 2:
         # an answer of other values has moved more than one, and a refit begins from a chosen one
         return None
-    other = look.end(begin)
+    (other,) = look.ends(begin[None])
     if other is None:
         return None
     nearer = np.log(np.abs(other[look.told] * structure.scale[look.told] / begin[look.told]))
@@ -64,8 +63,7 @@ def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
     rng = np.random.default_rng(0)
     ways = rng.uniform(-_SPREAD, _SPREAD, (_SCATTERED, len(x)))
     found: list[FloatArray] = []
-    for begin in [meant, *look.values * np.exp(ways)]:
-        other = look.end(begin)
+    for other in look.ends(np.vstack([meant, look.values * np.exp(ways)])):
         if other is None or not physical(structure, other):
             continue
         # a value that is zero, or is so but for rounding, is no other
@@ -74,6 +72,21 @@ def elsewhere(structure: GreyStructure, x: FloatArray) -> list[FloatArray]:
         if all(some.any() for some in each):
             found.append(other)
     return found
+
+
+def _continuous(
+    structure: GreyStructure, values: FloatArray, omega: FloatArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Responses of plants with values (S, P) by the inverse of jω - A, and derivatives."""
+    at, by = structure.model.linearise_many(values, structure.physical_names)
+    A, B, C, D = (M[:, None] for M in at)
+    s = 1j * omega[:, None, None] * np.eye(A.shape[-1])
+    inverse = np.linalg.inv(s - A)
+    x, w = inverse @ B, C @ inverse
+    # (S, K, outputs, inputs) and (S, P, K, outputs, inputs)
+    dA, dB, dC, dD = (M[:, :, None] for M in by)
+    change = w[:, None] @ (dA @ x[:, None] + dB) + dC @ x[:, None] + dD
+    return np.moveaxis(C @ x + D, 1, -1), np.moveaxis(change, 2, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +99,27 @@ class _Look:
     omega: FloatArray
     wanted: ComplexArray
     there: BoolArray
+
+    def responses(self, values: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Of plants with values (S, P), (S, outputs, inputs, K), and derivatives by the parameters
+        (S, P, …); NaN where there are none.
+        """
+        structure = self.structure
+        if not (structure.known or structure.model.delay_sources):
+            try:
+                return _continuous(structure, values, self.omega)
+            except Exception:  # the user's function may raise anything at one of the points
+                pass
+        found = []
+        for x in values / structure.scale:
+            try:
+                G, dG = structure.response(x, self.omega, None)
+                found.append((G, dG / structure.scale[:, None, None, None]))
+            except Exception:
+                shape = structure.model.n_outputs, structure.model.n_inputs, len(self.omega)
+                nothing = np.full((1 + len(x), *shape), np.nan + 0j)
+                found.append((nothing[0], nothing[1:]))
+        return np.stack([G for G, _ in found]), np.stack([dG for _, dG in found])
 
     @classmethod
     def at(cls, structure: GreyStructure, x: FloatArray, begin: FloatArray) -> _Look | None:
@@ -103,42 +137,49 @@ class _Look:
         there = np.abs(G) > 0
         return cls(structure, values, told, omega, G[there], there)
 
-    def end(self, begin: FloatArray) -> FloatArray | None:
-        """Unknowns with the same response that values lead to, what has no sign as it is; None
-        where they lead to none that a bound admits.
+    def ends(self, begins: FloatArray) -> list[FloatArray | None]:
+        """Unknowns with the same response that values (S, P) lead to, what has no sign as it is;
+        None for those that lead to none that a bound admits.
         """
-        structure, told, start = self.structure, self.told, self.values.copy()
-        start[told] = np.abs(begin[told]) * np.sign(self.values[told])
+        structure, told = self.structure, self.told
+        starts = np.tile(self.values, (len(begins), 1))
+        starts[:, told] = np.abs(begins[:, told]) * np.sign(self.values[told])
+        looks = _Looks(self, starts)
+        # what is found is polished with all digits
+        with in_doubles():
+            ended = descend(looks, np.zeros((len(begins), told.sum())), limit=_LOOKS)
+            off = np.abs(looks.off(ended.values, starts)[0]).max(axis=-1)
+        found = looks.values(ended.values, starts) / structure.scale
+        inside = ((structure.lower <= found) & (found <= structure.upper)).all(axis=1)
+        return [
+            x if good else None for x, good in zip(found, inside & (off < _MATCHED), strict=True)
+        ]
 
-        def at(logs: FloatArray) -> FloatArray:
-            other = start.copy()
-            other[told] *= np.exp(logs)
-            return np.asarray(other / structure.scale)
 
-        @lru_cache(maxsize=2)
-        def answers(logs: bytes) -> tuple[FloatArray, FloatArray]:
-            x = at(np.frombuffer(logs))
-            G, dG = structure.response(x, self.omega, None)
-            off = G.ravel()[self.there] / self.wanted - 1
-            rows = dG.reshape(len(dG), -1)[:, self.there] / self.wanted * x[:, None]
-            return off.view(float), np.ascontiguousarray(rows[told]).view(float).T
+class _Looks:
+    """How far responses of S plants are off one, by logarithms of the values that have a sign."""
 
-        def apart(logs: FloatArray) -> FloatArray:
-            return answers(logs.tobytes())[0]
+    def __init__(self, look: _Look, starts: FloatArray) -> None:
+        self.look, self.starts = look, starts
+        self.energy = np.full(len(starts), float(len(look.wanted)))
 
-        def slope(logs: FloatArray) -> FloatArray:
-            return answers(logs.tobytes())[1]
+    def values(self, logs: FloatArray, starts: FloatArray) -> FloatArray:
+        """Those of the parameters, (S, P)."""
+        values = starts.copy()
+        values[:, self.look.told] *= np.exp(logs)
+        return values
 
-        try:
-            # a look: what it finds is polished with all digits
-            with in_doubles():
-                end = scipy.optimize.least_squares(
-                    apart, np.zeros(int(told.sum())), slope, method="lm", max_nfev=_LOOKS
-                )
-        except Exception:  # the user's function may raise anything at a point
-            return None
-        if not np.abs(end.fun).max() < _MATCHED:
-            return None
-        other = at(end.x)
-        inside = (structure.lower <= other) & (other <= structure.upper)
-        return other if inside.all() else None
+    def off(self, logs: FloatArray, starts: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Relative errors (S, rows) and their derivatives (S, told, rows)."""
+        look, values = self.look, self.values(logs, starts)
+        G, dG = look.responses(values)
+        S, P = values.shape
+        off = G.reshape(S, -1)[:, look.there] / look.wanted - 1
+        rows = dG.reshape(S, P, -1)[..., look.there] / look.wanted * values[..., None]
+        told = np.ascontiguousarray(rows[:, look.told])
+        return np.ascontiguousarray(off).view(float), told.view(float)
+
+    def normal(self, x: FloatArray, which: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Cost, JᵀR and JᵀJ of some."""
+        r, J = self.off(x, self.starts[which])
+        return np.einsum("sk,sk->s", r, r), (J @ r[..., None])[..., 0], J @ J.swapaxes(-1, -2)
