@@ -7,6 +7,7 @@ mean the other.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,18 +105,17 @@ class _Look:
         """Of plants with values (S, P), (S, outputs, inputs, K), and derivatives by the parameters
         (S, P, …); NaN where there are none.
         """
-        structure = self.structure
-        if not (structure.known or structure.model.delay_sources):
-            try:
+        structure, found = self.structure, []
+        placed = isinstance(structure, PlacedStructure)
+        if not (placed or structure.known or structure.model.delay_sources):
+            # the user's function may raise anything at one of the points
+            with contextlib.suppress(Exception):
                 return _continuous(structure, values, self.omega)
-            except Exception:  # the user's function may raise anything at one of the points
-                pass
-        found = []
         for x in values / structure.scale:
             try:
                 G, dG = structure.response(x, self.omega, None)
                 found.append((G, dG / structure.scale[:, None, None, None]))
-            except Exception:
+            except Exception:  # at this one
                 shape = structure.model.n_outputs, structure.model.n_inputs, len(self.omega)
                 nothing = np.full((1 + len(x), *shape), np.nan + 0j)
                 found.append((nothing[0], nothing[1:]))
@@ -146,9 +146,12 @@ class _Look:
         starts[:, told] = np.abs(begins[:, told]) * np.sign(self.values[told])
         looks = _Looks(self, starts)
         # what is found is polished with all digits
-        with in_doubles():
-            ended = descend(looks, np.zeros((len(begins), told.sum())), limit=_LOOKS)
-            off = np.abs(looks.off(ended.values, starts)[0]).max(axis=-1)
+        try:
+            with in_doubles():
+                ended = descend(looks, np.zeros((len(begins), told.sum())), limit=_LOOKS)
+                off = np.abs(looks.off(ended.values, starts)[0]).max(axis=-1)
+        except np.linalg.LinAlgError:
+            return [None] * len(begins)
         found = looks.values(ended.values, starts) / structure.scale
         inside = ((structure.lower <= found) & (found <= structure.upper)).all(axis=1)
         return [
