@@ -135,6 +135,8 @@ class _Look:
         except Exception:  # the user's function may raise anything at a point
             return None
         there = np.abs(G) > 0
+        if not there.any():
+            return None
         return cls(structure, values, told, omega, G[there], there)
 
     def ends(self, begins: FloatArray) -> list[FloatArray | None]:
@@ -150,7 +152,7 @@ class _Look:
             with in_doubles():
                 ended = descend(looks, np.zeros((len(begins), told.sum())), limit=_LOOKS)
                 off = np.abs(looks.off(ended.values, starts)[0]).max(axis=-1)
-        except np.linalg.LinAlgError:
+        except Exception:  # the user's function may raise anything at a point
             return [None] * len(begins)
         found = looks.values(ended.values, starts) / structure.scale
         inside = ((structure.lower <= found) & (found <= structure.upper)).all(axis=1)

@@ -142,3 +142,41 @@ def test_linear_plants_are_neither(kind):
             kinds = {w.kind for w in est.warnings}
             assert not kinds & {"asymmetric", "backlash"}
             assert "asymmetric" in est.suspects.index
+
+
+def test_a_plant_that_changes_midway_is_not_asymmetric():
+    """To levels that are mostly of one sign in a half it looks so; a change explains more."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        u = levels(rng, 1500, 30)
+        changed = iter(np.repeat(np.where(np.arange(1500) < 750, 0.255, 0.345), 8))
+
+        def run(x, value, d):
+            return np.array([(x[1] - d * x[0]) / 0.1, (value - x[1]) / 0.05])
+
+        x, speed, h = np.zeros(2), [], DT / 8
+        for value in u:
+            speed.append(x[0])
+            for _ in range(8):
+                d = next(changed)
+                middle = x + h / 2 * run(x, value, d)
+                x = x + h * run(middle, value, d)
+        est = fq.fit(grey(rotor, ROTOR), fq.Record(u, noisy(rng, np.array(speed), 0.005), DT))
+        assert est.warnings[0].kind == "unsteady", (seed, est.warnings)
+
+
+@pytest.mark.parametrize("kind", [white, lambda rng, n: levels(rng, n, 30)])
+def test_a_heater_that_heats_more_than_it_cools(kind):
+    """The mean that comes of it looks like an offset, which explains but a part."""
+    lag = grey(lambda K, T: ([[-1 / T]], [[K / T]], [[1]], None), {"K": 2.0, "T": 0.08})
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        u = kind(rng, 1500)
+
+        def run(x, value):
+            return np.array([((2.3 if value > 0 else 1.7) * value - x[0]) / 0.08])
+
+        est = fq.fit(lag, fq.Record(u, noisy(rng, held(run, u, 1)[:, 0], 0.005), DT))
+        assert est.verdict.grade == "doubt"
+        assert est.warnings[0].kind == "asymmetric"
+        assert "K differs between one direction" in est.warnings[0]

@@ -288,3 +288,26 @@ def test_a_twin_of_other_values_is_said_unless_the_start_tells(away, told):
         assert "no data tell these values" in said[0]
     else:
         assert abs(est["L"] / BUCK["L"] - 1) < 0.15
+
+
+def test_a_plant_without_a_response_has_no_twin():
+    """Where a search has left every force at nothing."""
+    none = fq.GreyBox(
+        lambda g, a: ([[-a]], [[0 * g]], [[1.0]], None),
+        [fq.Parameter("g", 1), fq.Parameter("a", 2)],
+    )
+    structure = GreyStructure(none, {"g": 3.0, "a": 5.0})
+    assert elsewhere(structure, structure.start / 2) == []
+    assert matched(structure, structure.start / 2) is None
+
+
+def test_a_function_that_raises_away_from_home_is_asked_point_by_point():
+    def picky(L, C, Rl):
+        if np.ndim(L) == 0 and not 1e-5 < np.real(L) < 1e-3:
+            raise RuntimeError("no such coil")
+        return converter(L, C, Rl)
+
+    plant = fq.GreyBox(picky, buck(**BUCK).parameters)
+    structure = GreyStructure(plant, None)
+    (twin,) = elsewhere(structure, structure.start)
+    assert (twin * structure.scale)[:2] == pytest.approx(other_of(BUCK), rel=1e-6)

@@ -21,7 +21,9 @@ _CLEAR = 1e-3
 _AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
-BENT, _HALF = ("friction", "nonlinear", "asymmetric"), 0.5
+BENT, _HALF = ("friction", "nonlinear"), 0.5
+# what makes a motion jump beside these
+_JUMPS = (*BENT, "asymmetric", "backlash")
 # part of what jumps explain from which a plant that bends makes them, for at many places they
 # imitate all else; and the same where they explain less than the last part of what is left
 _FIFTH, _TWELFTH, _THIRD = 0.2, 0.08, 0.35
@@ -68,7 +70,7 @@ def _without_imitations(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
     jumps = next((a for a in asked if a.name == "jump"), None)
     if jumps is None or not others:
         return [*asked]
-    bent = max((a.test.gain for a in others if a.name in BENT), default=0.0)
+    bent = max((a.test.gain for a in others if a.name in _JUMPS), default=0.0)
     enough = _FIFTH if jumps.test.gain >= _THIRD * scene.cost else _TWELFTH
     return others if bent >= enough * jumps.test.gain else [*asked]
 
@@ -105,8 +107,8 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         ranked = [*simple, *(a for a in ranked if a not in simple)]
     if ranked[0].name == "asymmetric":
         # what acts more one way has a mean, and where the plant integrates a slope
-        enough = _AS_MUCH * ranked[0].test.gain
-        added = [a for a in ranked if a.name in _SENSOR and a.test.gain >= enough]
+        sure = _AS_MUCH * evidence(scene, ranked[0])
+        added = [a for a in ranked if a.name in _SENSOR and evidence(scene, a) >= sure]
         ranked = [*added, *(a for a in ranked if a not in added)]
     if ranked[0].name == "unsteady":
         # to a sweep whatever the model lacks is a change between its halves

@@ -30,7 +30,9 @@ from freqid.models import GreyBox, Parameter
 # the channel's own unknown, and how far from one it is looked for
 _NAME, _WIDE = "scale of a channel", 1e4
 # what a wrong scale looks like
-_LOOKS_LIKE = (*LACKING, *BENT, *LIKELY, "unsteady", "feedback", "jump", "tone")
+_LOOKS_LIKE = (
+    *LACKING, *BENT, *LIKELY, "asymmetric", "backlash", "unsteady", "feedback", "jump", "tone"
+)  # fmt: skip
 # how near to one a scale is none, and the part of the gain at which another channel's is as likely
 _NONE, _AS_LIKELY = 1e-3, 0.98
 # how near to the end of that range a scale is none that the data tell
