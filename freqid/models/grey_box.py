@@ -239,8 +239,7 @@ class GreyBox(Model):
                     f"parameter {name} is tied to {self.ties[name]!r}; set the parameters it is of"
                 )
         new = tuple(
-            dataclasses.replace(p, **changes[p.name]) if p.name in changes else p
-            for p in self.parameters
+            p.changed(**changes[p.name]) if p.name in changes else p for p in self.parameters
         )
         # shapes and names are as they were checked already
         other = copy.copy(self)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import math
 from dataclasses import dataclass
 from numbers import Real
@@ -46,11 +48,7 @@ class Parameter:
             raise InputError(
                 f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"
             )
-        if not self.lower <= self.value <= self.upper:
-            raise InputError(
-                f"parameter {self.name}={self.value:g} lies outside its bounds "
-                f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
-            )
+        self._check_bounds()
         try:
             least, most = (float(v) for v in self.physical)
         except (TypeError, ValueError):
@@ -76,3 +74,24 @@ class Parameter:
                 raise InputError(
                     f"parameter {self.name} is fixed and has a prior; free it or drop the prior"
                 )
+
+    def changed(self, **fields: object) -> Parameter:
+        """The same with other fields. Raises ValueError for what it cannot have.
+
+        >>> Parameter("k", 1.5e5, unit="N m/rad").changed(value=2e5).value
+        200000.0
+        """
+        if fields.keys() != {"value"}:
+            return dataclasses.replace(self, **fields)  # type: ignore[arg-type]
+        # a search does this at every point, where the rest is as it was checked already
+        other = copy.copy(self)
+        object.__setattr__(other, "value", finite(f"parameter {self.name}", fields["value"]))
+        other._check_bounds()
+        return other
+
+    def _check_bounds(self) -> None:
+        if not self.lower <= self.value <= self.upper:
+            raise InputError(
+                f"parameter {self.name}={self.value:g} lies outside its bounds "
+                f"[{self.lower:g}, {self.upper:g}]; change the value or the bounds"
+            )

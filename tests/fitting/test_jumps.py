@@ -118,3 +118,14 @@ def test_samples_that_are_off_are_no_jumps():
         est = fq.fit(AXIS, fq.Record(u, y, DT))
         assert est.warnings[0].kind == "spikes"
         assert "jump" not in [w.kind for w in est.warnings]
+
+
+def test_a_jump_at_an_end_of_a_decimated_record_is_what_was_folded():
+    axis = fq.two_mass()
+    fast = fq.simulate(axis, fq.chirp(10, 80, 10, 5e-4), 5e-4)
+    est = fq.fit(axis, fast.decimate(10))
+    (said,) = [w for w in est.warnings if w.kind == "jump"]
+    assert "at 0.01 s, an end of a decimated record: decimate(n, keep_input=True)" in said
+    assert "rows are lost in all channels" not in said
+    kept = fq.fit(axis, fast.decimate(10, keep_input=True))
+    assert "jump" not in {w.kind for w in kept.warnings}

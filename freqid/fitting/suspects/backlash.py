@@ -32,14 +32,17 @@ def backlash(scene: Scene, model: Model) -> list[Columns]:
         moved = np.diff(u, axis=-1, prepend=u[:, :1])
         lacking += of_inputs(s, model, -s.lines_of(_last_side(moved)))
     names = scene.seen[0].reading.data.input_names
-    unit = scene.seen[0].record.units.get(names[0], "")  # type: ignore[union-attr]
+    units = scene.seen[0].record.units  # type: ignore[union-attr]
     return [
         Columns(
-            [rows[[i]] for rows in lacking], f" {unit}" if unit else "", model.n_inputs,
-            f"input {name!r}" if len(names) > 1 else "the input", onesided=True,
+            [rows[[i]] for rows in lacking],
+            f" {units[name]}" if units.get(name) else "",
+            model.n_inputs,
+            f"input {name!r}" if len(names) > 1 else "the input",
+            onesided=True,
         )
         for i, name in enumerate(names)
-    ]  # fmt: skip
+    ]
 
 
 def _last_side(moved: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray
+from freqid.fitting.suspects.measurement import folded_end
 from freqid.fitting.suspects.register import Columns, suspect
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import of_several
@@ -31,8 +32,9 @@ _LEVEL, _SHARE, _JUMPS = 1e-4, 0.05, 8
 _DIES = 0.5
 # samples between two jumps that are one fault of a sensor
 _NEXT = 2
-# part of the record at its end in which none is looked for
-_END = 0.02
+# part of the record at its end in which none is looked for, and samples from an end of a decimated
+# record within which what was folded there makes the motion jump
+_END, _FOLDED = 0.02, 3
 
 
 @suspect("jump")
@@ -150,4 +152,6 @@ def _places(scene: Scene, found: list[tuple[int, int]]) -> str:
         f"{k * scene.seen[i].record.dt:.6g} s" + (f" of experiment {i}" if several else "")  # type: ignore[union-attr]
         for i, k in sorted(found)
     ]
-    return " and ".join([", ".join(times[:-1]), times[-1]] if len(times) > 1 else times)
+    ends = {folded_end(scene.seen[i].record, k, _FOLDED) for i, k in found}  # type: ignore[arg-type]
+    where = " and ".join([", ".join(times[:-1]), times[-1]] if len(times) > 1 else times)
+    return where + (ends.pop() if len(ends) == 1 else "")

@@ -91,18 +91,19 @@ def spikes(scene: Scene, model: Model) -> list[Columns]:
         drawn.append(s.rows_of(pulse))
     record = scene.seen[where].record
     assert record is not None
-    where_in_time = f"at {k * record.dt:.6g} s"
-    if k in (0, record.n_samples - 1) and _faster_held(record):
-        # how an input begins or ends is folded, too
-        where_in_time += (
-            ", an end of a decimated record: decimate(n, keep_input=True) keeps what was folded"
-        )
+    where_in_time = f"at {k * record.dt:.6g} s{folded_end(record, k, 0)}"
     return [Columns(drawn, "", count, where_in_time, channels=_channels(scene)[o : o + 1])]
 
 
-def _faster_held(record: Record) -> bool:
-    """Whether a record remembers a hold that is faster than its samples."""
-    return isinstance(record.hold, PeriodicHold) and record.hold.period < 0.99 * record.input_dt
+def folded_end(record: Record, k: int, near: int) -> str:
+    """A word on an end of a decimated record, for a sample so ``near`` to it; else nothing.
+
+    How an input begins or ends is folded, too.
+    """
+    faster = isinstance(record.hold, PeriodicHold) and record.hold.period < 0.99 * record.input_dt
+    if not faster or near < k < record.n_samples - 1 - near:
+        return ""
+    return ", an end of a decimated record: decimate(n, keep_input=True) keeps what was folded"
 
 
 def _whitened(scene: Scene, number: int, s: Seen) -> FloatArray:
