@@ -74,7 +74,7 @@ def test_what_is_explained_to_rounding_is_settled_behind_a_delay_as_well():
 
 def test_a_delay_that_a_black_box_has_found_is_the_plants():
     """A ContinuousModel knows its delay as well, which went the same way."""
-    record = fq.simulate(plant(), fq.white_noise(3000, seed=1), DT)
+    record = fq.simulate(plant(), fq.white_noise(600, seed=1), DT)
     found = fq.fit(fq.TransferFunction(0, 1, delay="estimate"), record).model
     seen = fq.apparent_response(found, fq.WhiteSpectrum(), DT)
     exact = fq.apparent_response(plant(), fq.WhiteSpectrum(), DT)

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 _UNEVEN = 100.0
 # what an output that is not met may look like: what is added to one would be taken for its noise
 _LIKENESSES = {
-    "nonlinear", "friction", "spikes", "jump", "delay", "lag", "feedthrough", "hold rejected",
-    "high-pass",
+    "nonlinear", "friction", "asymmetric", "backlash", "spikes", "jump", "delay", "lag",
+    "feedthrough", "hold rejected", "high-pass",
 }  # fmt: skip
 # the suspects that have led to what is said under another name
 _LED = {"hold rejected": HOLDS, "high-pass": HOLDS, "lag": ("delay",)}
