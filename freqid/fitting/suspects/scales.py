@@ -37,6 +37,8 @@ _LOOKS_LIKE = (
 _NONE, _AS_LIKELY = 1e-3, 0.98
 # how near to the end of that range a scale is none that the data tell
 _END = 1.1
+# part of the data's energy left below which exchanged channels explain all that there is
+_ALL_BUT = 0.01
 # starts of each fit, and the part of a mode's evidence that one unknown needs
 _STARTS, _AS_MUCH = 1, 0.8
 
@@ -106,10 +108,11 @@ def on_another_scale(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
 
 def instead_of_swapped(inquiry: Asking, turn: Sequence[Finding]) -> list[Finding]:
     """A finding where one channel on another scale explains more than channels exchanged."""
-    if turn[0].kind != "swapped channels":
+    left = turn[0].number or 0.0
+    if turn[0].kind != "swapped channels" or left < _ALL_BUT:
         return []
     _, tried = _tried(inquiry)
-    if not tried or not _left(tried[0][0]) < (turn[0].number or 0.0):
+    if not tried or not _left(tried[0][0]) < left:
         return []
     return [_finding(tried, inquiry.minimum.cost)]
 
