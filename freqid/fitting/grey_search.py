@@ -168,7 +168,8 @@ def _followed(
         return None
     bound = bound_of(there, data.structure, data.share)
     rule = StopRule(None, wide.rounding, data.floor, bound)
-    again = Found(end, found.n_starts, found.n_agreed)
+    # the starts that led there are counted
+    again = Found(end, n_agreed=found.n_agreed)
     if bound is None or not rule.convinced(again) or data.hidden(end.x):
         return None
     return again

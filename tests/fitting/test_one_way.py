@@ -88,6 +88,25 @@ def test_play_in_a_valve_is_named_with_its_width(seed):
     assert est.suspects.loc["backlash", "size"] == pytest.approx(0.15, rel=0.3)
 
 
+def test_play_of_one_input_beside_another_of_two_levels():
+    """Two forces on one mass: the rich one is asked for play, the binary one cannot be."""
+    true = {"m": 1.0, "d": 6.0, "k": 400.0, "g": 0.7}
+    mass = fq.GreyBox(
+        lambda m, d, k, g: ([[0, 1], [-k / m, -d / m]], [[0, 0], [1 / m, g / m]], [[1, 0]], None),
+        [fq.Parameter(n, 1.1 * v) for n, v in true.items()],
+        inputs=["push", "pull"],
+    )  # fmt: skip
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        u = np.stack([levels(rng, 2000, 30), np.repeat(rng.choice([-1.0, 1.0], 200), 10)], axis=1)
+        acting = np.stack([behind_play(u[:, 0], 0.1), u[:, 1]], axis=1)
+        y = fq.simulate(mass.with_values(**true), acting, DT).outputs[:, 0]
+        est = fq.fit(mass, fq.Record(u, noisy(rng, y, 0.01), DT, input_names=["push", "pull"]))
+        assert est.warnings[0].kind == "backlash", est.warnings
+        assert "input 'push' has play" in est.warnings[0]
+        assert est.suspects.loc["backlash", "size"] == pytest.approx(0.1, rel=0.3)
+
+
 @pytest.mark.parametrize("weights", [None, "noise"])
 @pytest.mark.parametrize("kind", [white, smooth, lambda rng, n: levels(rng, n, 30)])
 def test_a_motor_that_spins_up_faster_than_down(kind, weights):

@@ -1,5 +1,6 @@
 """Parts of the search beside what they are said to be: scattered starts, what an end leaves."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -81,17 +82,35 @@ def test_an_interrupted_search_tells_the_first_cost_at_the_best_point():
     assert best_so_far([lost], start) is None
 
 
-def test_a_minimum_that_few_lines_leave_open_is_followed_to_more(monkeypatch):
-    """The friction shows on more of the lines: no black box is looked for anew there."""
+def noisy_axis():
+    """The paper's plant, a record of it whose friction shows on all lines, and a start."""
     plant = fq.two_mass()
     record = fq.simulate(plant, fq.chirp(10, 80, 10, 5e-4), 5e-4)
-    record = record.with_noise(0.05 * record.y.std(), seed=1)
+    start = {p.name: 1.2 * p.value for p in plant.free_parameters}
+    return plant, record.with_noise(0.05 * record.y.std(), seed=1), start
+
+
+def test_starts_on_few_lines_are_counted_once(monkeypatch):
+    plant, record, start = noisy_axis()
+    searched = grey_search._searched
+
+    def after_many(*given):
+        found, beside = searched(*given)
+        return dataclasses.replace(found, n_starts=13, n_agreed=9, sure=False), beside
+
+    monkeypatch.setattr(grey_search, "_searched", after_many)
+    est = fq.fit(plant, record, start=start)
+    assert (est.n_starts, est.n_agreed) == (13, 9)
+
+
+def test_a_minimum_that_few_lines_leave_open_is_followed_to_more(monkeypatch):
+    """The friction shows on more of the lines: no black box is looked for anew there."""
+    plant, record, start = noisy_axis()
     asked = []
     looked_for = grey_search.beside_of
     monkeypatch.setattr(
         grey_search, "beside_of", lambda *given: asked.append(given[2]) or looked_for(*given)
     )
-    start = {p.name: 1.2 * p.value for p in plant.free_parameters}
     est = fq.fit(plant, record, start=start)
     assert len(asked) == 1
     assert est.n_starts == 1

@@ -24,24 +24,24 @@ def backlash(scene: Scene, model: Model) -> list[Columns]:
     """Inputs have play, each its own; of two levels it is but another gain."""
     if not can_bend(scene, model):
         return []
-    lacking = []
+    drawn = []
+    told = np.ones(model.n_inputs, bool)
     for s in scene.seen:
         u = s.record.inputs[: s.grid[0]].T  # type: ignore[union-attr]
-        if not all(more_than_levels(each) for each in u):
-            return []
+        told &= [more_than_levels(each) for each in u]
         moved = np.diff(u, axis=-1, prepend=u[:, :1])
-        lacking += of_inputs(s, model, -s.lines_of(_last_side(moved)))
+        drawn += of_inputs(s, model, -s.lines_of(_last_side(moved)))
     names = scene.seen[0].reading.data.input_names
     units = scene.seen[0].record.units  # type: ignore[union-attr]
     return [
         Columns(
-            [rows[[i]] for rows in lacking],
-            f" {units[name]}" if units.get(name) else "",
-            model.n_inputs,
-            f"input {name!r}" if len(names) > 1 else "the input",
+            [rows[[i]] for rows in drawn],
+            f" {units[names[i]]}" if units.get(names[i]) else "",
+            int(told.sum()),
+            f"input {names[i]!r}" if len(names) > 1 else "the input",
             onesided=True,
         )
-        for i, name in enumerate(names)
+        for i in np.flatnonzero(told)
     ]
 
 

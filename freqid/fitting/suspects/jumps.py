@@ -154,4 +154,5 @@ def _places(scene: Scene, found: list[tuple[int, int]]) -> str:
     ]
     ends = {folded_end(scene.seen[i].record, k, _FOLDED) for i, k in found}  # type: ignore[arg-type]
     where = " and ".join([", ".join(times[:-1]), times[-1]] if len(times) > 1 else times)
-    return where + (ends.pop() if len(ends) == 1 else "")
+    cause = ends.pop() if len(ends) == 1 else ""
+    return where + (cause or ", as where rows are lost in all channels")

@@ -25,7 +25,7 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.models import GreyBox, Model
 
-Part = TypeVar("Part", bound=Element | FarEnd)
+Part = TypeVar("Part", Element, FarEnd)
 
 # inputs times outputs that are asked at the most
 _PAIRS = 9
@@ -76,8 +76,8 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     if not can_bend(scene, model):
         return []
     dampers = [each for each in _elements(scene, model) if each[0].damps]
-    dampers += same([masses(s.own(model)) for s in scene.seen])
-    ends = same([[*far_ends(s.own(model))] for s in scene.seen])
+    dampers += _same([masses(s.own(model)) for s in scene.seen])
+    ends = _same([[*far_ends(s.own(model))] for s in scene.seen])
     count = 2 + len(dampers) + len(ends)
     ways: dict[str, Callable[[FloatArray], FloatArray]] = {
         "of the input turns round with the output": _direction,
@@ -174,10 +174,10 @@ def can_bend(scene: Scene, model: Model) -> bool:
 def _elements(scene: Scene, model: Model) -> list[tuple[Element, ...]]:
     """Springs and dampers, those of the modes of a black box, each as every experiment met it."""
     parts = elements if isinstance(model, GreyBox) else modal_elements
-    return same([parts(s.own(model)) for s in scene.seen])
+    return _same([parts(s.own(model)) for s in scene.seen])
 
 
-def same(met: Sequence[Sequence[Part]]) -> list[tuple[Part, ...]]:
+def _same(met: Sequence[Sequence[Part]]) -> list[tuple[Part, ...]]:
     """Each part of a plant as every experiment met it, where all met the same parts."""
     same = all([e.rubs for e in found] == [e.rubs for e in met[0]] for found in met)
     return list(zip(*met, strict=True)) if same else []

@@ -86,10 +86,7 @@ def words(name: str, size: float, unit: str, detail: str, channel: str = "") -> 
         "offset": f"{channel or 'an output'} has a constant of {number} added",
         "drift": f"{channel or 'an output'} drifts by {number}",
         "spikes": f"one sample{of} is off by {number} {detail}",
-        "jump": (
-            f"the motion jumps at {detail}"
-            + (", as where rows are lost in all channels" if "decimate(" not in detail else "")
-        ),
+        "jump": f"the motion jumps at {detail}",
         "tone": f"a sine of {number} {detail} is added{to} that the input does not have",
         "saturation": f"{detail or f'{channel or one} stays at one extreme value'}, as at a limit",
         # a sensor that looks the other way makes it negative
