@@ -198,3 +198,30 @@ def test_a_heater_that_heats_more_than_it_cools(kind):
         assert est.verdict.grade == "doubt"
         assert est.warnings[0].kind == "asymmetric"
         assert "K differs between one direction" in est.warnings[0]
+
+
+@pytest.mark.parametrize("kind", [lambda rng, n: levels(rng, n, 30), smooth])
+def test_what_play_adds_as_an_input_is_the_cure(kind):
+    """Begun from the size that the warning says, as the docs do; smooth inputs take two rounds."""
+    true = {"m": 2.0, "k": 800.0, "d": 8.0}
+    mass = grey(lambda m, k, d: ([[0, 1], [-k / m, -d / m]], [[0], [1 / m]], [[1, 0]], None), true)
+    played = fq.GreyBox(
+        lambda m, k, d, h: (
+            [[0, 1], [-k / m, -d / m]], [[0, 0], [1 / m, h / m]], [[1, 0]], None
+        ),
+        [*mass.parameters, fq.Parameter("h", 1.0)],
+        inputs=["force", "play"],
+    )  # fmt: skip
+    rng = np.random.default_rng(2)
+    u = kind(rng, 2000)
+    made = fq.simulate(mass.with_values(**true), behind_play(u, 0.1), DT)
+    record = fq.Record(u, noisy(rng, made.y, 0.01), DT, input_names=["force"])
+    half = fq.fit(mass, record).suspects.loc["backlash", "size"]
+    for _ in range(2):
+        adds = (behind_play(u, half) - u) / half
+        est = fq.fit(played, record.with_input("play", adds, hold="zoh"))
+        half = est["h"]
+    assert half == pytest.approx(0.1, rel=0.02)
+    off = np.array([est[n] / v - 1 for n, v in true.items()])
+    assert np.abs(off).max() < 0.02
+    assert est.verdict.grade == "trust"

@@ -39,6 +39,12 @@ _NONE, _AS_LIKELY = 1e-3, 0.98
 _END = 1.1
 # part of the data's energy left below which exchanged channels explain all that there is
 _ALL_BUT = 0.01
+# factors of units that are often taken for one another, and how near to one a factor is that
+_UNITS = {
+    "degrees for radians": 180 / np.pi, "radians for degrees": np.pi / 180,
+    "rpm for rad/s": 30 / np.pi, "rad/s for rpm": np.pi / 30,
+}  # fmt: skip
+_UNIT = 0.01
 # starts of each fit, and the part of a mode's evidence that one unknown needs
 _STARTS, _AS_MUCH = 1, 0.8
 
@@ -69,10 +75,12 @@ class _Channel:
 
     def words(self, scale: float) -> str:
         """How large it is beside the model's."""
-        if self.output:
-            return f"output {self.name!r} is {scale:.3g} times as large as the model says"
         # what the record has more of acts less
-        return f"input {self.name!r} is {1 / scale:.3g} times as large as what acts"
+        factor = scale if self.output else 1 / scale
+        side, beside = ("output", "the model says") if self.output else ("input", "what acts")
+        known = [word for word, one in _UNITS.items() if abs(factor / one - 1) < _UNIT]
+        unit = f" ({known[0]})" if known else ""
+        return f"{side} {self.name!r} is {factor:.3g} times as large as {beside}{unit}"
 
 
 def instead(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
@@ -137,9 +145,13 @@ def _finding(tried: Sequence[tuple[Estimate, _Channel]], cost: float) -> Finding
     least = _AS_LIKELY * (cost - best.minimum.cost)
     likely = [(est, c) for est, c in tried if cost - est.minimum.cost >= least]
     words = ", or ".join(c.words(float(est[_NAME])) for est, c in likely)
+    which = (
+        "; no data tell which: scale the wrong one, or all parameters are off by that factor"
+        if len(likely) > 1 else ""
+    )  # fmt: skip
     text = (
         f"{words}: so {100 * (1 - np.sqrt(_left(best))):.4g} % of the data are explained; check "
-        "its unit, gear ratio and calibration, or give it a scale in the model"
+        f"its unit, gear ratio and calibration, or give it a scale in the model{which}"
     )
     return Finding("scale", text, number=float(best[_NAME]))
 

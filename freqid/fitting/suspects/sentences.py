@@ -34,12 +34,12 @@ CURES = {
     ),
     "nonlinear": "lower the excitation, or identify at the level at which the plant will work",
     "backlash": (
-        "measure behind the play, keep a load on it so that one side always pushes, or give what "
-        "it takes off as an input of its own (record.with_input)"
+        "measure behind the play, put a load behind it that always pushes one way, or give what it "
+        "adds to the command, behind less command, as an input of its own (record.with_input)"
     ),
     "asymmetric": (
-        "give the model both values in a simulation of your own, or keep a bias on the motion so "
-        "that it does not turn round"
+        "give the absolute value of that motion as an input of its own (record.with_input, "
+        "hold='foh'), or move it in one direction only"
     ),
     "feedback": (
         "the record is of a closed loop: give it its reference, with reference=True where a note "
@@ -93,7 +93,7 @@ def words(name: str, size: float, unit: str, detail: str, channel: str = "") -> 
         "friction": f"a friction of {abs(size):.3g}{unit} {detail}",
         "nonlinear": f"the plant is not linear: {detail}{level}",
         "backlash": f"{detail} has play: what acts is {number} behind it, on either side",
-        "asymmetric": f"the plant is not linear: {detail}, by about {2 * abs(size):.2g} %",
+        "asymmetric": f"the plant is not linear: {detail}, by about {2 * abs(size):.2g} % of it",
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": (
             f"separate fits of the experiments differ by {100 * size:.3g} %{parameter}"
