@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SystemModel(MatrixModel):
-    """A continuous-time control system."""
+    """A continuous-time control system; its inputs come late by ``input_delays`` in s, if any."""
 
     dt = 0.0
     delay = 0.0
@@ -27,6 +27,12 @@ class SystemModel(MatrixModel):
     matrices: StateSpace
     input_names: Sequence[str]
     output_names: Sequence[str]
+    input_delays: Sequence[float] = ()
+
+    @property
+    def delays(self) -> tuple[float, ...]:
+        """Delay of each input in s."""
+        return tuple(self.input_delays) or super().delays
 
 
 class HasModel(Protocol):

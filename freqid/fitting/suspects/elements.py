@@ -1,11 +1,13 @@
 """Elements of a plant: free parameters that make one force of one motion, as a spring does.
 
 Such a parameter p enters A alone, as p b cᵀ: cᵀx is the motion it answers to, b where its force
-acts. What is not linear in it is a force of another shape at the same place.
+acts. What is not linear in it is a force of another shape at the same place. Where inputs come late
+the motion does, and the force then acts at once.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +59,7 @@ class Element:
         """The lines (K,) of the motion as the fit has it."""
         A, B, _, _ = self.matrices(model)
         plant = StateSpace(A, B, self.motion[None], 0 * B[:1])
-        return s.moved(inner_response(s, plant, s.reading.hold))[0]
+        return s.moved(inner_response(s, plant, s.reading.hold, model.delays))[0]
 
     def answers(self, s: Seen, model: Model, shape: ComplexArray) -> FloatArray:
         """Rows (1, rows) of a force of another shape, by its lines (K,), in units of the
@@ -83,17 +85,28 @@ class Element:
         return np.zeros(len(C))
 
 
-def inner_response(s: Seen, plant: StateSpace, hold: Hold) -> ComplexArray:
-    """Of what lies inside a plant at the lines, (outputs, inputs, K)."""
+def inner_response(
+    s: Seen, plant: StateSpace, hold: Hold, delays: Sequence[float] = ()
+) -> ComplexArray:
+    """Of what lies inside a plant at the lines, (outputs, inputs, K), its inputs late by
+    ``delays`` in s.
+    """
     names = [f"u{i}" for i in range(plant.B.shape[1])], [f"y{i}" for i in range(len(plant.C))]
-    return responses(SystemModel(plant, *names), hold, s.omega_input)
+    return responses(SystemModel(plant, *names, delays), hold, s.omega_input)
+
+
+def behind_delay(model: Model) -> Model:
+    """The plant as a force meets it that acts where its inputs do, behind their delays."""
+    if model.dt or not model.late:
+        return model
+    return SystemModel(model.state_space(), model.inputs or (), model.outputs or ())
 
 
 def elements(model: Model, heard: bool = False) -> list[Element]:
     """Those of a grey box in continuous time, its springs and dampers; those too of which outputs
     show the force, as an acceleration does, where they may be ``heard``.
     """
-    if not isinstance(model, GreyBox) or model.dt or model.late:
+    if not isinstance(model, GreyBox) or model.dt:
         return []
     # a user's function need not know how to move what is fixed
     names = [p.name for p in model.free_parameters]

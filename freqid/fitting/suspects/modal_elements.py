@@ -43,7 +43,7 @@ class ModalElement(Element):
 
 def modal_elements(model: Model) -> list[ModalElement]:
     """Spring and damper of the largest modes of a black box, weakly damped ones."""
-    if isinstance(model, GreyBox) or model.late:
+    if isinstance(model, GreyBox):
         return []
     found = sorted(filter(is_mode, blocks(model)), key=_largest, reverse=True)
     return [each for mode in found[:_MOST] for each in _of(mode)]

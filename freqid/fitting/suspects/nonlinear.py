@@ -15,7 +15,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.findings import FOLDED
-from freqid.fitting.suspects.elements import Element, elements
+from freqid.fitting.suspects.elements import Element, behind_delay, elements
 from freqid.fitting.suspects.far_end import FarEnd, far_ends
 from freqid.fitting.suspects.masses import masses
 from freqid.fitting.suspects.modal_elements import modal_elements
@@ -90,9 +90,10 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     signed = isinstance(model, GreyBox)
     for s in scene.seen:
         y = s.signals(_fitted(s))
+        plant = behind_delay(s.own(model))
         # an input is less by the sign
         drawn.append(
-            _onto(s, model, _pairs(model), *(-s.lines_of(way(y)) for way in ways.values()))
+            _onto(s, plant, _pairs(model), *(-s.lines_of(way(y)) for way in ways.values()))
         )
     found = [
         Columns(rows, _unit(scene), count, text, onesided=signed)
@@ -135,7 +136,7 @@ def nonlinear(scene: Scene, model: Model) -> list[Columns]:
             drive = of_inputs(s, model, s.lines_of(_cube(u)), s.lines_of_input)
             kinds.setdefault(_DRIVE, []).append((drive[0], drive[1]))
         if not isinstance(model, GreyBox) or all(each[0].damps for each in springs):
-            forces = _onto(s, model, pairs, bent, y)
+            forces = _onto(s, behind_delay(s.own(model)), pairs, bent, y)
             kinds.setdefault(_FORCE, []).append((forces[0], forces[1]))
         alone = np.eye(len(y))[:, :, None]
         kinds.setdefault(_SENSOR, []).append((s.rows_of(alone * bent), s.rows_of(alone * y)))
@@ -213,7 +214,7 @@ def _onto(
     """Rows (pairs, rows) of each input with a signal beside it, for each of several signals of
     these lines (channels, K).
     """
-    G, rows = responses(s.own(model), s.reading.hold, s.omega_input), []
+    G, rows = responses(model, s.reading.hold, s.omega_input), []
     for each in signals:
         inputs = np.zeros((len(pairs), model.n_inputs, each.shape[-1]), complex)
         for row, (i, o) in enumerate(pairs):
@@ -224,7 +225,7 @@ def _onto(
 
 def of_inputs(s: Seen, model: Model, *signals: ComplexArray) -> list[FloatArray]:
     """Rows (inputs, rows) of each input with its own of several signals (inputs, K) beside it."""
-    return _onto(s, model, [(i, i) for i in range(model.n_inputs)], *signals)
+    return _onto(s, s.own(model), [(i, i) for i in range(model.n_inputs)], *signals)
 
 
 def _cube(signal: FloatArray) -> FloatArray:

@@ -49,7 +49,7 @@ class _Parts:
             np.concatenate([self.motions, along]),
             np.concatenate([self.direct, 0 * self.direct]),
         )
-        lines = s.moved(inner_response(s, seen, s.reading.hold))
+        lines = s.moved(inner_response(s, seen, s.reading.hold, model.delays))
         # what acts inside is held as the first input is
         hold = InputHolds.each(s.reading.hold, model.n_inputs)[0]
         acting = StateSpace(A, self.forces, C, np.zeros((len(C), len(self.names))))
@@ -94,7 +94,7 @@ def _turns(motion: FloatArray) -> bool:
 
 def _parts(model: Model) -> _Parts | None:
     """The parameters of a grey box in continuous time that act through one force on one motion."""
-    if not isinstance(model, GreyBox) or model.dt or model.late:
+    if not isinstance(model, GreyBox) or model.dt:
         return None
     names = [p.name for p in model.free_parameters]
     _, by = model.linearise(model.values, names)
