@@ -79,9 +79,15 @@ def errors_at_stamps(model: Model, record: StampedRecord, hold: Hold | str | Non
 
 
 def errors_in_time(
-    model: Model, record: Record, hold: Hold | str | None, initial_state: str, offset: bool
+    model: Model,
+    record: Record,
+    hold: Hold | str | None,
+    initial_state: str,
+    offset: bool,
+    band: Band | None = None,
 ) -> FloatArray:
-    """Errors ŷ − y (N, outputs) of a simulation, the initial state fitted.
+    """Errors ŷ − y (N, outputs) of a simulation, or their part in a band, the initial state fitted
+    to what is compared.
 
     Those of lines in time, but where a model in continuous time integrates an input that is held
     from sample to sample: without the line at zero a constant force would be free.
@@ -89,9 +95,10 @@ def errors_in_time(
     reading = Reading.of(record, hold, domain="time")
     held = reading.hold
     every = isinstance(held, PeriodicHold) and np.isclose(held.period, record.input_dt, rtol=1e-9)
+    every = every and band is None
     if every and initial_state == "estimate" and model.integrates and not (model.dt or model.late):
         return _at_samples(model, reading).reshape(model.n_outputs, -1).T
-    return line_errors(model, record, hold, None, initial_state, offset).in_time()
+    return line_errors(model, record, hold, band, initial_state, offset).in_time()
 
 
 def _at_samples(model: Model, reading: Reading) -> FloatArray:

@@ -131,7 +131,8 @@ def compare(
             higher than what is told here where a force or an offset of the input was not recorded.
             Behind a delay, of a discrete model and of an input that is held for longer than its
             samples a constant force stays free here as well.
-        band: in Hz; only what lies inside it is compared, of both. None compares everything.
+        band: in Hz; only what lies inside it is compared, of both, and told of the initial state.
+            None compares everything.
 
     Raises ValueError for channels that do not match, a band that the record does not have, or an
     output that is constant there, of which nothing is to be explained.
@@ -158,10 +159,10 @@ def compare(
     choice("initial_state", initial_state, ("estimate", "steady"))
     given, hold = fitted, own_hold(model, hold, record)
     free = offset_is_free(model)
-    residual = -errors_in_time(given, record, hold, initial_state, free)
+    residual = -errors_in_time(given, record, hold, initial_state, free, limits)
     y = record.outputs[: len(residual)]
     if limits is not None:
-        y, residual = part_inside(y, record.dt, limits), part_inside(residual, record.dt, limits)
+        y = part_inside(y, record.dt, limits)
     centred = np.linalg.norm(y - y.mean(axis=0), axis=0)
     left = np.linalg.norm(residual, axis=0)
     size = np.linalg.norm(record.outputs[: len(residual)], axis=0)

@@ -77,6 +77,22 @@ def test_friction_that_only_changes_its_sign_is_named_with_its_size(model, kind)
         assert abs(est.suspects.loc["friction", "size"] - 0.1) < 0.02
 
 
+@pytest.mark.parametrize("model", [LAG, SPRING], ids=["velocity", "position"])
+def test_a_sensor_that_is_turned_round_has_the_same_friction(model):
+    """Found: a friction's sign was that of the output, as if every gain were positive."""
+    record = measured(model, inputs("white"), "friction", 0.1)
+    there = fq.fit(model, record).suspects.loc["friction"]
+
+    def turned(**values):
+        A, B, C, D = model.state_space(**values)
+        return A, B, -C, -D
+
+    plant = fq.GreyBox(turned, model.parameters)
+    here = fq.fit(plant, fq.Record(record.u, -record.y, DT))
+    assert here.warnings[0].kind == "friction"
+    assert here.suspects.loc["friction", "size"] == pytest.approx(there["size"], rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("model", "kind", "fault", "size", "what"),
     [

@@ -45,3 +45,29 @@ def test_a_start_a_third_off_ends_where_the_truth_does(seed):
     assert est.cost <= right.cost * (1 + 1e-6)
     std = est.parameters["std"].to_numpy()
     assert (np.abs(est.values - list(TRUE.values())) < 4 * std).all()
+
+
+def _spring(unit):
+    return lambda m, c, k: (
+        [[0, 1], [-k / m, -c / m]], [[0], [1 / m]], [[1, 0], [0, unit]], None,
+    )  # fmt: skip
+
+
+def test_the_unit_of_an_output_does_not_matter_to_noise_that_is_learnt():
+    truth, u = {"m": 1.0, "c": 2.0, "k": 100.0}, fq.white_noise(1000, seed=1)
+
+    def fitted(unit):
+        model = fq.GreyBox(_spring(unit), [fq.Parameter(n, v) for n, v in truth.items()])
+        return fq.fit(model, fq.Record(u, y * [1, unit], DT), weights="noise")
+
+    plant = fq.GreyBox(_spring(1.0), [fq.Parameter(n, v) for n, v in truth.items()])
+    y = fq.simulate(plant, u, DT).y
+    y = y + [0.3, 0.03] * y.std(axis=0) * np.random.default_rng(0).standard_normal(y.shape)
+    here = fitted(1.0)
+    for unit in (1e-7, 1e7):
+        there = fitted(unit)
+        assert there.cost == pytest.approx(here.cost, rel=1e-4)
+        assert there.values == pytest.approx(here.values, rel=1e-4)
+        assert there.parameters["std"].to_numpy() == pytest.approx(
+            here.parameters["std"].to_numpy(), rel=1e-4
+        )

@@ -32,8 +32,8 @@ _PAIRS = 9
 # part of a signal's range that its values differ by where they are levels, and how many levels are
 # no more than a cube can be told from
 _LEVEL, _LEVELS = 1e-6, 3
-# about how many samples are looked at first
-_GLANCED = 1000
+# about how many samples are looked at first, and part of a sum's terms that is but rounding
+_GLANCED, _ROUNDING = 1000, 1e-12
 # change with the level, in %, from which a black box is another: of a gain, of a mode's stiffness,
 # which moves its frequency by half of that, and of its damping
 _GAIN, _STIFFNESS, _DAMPING = 5.0, 2.0, 10.0
@@ -87,14 +87,14 @@ def friction(scene: Scene, model: Model) -> list[Columns]:
     }
     drawn = []
     # only who names a sensor's direction knows which way friction acts
-    signed = isinstance(model, GreyBox)
+    signed, pairs = isinstance(model, GreyBox), _pairs(model)
     for s in scene.seen:
         y = s.signals(_fitted(s))
         plant = behind_delay(s.own(model))
-        # an input is less by the sign
-        drawn.append(
-            _onto(s, plant, _pairs(model), *(-s.lines_of(way(y)) for way in ways.values()))
-        )
+        # an input is less by the sign, where it moves the output up
+        side = _way(plant, pairs)[:, None] if signed else 1.0
+        against = (-s.lines_of(way(y)) for way in ways.values())
+        drawn.append([side * rows for rows in _onto(s, plant, pairs, *against)])
     found = [
         Columns(rows, _unit(scene), count, text, onesided=signed)
         for text, rows in zip(ways, zip(*drawn, strict=True), strict=True)
@@ -189,6 +189,23 @@ def _pairs(model: Model) -> list[tuple[int, int]]:
     if model.n_inputs == model.n_outputs:
         return [(i, i) for i in range(model.n_inputs)]
     return [(i, o) for i in range(model.n_inputs) for o in range(model.n_outputs)]
+
+
+def _way(plant: Model, pairs: list[tuple[int, int]]) -> FloatArray:
+    """Which way an input moves an output at first, ±1 for each pair: a sensor may be turned."""
+    A, B, C, D = plant.state_space()
+    found = []
+    for i, o in pairs:
+        x, row, way = B[:, i], C[o], float(D[o, i])
+        for _ in range(len(A)):
+            if way:
+                break
+            told = float(row @ x)
+            # what is but rounding of the sum is none
+            way = told if abs(told) > _ROUNDING * float(np.abs(row) @ np.abs(x)) else 0.0
+            x = A @ x
+        found.append(np.sign(way) or 1.0)
+    return np.array(found)
 
 
 def _fitted(s: Seen) -> ComplexArray:

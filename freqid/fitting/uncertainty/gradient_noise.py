@@ -106,16 +106,7 @@ def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -
         J = J - (J @ Q.T) @ Q
         if noise_at is not realisation:
             left = projected(e.at(noise_at))[0]
-        p = len(e.y)
-        R, JF = (scipy.fft.rfft(a.reshape(*a.shape[:-1], p, -1), norm="ortho") for a in (left, J))
-        N = e.y.shape[1]
-        twice = np.full(R.shape[-1], 2.0)
-        twice[0] = 1.0
-        if N % 2 == 0:
-            twice[-1] = 1.0
-        # J'Σ J over all samples is that over the lines, each but the ends standing for two
-        seen = (JF * (smoothed_power(R) * twice)).reshape(len(x), -1)
-        total += (seen @ JF.reshape(len(x), -1).conj().T).real
+        total += _of_series(J.reshape(len(x), len(e.y), -1), left.reshape(len(e.y), -1))
         rows += e.n_rows
         unknown += 0 if delta is None else len(delta)
     if not np.isfinite(total).all():
@@ -196,8 +187,8 @@ def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
 def _of_stamps(
     e: StampedExperiment, at: Realisation, noise_at: Realisation
 ) -> tuple[FloatArray, int]:
-    """The same of samples at times of their own, each output's noise taken for white, and how many
-    unknowns its initial state has.
+    """The same of samples at times of their own, whose noise has the colour that it has from one
+    sample to the next, and how many unknowns their initial state has.
     """
     evaluation = e.at(at)
     left, Q, delta = projected(evaluation)
@@ -205,8 +196,22 @@ def _of_stamps(
     J = J - (J @ Q.T) @ Q
     if noise_at is not at:
         left = projected(e.at(noise_at))[0]
-    power = np.mean(left.reshape(e.y.shape) ** 2, axis=0)
-    return (J * np.tile(power, len(e.y))) @ J.T, 0 if delta is None else len(delta)
+    J, left = np.moveaxis(J.reshape(len(J), *e.y.shape), 2, 1), left.reshape(e.y.shape).T
+    return _of_series(J, left), 0 if delta is None else len(delta)
+
+
+def _of_series(J: FloatArray, left: FloatArray) -> FloatArray:
+    """JᵀΣJ of derivatives (P, outputs, N), Σ being the covariance that residuals (outputs, N) tell:
+    the sum over all samples is that over the lines, each but the ends standing for two.
+    """
+    R, JF = (scipy.fft.rfft(a, norm="ortho") for a in (left, J))
+    twice = np.full(R.shape[-1], 2.0)
+    twice[0] = 1.0
+    if left.shape[-1] % 2 == 0:
+        twice[-1] = 1.0
+    seen = (JF * (smoothed_power(R) * twice)).reshape(len(J), -1)
+    total: FloatArray = (seen @ JF.reshape(len(J), -1).conj().T).real
+    return total
 
 
 def _of_response(

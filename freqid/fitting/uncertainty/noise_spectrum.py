@@ -123,11 +123,14 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     """1/variance at each line from the errors (outputs, K) that a fit left there.
 
     In a record's cost, Σ 2|E|²/N, every real value then adds a half, as it does to a response's
-    under weights of 1/variance.
+    under weights of 1/variance. Outputs have units of their own, and each its own least variance.
     """
     variance = _spectrum(error)
-    floor = 1e-12 * variance.max(initial=0)
-    return n_samples / 2 / np.maximum(variance, max(float(floor), 1e-300))
+    floor = 1e-12 * variance.max(axis=-1, keepdims=True, initial=0)
+    # an output without errors has no variance: it counts as much as what is hardly none of others
+    floor = np.where(floor > 0, floor, 1e-12 * floor.max(initial=0))
+    weights: FloatArray = n_samples / 2 / np.maximum(variance, np.maximum(floor, 1e-300))
+    return weights
 
 
 def shaped_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
