@@ -39,4 +39,4 @@ from freqid.data.stamped_record import StampedRecord
 from freqid.data.stream_chain import files_of
 from freqid.data.stream_sources import open
 from freqid.data.streams import Stream
-from freqid.data.units import coherent, is_count, units_of_channels
+from freqid.data.units import coherent, is_count, is_of_time, mentions, units_of_channels

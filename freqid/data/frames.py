@@ -27,7 +27,8 @@ from freqid.data.remembered import (
     kept_reference,
     kept_step,
 )
-from freqid.data.time_column import EPOCHS, of_this_world, time_named, with_time
+from freqid.data.time_column import time_named, with_time
+from freqid.data.times_in_seconds import EPOCHS, of_this_world
 from freqid.lti import Hold
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import Array, FloatArray, InputError
-from freqid.data.time_column import EPOCHS
+from freqid.data.times_in_seconds import EPOCHS
 
 # from where on a number of seconds is one since 1970
 _CALENDAR = 1e8
@@ -56,5 +56,5 @@ def _counted(name: str, given: ArrayLike) -> tuple[Array, tuple[float, str]]:
     whole = array.astype("int64") if array.dtype.kind in "iu" else array.astype(float)
     for least, most, scale, text in EPOCHS:
         if least < size < most:
-            return whole, (scale, f"{text} since 1970")
+            return whole, (scale, text)
     return array.astype(float), (1.0, "s")

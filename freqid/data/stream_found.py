@@ -10,7 +10,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError, channel_names
 from freqid.data.readers.table import named
-from freqid.data.time_column import in_seconds
+from freqid.data.times_in_seconds import in_seconds
 from freqid.lti import Hold
 
 # an array of some library, a path, or blocks: what it can do is asked of it

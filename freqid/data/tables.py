@@ -35,6 +35,8 @@ def frame_of(
     reader = READERS.get(path.suffix.lower()) or _as_text(path)
     if path.stat().st_size == 0:
         raise InputError(f"{path} is empty; expected columns of samples under a line of names")
+    if decimal not in (None, ".", ","):
+        raise InputError(f"decimal={decimal!r} is no decimal sign; expected '.' or ','")
     asked = {k: v for k, v in (("sep", sep), ("decimal", decimal)) if v is not None}
     if asked and reader is not READERS[".csv"]:
         raise InputError(f"{path}: {next(iter(asked))}= is for text tables")

@@ -3,56 +3,49 @@
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import Array, FloatArray, InputError, unknown
+from freqid.checks import FloatArray, InputError, unknown
 from freqid.data.readers.table import named
+from freqid.data.times_in_seconds import (
+    DATE,
+    LONG,
+    SUFFIX,
+    UNITS,
+    converted,
+    in_seconds,
+    unit_in_name_of_time,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
 
     Column = pd.Series[Any]
 
-# seconds of each unit by its names
-UNITS = {
-    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek"), 1.0),
-    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds"), 1e-3),
-    **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
-    **dict.fromkeys(("ns", "nsec", "nanos", "nanosecond", "nanoseconds"), 1e-9),
-    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
-    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
-}
 # names that mean the time, case and unit apart
 _NAMES = {
     "time", "t", "zeit", "temps", "tid", "timestamp", "timestamps", "time stamp", "date time",
     "datetime", "date", "elapsed", "elapsed time", "seconds", "sec", "t_s", "time_s", "time_ms",
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
-    "x_value", "tout", "ms", "us", "µs", "ns",
+    "x_value", "tout", "ms", "us", "µs", "ns", "datum", "uhrzeit", "zeitstempel", "fecha", "heure",
 }  # fmt: skip
-# a count since 1970 that means a day between 2001 and 2100 is of nanoseconds, microseconds, …
-EPOCHS = ((1e18, 4.1e18, 1e-9, "ns"), (1e15, 4.1e15, 1e-6, "µs"), (1e12, 4.1e12, 1e-3, "ms"))
 # steps that differ by no more than this part make an unnamed column a time
 _EVEN = 1e-3
-# a name that ends in a unit, and steps in s that nobody samples a machine with
-_SUFFIX = r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos)\.*$"
+# steps in s that nobody samples a machine with
 _SLOW = 0.2
-# names of the time with a longer unit behind them, which may be something else behind another name
+# names of the time with a unit behind them, which may be something else behind another name
 _STEMS = {"time", "elapsed", "elapsed time", "zeit", "temps", "timestamp"}
-_LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
+# steps that tell a clock, the part of one by which two are not the same, and the ratios that counts
+# of one clock have
+_FEW, _OFF = 8, 0.02
+_RATIOS = sorted({a / b for a in UNITS.values() for b in UNITS.values()})
 # units of a count by its steps in them, and what they are called
 _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms", "milliseconds"))
-# a date and a time of day in columns of their own, and seconds of a day
-_DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
+# a time of day in a column of its own
 _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
-_DAY = 86_400.0
-# beyond it a difference may be more than a double holds
-_BEYOND = 1e300
-# a number, however its thousands are marked
-_NUMERAL = r"[+-]?\d[\d.,' ]*([eEdD][+-]?\d+)?"
 
 
 def with_time(
@@ -67,13 +60,15 @@ def with_time(
     if name is None:
         return frame, []
     seconds, said = in_seconds(name, frame[name], units.get(name, ""))
-    rest = frame.drop(columns=[name])
+    same = same_clock(frame, name, seconds, units) if time is None else []
+    rest = frame.drop(columns=[name, *same])
     if "time" in rest.columns:
         raise InputError(f"time={name!r}: the column 'time' is another; rename it")
     rest.insert(0, "time", seconds)
     plain = name == "time" and said == "s"
     notes = [] if plain else [f"column {name!r} was taken for the time, in {said}"]
-    told = units.get(name) or _unit_in(name)
+    notes += [f"column {other!r} is of the same clock, and left out" for other in same]
+    told = units.get(name) or unit_in_name_of_time(name)
     # times that are no numbers are refused by whoever makes a record of them
     with np.errstate(all="ignore"):
         step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
@@ -83,13 +78,6 @@ def with_time(
             f"its steps are {step:g} s: give units={{{name!r}: {unit!r}}} where they are {called}"
         )
     return rest, notes
-
-
-def _unit_in(name: str) -> str:
-    """The unit in which a name ends; empty where it is none of time."""
-    plain = name.strip().casefold()
-    long, short = _LONG.fullmatch(plain), re.search(_SUFFIX, plain)
-    return long[2] if long else short[1] if short else ""
 
 
 def time_named(columns: Sequence[str]) -> str | None:
@@ -102,8 +90,8 @@ def time_named(columns: Sequence[str]) -> str | None:
             return column
     # a unit behind the name, of the first column alone: T_h may be a temperature
     first = named(columns[0])[0].strip().casefold() if columns else ""
-    stem = re.sub(_SUFFIX, "", first)
-    return columns[0] if (stem != first and stem in _STEMS) or _LONG.fullmatch(first) else None
+    stem = re.sub(SUFFIX, "", first)
+    return columns[0] if (stem != first and stem in _STEMS) or LONG.fullmatch(first) else None
 
 
 def _joined(frame: pd.DataFrame) -> pd.DataFrame:
@@ -112,7 +100,7 @@ def _joined(frame: pd.DataFrame) -> pd.DataFrame:
         texts = [frame[c].iloc[:5] for c in (day, clock)]
         if any(t.dtype.kind in "fiubmM" for t in texts):
             continue
-        if not all(_DATE.fullmatch(str(x)) for x in texts[0]):
+        if not all(DATE.fullmatch(str(x)) for x in texts[0]):
             continue
         if not all(_CLOCK.fullmatch(str(x)) for x in texts[1]):
             continue
@@ -133,7 +121,8 @@ def _found(
         if plain not in frame.columns:
             raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
         return plain
-    told = time_named([str(c) for c in frame.columns])
+    # what has another unit is no time: T in °C
+    told = time_named([str(c) for c in frame.columns if _may_be_time(units.get(c, ""))])
     if told is not None:
         return told
     if dt is not None or len(frame.columns) < 3 or len(frame) < 3:
@@ -155,110 +144,48 @@ def _found(
 
 
 def _is_stamp(column: Column) -> bool:
-    return column.dtype.kind in "mM" or _converted(column.iloc[:5]) is not None
+    return column.dtype.kind in "mM" or converted(column.iloc[:5]) is not None
 
 
-def _converted(column: Column) -> Column | None:
-    """Texts as dates or durations; None where they are neither."""
-    import pandas as pd
+def same_clock(
+    frame: pd.DataFrame, name: str, seconds: FloatArray, units: Mapping[str, str]
+) -> list[str]:
+    """Other columns of times that are called as the column ``name`` is, and are of its clock.
 
-    # what pandas takes for a count of nanoseconds is a number that it could not read
-    numbers = column.astype(str).str.fullmatch(_NUMERAL)
-    if numbers.any():
-        others = column[~numbers & column.notna()]
-        if len(others) and 2 * len(others) < len(column):
-            raise InputError(
-                f"column {column.name!r} holds {others.iloc[0]!r} in row {others.index[0]} among "
-                "its numbers; mend or leave out the row"
-            )
-        cell = column[numbers].iloc[-1]
-        raise InputError(
-            f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
-        )
-    # with dots the day comes first
-    first = bool(column.astype(str).str.contains(r"\d\.\d+\.").any())
-    ways: list[Callable[[], Any]] = [
-        lambda: pd.to_datetime(column, format="ISO8601"),
-        lambda: pd.to_timedelta(column),
-        lambda: pd.to_datetime(column, format="mixed", dayfirst=first),
-    ]
-    for way in ways:
-        try:
-            with warnings.catch_warnings():
-                # what pandas will call by another name is no matter of the file's
-                warnings.simplefilter("ignore")
-                return pd.Series(way())
-        except (ValueError, TypeError, OverflowError):
+    Raises ValueError where one is of another, at other steps or by a part of the record earlier or
+    later: its signals have times of their own.
+    """
+    found: list[str] = []
+    stem = _stem(name)
+    with np.errstate(all="ignore"):
+        steps, span = np.diff(seconds), float(np.ptp(seconds)) if len(seconds) else 0.0
+    if stem not in _NAMES or len(steps) < _FEW or not (steps > 0).all():
+        return found
+    for other in map(str, frame.columns):
+        alike = other != name and _stem(other) == stem and _may_be_time(units.get(other, ""))
+        if not alike or frame[other].dtype.kind not in "fiu":
             continue
-    return None
-
-
-def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
-    """A column as seconds, and the unit that it was in."""
-    if column.dtype.kind == "M":
-        return _since_first(column), "date and time"
-    if column.dtype.kind == "m":
-        seconds = column.dt.total_seconds().to_numpy(dtype=float)
-        # a time of day begins anew at midnight
-        nights = np.cumsum(np.concatenate([[0], np.diff(seconds) < -_DAY / 2]))
-        return seconds + _DAY * nights, "durations"
-    if column.dtype.kind not in "fiub":
-        converted = _converted(column)
-        if converted is None:
+        x = frame[other].to_numpy(dtype=float)
+        if not np.isfinite(x).all() or not (np.diff(x) > 0).all():
+            continue
+        # counts of one clock differ by their unit and by where they begin
+        unit = min(_RATIOS, key=lambda r: abs(np.log(np.ptp(x) / span / r)))
+        apart = x / unit - seconds
+        begins = abs(float(apart[0])) if unit == 1 and abs(apart[0]) < span else 0.0
+        if max(float(np.ptp(apart)), begins) > _OFF * float(np.median(steps)):
             raise InputError(
-                f"column {name!r} holds {column.iloc[0]!r}, which is neither a number nor a time"
+                f"columns {name!r} and {other!r} are both times, and not of one clock: of signals "
+                "that have their own make a record by Record.from_logs(times of the input, input, "
+                f"times of the output, output), or give time={name!r} for all of them"
             )
-        return in_seconds(name, converted, unit)
-    values = of_this_world(name, _less_the_first(column.to_numpy()))
-    wanted = unit or _unit_in(name)
-    if wanted:
-        if wanted.casefold() not in UNITS:
-            raise InputError(
-                f"the unit of {name!r} is {wanted!r}; expected one of {', '.join(UNITS)}"
-            )
-        scale = UNITS[wanted.casefold()]
-        if _since_1970(column, scale):
-            # whole numbers keep digits that their seconds have not
-            return _scaled(values - values[0], scale), f"{wanted} since 1970"
-        return _scaled(values, scale), wanted
-    size = float(np.nan_to_num(np.abs(column.to_numpy(dtype=float)), nan=0.0).max(initial=0))
-    for least, most, scale, text in EPOCHS:
-        if least < size < most:
-            return _scaled(values - values[0], scale), f"{text} since 1970"
-    return values, "s"
+        found.append(other)
+    return found
 
 
-def _since_1970(column: Column, scale: float) -> bool:
-    """Whether a column counts units of so many seconds since 1970."""
-    size = np.abs(column.to_numpy().astype(float))
-    largest = float(size.max(initial=0, where=np.isfinite(size)))
-    return any(least < largest < most and scale == s for least, most, s, _ in EPOCHS)
+def _may_be_time(unit: str) -> bool:
+    return not unit or unit.casefold() in UNITS
 
 
-def of_this_world(name: str, seconds: FloatArray) -> FloatArray:
-    """Times whose differences a double can hold; InputError names the first row of others."""
-    beyond = np.abs(seconds) > _BEYOND
-    if beyond.any():
-        row = int(np.argmax(beyond))
-        raise InputError(
-            f"column {name!r} holds {seconds[row]:g} in row {row}, which is no time; mend or leave "
-            "out the row"
-        )
-    return seconds
-
-
-def _less_the_first(values: Array) -> FloatArray:
-    """Values as floats; whole ones beyond the digits of these from the first of them on."""
-    large = values.dtype.kind in "iu" and np.abs(values.astype(float)).max(initial=0) > 2**53
-    return (values - values[0] if large else values).astype(float)
-
-
-def _scaled(values: FloatArray, scale: float) -> FloatArray:
-    """Values times a power of ten, rounded as one would divide."""
-    return values / round(1 / scale) if scale < 1 else values * scale
-
-
-def _since_first(column: Column) -> FloatArray:
-    import pandas as pd
-
-    return np.asarray((column - column.iloc[0]) / pd.Timedelta(seconds=1), dtype=float)
+def _stem(name: str) -> str:
+    """A name up to its first underscore, blank, dot or digit."""
+    return re.split(r"[\W_\d]", name.strip().casefold(), maxsplit=1)[0]

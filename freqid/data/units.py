@@ -41,7 +41,8 @@ _OTHERS = {
     "rad": {"°": np.pi / 180, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180,
             "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6, "rev": 2 * np.pi, "turn": 2 * np.pi,
             "turns": 2 * np.pi},
-    "rad/s": {"rpm": np.pi / 30, "1/min": np.pi / 30, "r/min": np.pi / 30, "U/min": np.pi / 30,
+    "rad/s": {"rpm": np.pi / 30, "krpm": 1e3 * np.pi / 30,
+              "1/min": np.pi / 30, "r/min": np.pi / 30, "U/min": np.pi / 30,
               "rev/min": np.pi / 30, "min^-1": np.pi / 30, "min-1": np.pi / 30,
               "rev/s": 2 * np.pi, "°/s": np.pi / 180, "deg/s": np.pi / 180,
               "deg/sec": np.pi / 180, "dps": np.pi / 180, "mrad/s": 1e-3},
@@ -51,14 +52,32 @@ _OTHERS = {
     "N": {"mN": 1e-3, "kN": 1e3, "lbf": 4.4482216},
     "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "inch": 0.0254,
           "ft": 0.3048},
-    "m/s": {"mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6},
+    "m/s": {"mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6, "kph": 1 / 3.6, "kmh": 1 / 3.6,
+            "mph": 0.44704},
     "m/s^2": {"mm/s^2": 1e-3, "cm/s^2": 1e-2, "mm/s²": 1e-3, "cm/s²": 1e-2, "mm/s2": 1e-3,
               "cm/s2": 1e-2},
     "A": {"mA": 1e-3},
-    "V": {"mV": 1e-3},
+    "V": {"mV": 1e-3, "kV": 1e3},
+    "W": {"mW": 1e-3, "kW": 1e3, "MW": 1e6},
+    "K": {"mK": 1e-3, "°F": 1 / 1.8, "degF": 1 / 1.8},
+    "Pa": {"hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "mbar": 1e2, "bar": 1e5, "psi": 6894.757},
+    "m^3/s": {"l/s": 1e-3, "L/s": 1e-3, "l/min": 1e-3 / 60, "L/min": 1e-3 / 60, "lpm": 1e-3 / 60,
+              "l/h": 1e-3 / 3600, "m³/h": 1 / 3600, "m^3/h": 1 / 3600, "m3/h": 1 / 3600},
+    "kg": {"t": 1e3},
 }  # fmt: skip
 
 
+# units of times, rates and plain numbers
+_TIMED = re.compile(r"|1|%|m?s|k?Hz|(1|rad)/s(²|\^2)?")
+# how the unit of a parameter has that of a channel in it, a moment of inertia N m s²/rad
+_INERTIA = r"kg\s*m(²|\^2|2)"
+_LENGTH = r"/\s*\(?m\b|kg(?!\s*m)|^m(/s)?/|^m([²³]|\^[23])|s/m([²³]|\^[23])"
+_MENTIONS = {
+    "rad": rf"rad|{_INERTIA}", "rad/s": rf"rad|{_INERTIA}",
+    "N m": rf"N\s*m|{_INERTIA}", "N": r"N(?!\s*m)|kg(?!\s*m)", "m": _LENGTH, "m/s": _LENGTH,
+    "m/s^2": _LENGTH, "m^3/s": rf"{_LENGTH}|m³", "A": r"A\b", "V": r"V\b", "W": r"W\b",
+    "K": r"K\b", "Pa": r"Pa\b", "kg": r"kg",
+}  # fmt: skip
 # those that mean one thing however they are written
 _ANY_CASE = {
     other.casefold(): (base, factor)
@@ -101,6 +120,24 @@ def _spelled(unit: str) -> str:
     return re.sub(r"(?<=s)2$", "^2", re.sub(r"[·*]", " ", unit).replace("²", "^2").strip())
 
 
+def is_of_time(unit: str) -> bool:
+    """Whether a unit has that of no channel in it: times, rates and plain numbers.
+
+    >>> is_of_time("rad/s"), is_of_time("rad/s/V")
+    (True, False)
+    """
+    return _TIMED.fullmatch(unit) is not None
+
+
+def mentions(unit: str, base: str) -> bool:
+    """Whether the unit of a parameter has the ``base`` of a channel's in it, as an inertia has rad.
+
+    >>> mentions("kg m²", "rad/s"), mentions("rad/s/V", "rad/s"), mentions("rad/s", "rad/s")
+    (True, True, False)
+    """
+    return not is_of_time(unit) and re.search(_MENTIONS[base], unit) is not None
+
+
 def units_of_channels(names: Sequence[str], units: Mapping[str, str]) -> list[tuple[str, str]]:
     """Channels and their units, of those that have one or whose name ends in one.
 
@@ -123,10 +160,10 @@ def is_count(unit: str) -> bool:
 def unit_in_name(name: str) -> str:
     """The unit that a name ends in; empty where that is none.
 
-    >>> unit_in_name("angle_deg"), unit_in_name("speed_RPM"), unit_in_name("torque")
+    >>> unit_in_name("angle_deg"), unit_in_name("Speed RPM"), unit_in_name("torque")
     ('deg', 'rpm', '')
     """
-    end = name.rpartition("_")[2]
+    end = re.split(r"[_\s]+", name.strip())[-1]
     if end == name or (coherent(end) is None and not is_count(end)):
         return ""
     return next((u for u in _ENDS if end in (u, u.upper(), u.capitalize())), "")

@@ -95,8 +95,8 @@ def errors_in_time(
     reading = Reading.of(record, hold, domain="time")
     held = reading.hold
     every = isinstance(held, PeriodicHold) and np.isclose(held.period, record.input_dt, rtol=1e-9)
-    every = every and band is None
-    if every and initial_state == "estimate" and model.integrates and not (model.dt or model.late):
+    plain = model.integrates and not (model.dt or model.late)
+    if band is None and every and initial_state == "estimate" and plain:
         return _at_samples(model, reading).reshape(model.n_outputs, -1).T
     return line_errors(model, record, hold, band, initial_state, offset).in_time()
 

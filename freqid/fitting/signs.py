@@ -6,14 +6,13 @@ findings.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.data import coherent, is_count
+from freqid.data import coherent, is_count, is_of_time, mentions
 from freqid.fitting.findings import FOLDED, Finding, Severity
 from freqid.models import Parameter
 
@@ -148,24 +147,13 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
             yield Finding("edge of a bound", sentence, severity, float(value))
 
 
-# units that have none of a channel in them: times, rates and plain numbers
-_TIMED = re.compile(r"|1|%|m?s|k?Hz|(1|rad)/s(²|\^2)?")
-# how the unit of a parameter has that of a channel in it, a moment of inertia N m s²/rad
-_INERTIA = r"kg\s*m(²|\^2|2)"
-_MENTIONS = {
-    "rad": rf"/\s*\(?rad|{_INERTIA}", "rad/s": rf"/\s*\(?rad|{_INERTIA}",
-    "N m": rf"N\s*m|{_INERTIA}", "N": r"N(?!\s*m)|kg(?!\s*m)",
-    "m": r"/\s*\(?m\b|kg(?!\s*m)", "m/s": r"/\s*\(?m\b|kg(?!\s*m)", "A": r"A\b", "V": r"V\b",
-}  # fmt: skip
-
-
 @sign
 def other_units(e: Evidence) -> Iterator[Finding]:
     """A channel in multiples of the unit that parameters are printed in."""
     for channel, unit in e.units:
         told = coherent(unit)
         if told is None:
-            named = sorted({p.unit for p in e.parameters if not _TIMED.fullmatch(p.unit)})
+            named = sorted({p.unit for p in e.parameters if not is_of_time(p.unit)})
             counted = unit.casefold().removesuffix("s")
             if is_count(unit) and named and not any(counted in u.casefold() for u in named):
                 yield Finding(
@@ -178,7 +166,7 @@ def other_units(e: Evidence) -> Iterator[Finding]:
         base, factor = told
         # who has the channel's own unit in his parameters means it
         units = {p.unit.replace("·", " ") for p in e.parameters}
-        met = sorted(u for u in units if unit not in u and re.search(_MENTIONS[base], u))
+        met = sorted(u for u in units if unit not in u and mentions(u, base))
         if met:
             yield Finding(
                 "units",

@@ -90,6 +90,32 @@ def test_a_channel_of_another_unit_is_doubted(tmp_path, name, in_file):
     assert "multiply the samples of angle" in reason
 
 
+@pytest.mark.parametrize(
+    ("channel", "parameters", "doubted"),
+    [
+        ("speed [rpm]", ("rad/s/V", "s"), True), ("speed [rad/s]", ("rad/s/V", "s"), False),
+        ("speed [deg/s]", ("rad/(V s)", "s"), True), ("Speed rpm", ("rad/s/V", "s"), True),
+        ("temperature [mK]", ("K/W", "s"), True), ("temperature [°C]", ("K/W", "s"), False),
+        ("level [cm]", ("s/m²", "s"), True), ("level [m]", ("s/m²", "s"), False),
+        ("speed [kph]", ("m/s/V", "s"), True), ("a [cm/s^2]", ("m/s^2/V", "s"), True),
+        ("speed [rpm]", ("rpm/V", "s"), False), ("angle [deg]", ("", "rad/s"), False),
+        ("pressure [bar]", ("Pa/V", "s"), True), ("flow [l/min]", ("m³/s/V", "s"), True),
+    ],
+)  # fmt: skip
+def test_parameters_of_a_gain_say_the_unit_of_its_channel(channel, parameters, doubted):
+    """Found: rpm were told beside inertias alone, kW, mK, l/min, mph and kph of nothing."""
+    unit, other = parameters
+    plant = fq.GreyBox(
+        lambda K, p: ([[-p]], [[K * p]], [[1.0]], [[0.0]]),
+        [fq.Parameter("K", 1.0, unit), fq.Parameter("p", 5.0, other)],
+    )
+    u = np.random.default_rng(1).standard_normal(400)
+    y = fq.simulate(plant, u, 1e-2).with_noise(0.01).y
+    table = pd.DataFrame({"time": 1e-2 * np.arange(400), "u [V]": u, channel: y})
+    est = fq.fit(plant, fq.Record.from_frame(table), n_starts=1)
+    assert any(r.startswith("units") for r in est.verdict.reasons) == doubted
+
+
 def test_columns_of_a_frame_are_named_with_their_units_or_without():
     u, y = moved(60)
     table = pd.DataFrame({"Time [ms]": 10.0 * np.arange(60), "angle [rad]": y, "torque [N m]": u})

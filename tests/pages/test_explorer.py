@@ -195,7 +195,9 @@ def test_the_address_follows_and_a_reload_keeps_it(browser, address):
 def test_who_hears_the_page_is_told_names_and_values(browser, address):
     browser.get(address)
     until(browser, f"{VERDICT}.startsWith('d = -2')", "the page")
-    named = until(browser, f"const s = (() => {{{SLIDERS}}})(); return s.every(x => x[0]) && s", "")
+    # the plant's sliders come with its parameters
+    there = "s.every(x => x[0]) && s.some(x => x[0].startsWith('k = ')) && s"
+    named = until(browser, f"const s = (() => {{{SLIDERS}}})(); return {there}", "sliders")
     told = dict(named)
     assert told["keep one sample in"] == "10"
     assert told["chirp, Hz, from"] == "10.0 Hz"

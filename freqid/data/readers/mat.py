@@ -102,7 +102,7 @@ def loaded(path: Path) -> Fields:
         with warnings.catch_warnings():
             # before scipy 1.18 all objects have one name
             warnings.filterwarnings("ignore", 'Duplicate variable name "None"')
-            return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True)
+            return scipy.io.loadmat(path, squeeze_me=True, struct_as_record=True, spmatrix=False)
     except NotImplementedError:
         raise
     except Exception as error:

@@ -1,0 +1,178 @@
+"""A column of times as seconds: numbers in a unit, counts since some day, dates, durations."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from freqid.checks import Array, FloatArray, InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    Column = pd.Series[Any]
+
+# seconds of each unit by its names
+UNITS = {
+    **dict.fromkeys(("s", "sec", "secs", "second", "seconds", "sek"), 1.0),
+    **dict.fromkeys(("ms", "msec", "millis", "millisecond", "milliseconds"), 1e-3),
+    **dict.fromkeys(("us", "µs", "μs", "usec", "micros", "microsecond", "microseconds"), 1e-6),
+    **dict.fromkeys(("ns", "nsec", "nanos", "nanosecond", "nanoseconds"), 1e-9),
+    **dict.fromkeys(("min", "minute", "minutes"), 60.0),
+    **dict.fromkeys(("h", "hour", "hours"), 3600.0),
+    **dict.fromkeys(("d", "day", "days"), 86_400.0),
+}
+# counts that mean a day between 2001 and 2100, the smallest last: of nanoseconds since 1970, of
+# .NET's and Windows' ticks, of microseconds, of milliseconds
+EPOCHS = (
+    (1e18, 4.1e18, 1e-9, "ns since 1970"), (6.31e17, 6.63e17, 1e-7, "ticks of 100 ns since year 1"),
+    (1.26e17, 1.58e17, 1e-7, "ticks of 100 ns since 1601"), (1e15, 4.1e15, 1e-6, "µs since 1970"),
+    (1e12, 4.1e12, 1e-3, "ms since 1970"),
+)  # fmt: skip
+# days of a spreadsheet since 1900, or of MATLAB since year 0, that mean the same, and the step up
+# to which numbers so large are no seconds: 2 s as days, 43 kHz as seconds since half a day ago
+_DAYS, _DAY_STEP = ((36_892, 73_051, "1900"), (730_852, 767_011, "year 0")), 2.4e-5
+# a name that ends in a unit, and one of the time with a longer unit behind it
+SUFFIX = r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos)\.*$"
+LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
+# a date, and one that a time of day follows; seconds of a day
+DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
+_DATED = rf"\s*{DATE.pattern}\s"
+_DAY = 86_400.0
+# beyond it a difference may be more than a double holds
+_BEYOND = 1e300
+# a number, however its thousands are marked
+_NUMERAL = r"[+-]?\d[\d.,' ]*([eEdD][+-]?\d+)?"
+
+
+def unit_in_name_of_time(name: str) -> str:
+    """The unit in which a name ends; empty where it is none of time."""
+    plain = name.strip().casefold()
+    long, short = LONG.fullmatch(plain), re.search(SUFFIX, plain)
+    return long[2] if long else short[1] if short else ""
+
+
+def converted(column: Column) -> Column | None:
+    """Texts as dates or durations; None where they are neither."""
+    import pandas as pd
+
+    # what pandas takes for a count of nanoseconds is a number that it could not read
+    texts = column.astype(str).str
+    numbers = texts.fullmatch(_NUMERAL) & ~texts.fullmatch(DATE)
+    if numbers.any():
+        others = column[~numbers & column.notna()]
+        if len(others) and 2 * len(others) < len(column):
+            raise InputError(
+                f"column {column.name!r} holds {others.iloc[0]!r} in row {others.index[0]} among "
+                "its numbers; mend or leave out the row"
+            )
+        cell = column[numbers].iloc[-1]
+        raise InputError(
+            f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
+        )
+    # with dots the day comes first
+    first = bool(column.astype(str).str.contains(r"\d\.\d+\.").any())
+    dated = bool(column.astype(str).str.match(_DATED).any())
+    ways: list[Callable[[], Any]] = [
+        lambda: pd.to_datetime(column, format="ISO8601"),
+        # of a date and a time of day without seconds it makes nanoseconds
+        *([] if dated else [lambda: pd.to_timedelta(column)]),
+        lambda: pd.to_datetime(column, format="mixed", dayfirst=first),
+    ]
+    for way in ways:
+        try:
+            with warnings.catch_warnings():
+                # what pandas will call by another name is no matter of the file's
+                warnings.simplefilter("ignore")
+                return pd.Series(way())
+        except (ValueError, TypeError, OverflowError):
+            continue
+    return None
+
+
+def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
+    """A column as seconds, and the unit that it was in."""
+    if column.dtype.kind == "M":
+        return _since_first(column), "date and time"
+    if column.dtype.kind == "m":
+        seconds = column.dt.total_seconds().to_numpy(dtype=float)
+        # a time of day begins anew at midnight
+        nights = np.cumsum(np.concatenate([[0], np.diff(seconds) < -_DAY / 2]))
+        return seconds + _DAY * nights, "durations"
+    if column.dtype.kind not in "fiub":
+        times = converted(column)
+        if times is None:
+            raise InputError(
+                f"column {name!r} holds {column.iloc[0]!r}, which is neither a number nor a time"
+            )
+        return in_seconds(name, times, unit)
+    values = of_this_world(name, _less_the_first(column.to_numpy()))
+    wanted = unit or unit_in_name_of_time(name)
+    if wanted:
+        if wanted.casefold() not in UNITS:
+            raise InputError(
+                f"the unit of {name!r} is {wanted!r}; expected one of {', '.join(UNITS)}"
+            )
+        scale = UNITS[wanted.casefold()]
+        if _since_1970(column, scale):
+            # whole numbers keep digits that their seconds have not
+            return _scaled(values - values[0], scale), f"{wanted} since 1970"
+        return _scaled(values, scale), wanted
+    size = float(np.nan_to_num(np.abs(column.to_numpy(dtype=float)), nan=0.0).max(initial=0))
+    for least, most, scale, text in EPOCHS:
+        if least < size < most:
+            return _scaled(values - values[0], scale), text
+    if since := _days_since(values):
+        return _scaled(values - values[0], _DAY), f"days since {since}"
+    return values, "s"
+
+
+def _days_since(values: FloatArray) -> str:
+    """The year since which a column counts days, as spreadsheets do; empty where it may be s."""
+    with np.errstate(all="ignore"):
+        step = np.diff(values)
+        finer = len(step) > 0 and bool(0 < np.median(step) < _DAY_STEP)
+    found = (year for least, most, year in _DAYS if least < values.min() <= values.max() < most)
+    return next(found, "") if finer else ""
+
+
+def _since_1970(column: Column, scale: float) -> bool:
+    """Whether a column counts units of so many seconds since 1970."""
+    size = np.abs(column.to_numpy().astype(float))
+    largest = float(size.max(initial=0, where=np.isfinite(size)))
+    return any(
+        least < largest < most and scale == s and "1970" in text for least, most, s, text in EPOCHS
+    )
+
+
+def of_this_world(name: str, seconds: FloatArray) -> FloatArray:
+    """Times whose differences a double can hold; InputError names the first row of others."""
+    beyond = np.abs(seconds) > _BEYOND
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        raise InputError(
+            f"column {name!r} holds {seconds[row]:g} in row {row}, which is no time; mend or leave "
+            "out the row"
+        )
+    return seconds
+
+
+def _less_the_first(values: Array) -> FloatArray:
+    """Values as floats; whole ones beyond the digits of these from the first of them on."""
+    large = values.dtype.kind in "iu" and np.abs(values.astype(float)).max(initial=0) > 2**53
+    return (values - values[0] if large else values).astype(float)
+
+
+def _scaled(values: FloatArray, scale: float) -> FloatArray:
+    """Values times a power of ten, rounded as one would divide."""
+    return values / round(1 / scale) if scale < 1 else values * scale
+
+
+def _since_first(column: Column) -> FloatArray:
+    import pandas as pd
+
+    return np.asarray((column - column.iloc[0]) / pd.Timedelta(seconds=1), dtype=float)
