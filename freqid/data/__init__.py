@@ -22,6 +22,7 @@ from freqid.data.folding import fold, low_pass_gain, merged_lines, unfold
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import LineNoise, LocalResponse, ToldNoise, noise_that_is_told
 from freqid.data.logged import channels
+from freqid.data.misread import misread
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.progress import Bar
 from freqid.data.quality import check_record

@@ -108,6 +108,7 @@ def read(
             text = str(error)
             raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     frame = frame_of(path, sep, decimal, columns, group)
+    by_name = frame.attrs.get("by_name", False)
     found = frame.attrs.get("found", f"columns {', '.join(map(str, frame.columns))}")
     try:
         for name in units or {}:
@@ -140,6 +141,11 @@ def read(
             record = made(rows)
             start = None if start is None else max(start - gone, 0.0)
             stop = None if stop is None else stop - gone
+        if by_name and not asked and record.input_names != ("u",):
+            said.append(
+                "HDF5 lists channels by their names, not as they were written: "
+                f"{record.input_names[0]!r} was taken for the input, name inputs= and outputs="
+            )
         notes = dict.fromkeys((*frame.attrs.get("notes", ()), *said, *record.notes))
         return _cut(dataclasses.replace(record, notes=tuple(notes)), start, stop, detrend)
     except ResponseFile:

@@ -13,6 +13,7 @@ from freqid.checks import FloatArray, InputError, path_of, unknown
 from freqid.data.logs import record_from_logs
 from freqid.data.readers.kinds import LOGS, Channel, Log
 from freqid.data.record import Record
+from freqid.data.regular_time import lost_between
 from freqid.data.remembered import is_kept
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
@@ -26,8 +27,8 @@ def channels(path: str | Path) -> pd.DataFrame:
     """What a file holds: a row for each channel, with its rate and how regular that is.
 
     Columns: ``channel``, ``rate`` (Hz, the mean one), ``jitter`` (s, standard deviation of the
-    steps), ``samples``, ``missing`` (steps of more than one and a half median ones, in samples),
-    ``length`` (s) and ``unit``. Takes every file that ``read`` takes; raises ValueError like it.
+    steps), ``samples``, ``missing`` (samples that steps of several median ones lack), ``length``
+    (s) and ``unit``. Takes every file that ``read`` takes; raises ValueError like it.
 
     >>> import tempfile, pathlib, freqid as fq
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "step.csv"
@@ -49,7 +50,7 @@ def _row(c: Channel) -> tuple[float, float, int, int, float, str]:
         return float("nan"), float("nan"), count, 0, 0.0, c.unit
     length, gaps = float(c.times[-1] - c.times[0]), np.diff(c.times)
     period = float(np.median(gaps))
-    missing = int((np.round(gaps / period) - 1).clip(min=0).sum()) if period > 0 else 0
+    missing = lost_between(gaps, period) if period > 0 else 0
     return (count - 1) / length, float(np.std(gaps)), count, missing, length, c.unit
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, IntArray, an
+from freqid.data.misread import misread
 from freqid.data.record import Record
 
 if TYPE_CHECKING:
@@ -27,9 +28,10 @@ _RUNS, _ALIKE = 20, 0.95
 def check_record(record: Record) -> pd.DataFrame:
     """What is wrong with a record's channels, one row a finding; empty where all is well.
 
-    Columns channel, finding (``constant``, ``stuck``, ``saturated``, ``repeated``, ``quantised``,
-    ``offset``, ``unrelated reference``, ``note``), value and meaning. Quantisation is reported with
-    its step q and the noise q/√12 that it makes (Widrow and Kollár, Quantization Noise, 2008).
+    Columns channel, finding (``constant``, ``code``, ``wrapped``, ``stuck``, ``saturated``,
+    ``repeated``, ``quantised``, ``offset``, ``unrelated reference``, ``note``), value and meaning.
+    Quantisation is reported with its step q and the noise q/√12 that it makes (Widrow and Kollár,
+    Quantization Noise, 2008).
 
     >>> import numpy as np
     >>> t = np.arange(1000) * 1e-3
@@ -66,6 +68,9 @@ def _findings(x: FloatArray, measured: bool) -> list[dict[str, str | float]]:
     N, span = len(x), float(np.ptp(x))
     if span == 0:
         add("constant", x[0], "the channel never moves; leave it out or check the sensor")
+        return found
+    if other := misread(x, measured):
+        add(other.finding, other.value, other.meaning)
         return found
     changes = np.flatnonzero(np.diff(x)) + 1
     edges = np.concatenate([[0], changes, [N]])

@@ -90,6 +90,11 @@ def rows_apart(y: FloatArray) -> int:
     return factor if regular and blank else 1
 
 
+def lost_between(gaps: FloatArray, period: float) -> int:
+    """Samples that lack between stamps: one that comes late is the nearer to the next."""
+    return max(int((np.rint(gaps / period) - 1).sum()), 0)
+
+
 def uneven(times: FloatArray) -> str:
     """What is said of increasing times that are not regular: where, and what to do about it."""
     gaps = np.diff(times)
@@ -98,10 +103,13 @@ def uneven(times: FloatArray) -> str:
     said = (
         f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on average"
     )
-    missing = int((np.rint(gaps / usual) - 1)[gaps > 1.5 * usual].sum())
+    missing = lost_between(gaps, float(usual))
     if gaps[row - 1] <= (_FEW + 1.5) * usual:
         lost = f"; {missing} samples are missing" if missing else ""
-        return f"{said}{lost}; resample=True puts them on a regular grid"
+        return (
+            f"{said}{lost}; resample=True puts them on a regular grid by straight lines, "
+            "Record.from_logs(time, u, time, y) leaves them where they are"
+        )
     before, after = times[row - 1] - times[0], times[row] - times[0]
     return (
         f"{said}; {missing} samples are missing, and lines through a long gap are no data: "

@@ -37,6 +37,8 @@ _USELESS = frozenset(
         "swapped channels",
         "wrong sign",
         "hold rejected",
+        "wrapped",
+        "code",
     }
 )
 _SURE = 1e-6

@@ -99,3 +99,16 @@ def test_a_decimal_sign_is_a_point_or_a_comma(tmp_path, sign):
     path = write(tmp_path / "log.csv", ["time", "u", "y"], np.arange(N) * DT, U, np.cumsum(U))
     with pytest.raises(ValueError, match=r"decimal=.* expected '.' or ','"):
         fq.read(path, decimal=sign)
+
+
+def test_channels_that_a_file_lists_by_name_are_said_to_be(tmp_path):
+    """Found: of voltage and speed the speed became the input, without a note."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        for name, x in (("time", np.arange(N) * DT), ("voltage", U), ("speed", np.cumsum(U))):
+            file[name] = x
+    assert any("'speed' was taken for the input" in note for note in fq.read(path).notes)
+    named = fq.read(path, inputs="voltage", outputs="speed")
+    assert (named.input_names, named.output_names) == (("voltage",), ("speed",))
+    assert not any("taken for the input" in note for note in named.notes)

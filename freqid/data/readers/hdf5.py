@@ -64,4 +64,6 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
     asked = units.values() if group is None else [units[group.strip("/")]]
     told = {n: unit for each in asked for n, unit in each.items() if unit}
     frame.attrs["units"] = {n: unit for n, unit in told.items() if n in frame.columns}
+    # which one was first when they were written nobody knows
+    frame.attrs["by_name"] = True
     return frame

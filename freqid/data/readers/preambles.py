@@ -42,7 +42,7 @@ def _counted(text: str) -> Body | None:
     lines = text[:_LOOK].split("\n", 2)
     if len(lines) < 3:
         return None
-    names, below = ([c.strip() for c in line.split(",")] for line in lines[:2])
+    names, below = ([c.strip() for c in line.rstrip(", \t").split(",")] for line in lines[:2])
     lower = [n.casefold() for n in names]
     if lower[0] != "x" or not {"start", "increment"} <= set(lower) or len(below) < len(names):
         return None

@@ -34,6 +34,8 @@ _UNIT = (
     r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2"
     r"|m/s²|g|Hz|Pa|bar|K|°C|%|counts?)"
 )
+# as oscilloscopes write units below the names of their channels, and settings above these
+_SPOKEN, _SETTINGS = r"(?i:seconds?|volts?|amps?|amperes?|hertz|watts?)", 60
 _BLANK = {"true", "false", "", "nan", "na", "n/a", "null", "none", "-nan", "inf", "-inf"}
 _STAMP = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([T ]?\d{0,2}:?\d{0,2}:?\d{0,2}[.,]?\d*)?.*")
 
@@ -145,6 +147,10 @@ def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[
         names.append(name)
         if unit:
             units[name] = unit
+    for name in {n for n in names if names.count(n) > 1}:
+        # V(in) and V(out) are names, and no volts
+        units.pop(name, None)
+        names = [t.strip() if n == name else n for n, t in zip(names, given, strict=True)]
     if len(set(names)) < len(names):
         twice = next(n for n in names if names.count(n) > 1)
         raise InputError(f"column {twice!r} is there twice; rename one of them: {', '.join(names)}")
@@ -187,7 +193,7 @@ def _are_units(cells: Sequence[str]) -> bool:
     words = [c.strip() for c in cells if c.strip()]
     if all(re.fullmatch(r"[\[(].*[\])]", w) or w == "-" for w in words):
         return True
-    known = sum(w == "-" or bool(re.fullmatch(_UNIT, w)) for w in words)
+    known = sum(w == "-" or bool(re.fullmatch(rf"{_UNIT}|{_SPOKEN}", w)) for w in words)
     return bool(words) and known >= 0.6 * len(words)
 
 
@@ -232,6 +238,7 @@ def _tried(
         return None
     followed = [g and after for g, after in zip(good, [*good[1:], True], strict=True)]
     first = followed.index(True) if True in followed else good.index(True)
+    first = _below_settings(rows, good, first, width)
     if not any(any(r) for r in rows[:first]) and _is_heading(rows[first:], sign, mark, sure):
         first += 1
     body = [g for r, g in zip(rows[first:], good[first:], strict=True) if any(r)]
@@ -244,6 +251,23 @@ def _tried(
     names, units, headed = heading([r for r in rows[:first] if any(r)], width)
     layout = Layout(mark, sign, first, names, units, headed, _OTHER[sign] if marked else None)
     return round(share * numbers, 2), width, layout
+
+
+def _below_settings(
+    rows: Sequence[Sequence[str]], good: Sequence[bool], first: int, width: int
+) -> int:
+    """Where samples begin: below a line of names that settings such as ``Vertical Scale,1,1`` stand
+    above, each with its own name in front.
+    """
+    for at in range(first, min(first + _SETTINGS, len(rows) - 1)):
+        cells = rows[at]
+        if len(cells) == width and all(cells) and _are_names(cells) and good[at + 1]:
+            return at + 1
+        if not any(cells) or not good[at]:
+            continue
+        if not re.match(r"[^\W\d]", cells[0]) or cells[0].lower() in _BLANK:
+            break
+    return first
 
 
 def _is_heading(rows: Sequence[Sequence[str]], sign: str, mark: str, sure: bool) -> bool:

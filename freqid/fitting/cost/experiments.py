@@ -161,12 +161,15 @@ class SpectralExperiment:
         return dataclasses.replace(made, response=True, reach=frf.reach, line_noise=known)
 
     def with_offsets(self, n_samples: int) -> SpectralExperiment:
-        """The same where a constant of unknown size is added to each output's samples."""
+        """The same where a constant of unknown size is added to each output's samples: what is
+        there of one says nothing, and is no part of the data's energy.
+        """
         zero = self.lines.omega == 0
         if not zero.any():
             return self
-        p = len(self.lines.Y)
-        return self.with_shapes(n_samples * np.eye(p, dtype=complex)[:, :, None] * zero)
+        constants = n_samples * np.eye(len(self.lines.Y), dtype=complex)[:, :, None] * zero
+        moving = dataclasses.replace(self, lines=self.lines.moving(zero))
+        return moving.with_shapes(constants)
 
     def with_shapes(self, shapes: ComplexArray) -> SpectralExperiment:
         """The same where shapes (q, outputs, K) of unknown size are added to the outputs' lines."""

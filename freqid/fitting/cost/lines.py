@@ -59,6 +59,10 @@ class Lines:
             scale=like.scale if same else self.scale,
         )  # fmt: skip
 
+    def moving(self, zero: BoolArray) -> Lines:
+        """The same without what the outputs have at the lines (K,) at zero."""
+        return dataclasses.replace(self, Y=np.where(zero, 0, self.Y))
+
     @property
     def aliases(self) -> int:
         """Input frequencies that fold onto each line, M."""

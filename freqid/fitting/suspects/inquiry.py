@@ -24,6 +24,7 @@ from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
 from freqid.fitting.suspects.leakage import leaking
+from freqid.fitting.suspects.no_values import no_values
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
@@ -193,10 +194,10 @@ class Inquiry:
     @tuned
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects, or that there has to be one."""
-        leak = leakage(self.scene, self._leak)
-        if any(f.severity == "serious" for f in leak):
-            return leak
-        found = [*self._on_suspects(), *leak]
+        first = no_values(self.minimum, self.readings) or leakage(self.scene, self._leak)
+        if any(f.severity == "serious" for f in first):
+            return first
+        found = [*self._on_suspects(), *first]
         found = constant_instead(self, self.scene, self._std, found, self.named) or found
         if any(f.severity == "serious" for f in found):
             return found
