@@ -8,7 +8,6 @@ from freqid.checks import InputError
 from freqid.data import Record
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
-from freqid.frf import lines_of
 
 
 def with_offset(reading: Reading) -> Reading:
@@ -32,11 +31,7 @@ def offsets(est: Estimate, readings: Sequence[Reading]) -> list[str]:
         assert isinstance(r.data, Record)
         assert free is not None
         names = r.data.output_names
-        # what the fit has is beside the mean of the data
-        shown = len(r.data.u) // r.data.factor
-        mean = r.data.outputs[:shown].sum(axis=0) / lines_of(r.data)[0]
-        found = mean + free[-len(names) :]
-        sizes = [f"{n} {x:.4g}" for n, x in zip(names, found, strict=True)]
+        sizes = [f"{n} {x:.4g}" for n, x in zip(names, free[-len(names) :], strict=True)]
         where = f" in experiment {number}" if len(readings) > 1 else ""
         notes.append(f"offset estimated{where}: {', '.join(sizes)}")
     return notes

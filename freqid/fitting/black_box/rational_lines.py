@@ -67,6 +67,7 @@ class RationalLines:
         stable: bool = False,
         gain: float = FOLLOWED,
     ) -> None:
+        experiments = [e.moving() for e in experiments]
         self.experiments, self.feedthrough, self.stable = experiments, feedthrough, stable
         self.gain = gain
         # with one channel the weights are in the data already

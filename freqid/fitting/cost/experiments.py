@@ -73,7 +73,7 @@ class SpectralExperiment:
     model's matrices are taken as they are. ``n_rows`` counts real values. The noise of a
     ``response`` need not be alike at lines that are neighbours, and may go together within the
     ``reach`` of some lines, as ``line_noise`` says where that is known. ``added`` (q, rows) are
-    shapes of unknown size in the output, the noise's past and offsets of the sensor, which are
+    shapes of unknown size in the output, the noise's past and the sensor's ``offsets``, which are
     eliminated with the initial state. ``place`` is the number of the experiment where these differ
     in more than their data.
     """
@@ -89,6 +89,7 @@ class SpectralExperiment:
     reach: int = 0
     line_noise: ToldNoise | None = None
     added: FloatArray | None = None
+    offsets: bool = False
     place: int = 0
 
     @classmethod
@@ -161,15 +162,12 @@ class SpectralExperiment:
         return dataclasses.replace(made, response=True, reach=frf.reach, line_noise=known)
 
     def with_offsets(self, n_samples: int) -> SpectralExperiment:
-        """The same where a constant of unknown size is added to each output's samples: what is
-        there of one says nothing, and is no part of the data's energy.
-        """
+        """The same where a constant of unknown size is added to each output's samples."""
         zero = self.lines.omega == 0
         if not zero.any():
             return self
         constants = n_samples * np.eye(len(self.lines.Y), dtype=complex)[:, :, None] * zero
-        moving = dataclasses.replace(self, lines=self.lines.moving(zero))
-        return moving.with_shapes(constants)
+        return dataclasses.replace(self, offsets=True).with_shapes(constants)
 
     def with_shapes(self, shapes: ComplexArray) -> SpectralExperiment:
         """The same where shapes (q, outputs, K) of unknown size are added to the outputs' lines."""
@@ -243,29 +241,31 @@ class SpectralExperiment:
     @property
     def energy(self) -> float:
         """Weighted energy of the data, the cost of a model that is zero."""
-        Y = self.lines.error(self.lines.Y)
-        return float(np.vdot(Y, Y).real)
+        return self.lines.energy(moving=self.offsets)
 
     def thinned(self, part: float = 1.0, evenly: bool = False) -> SpectralExperiment:
         """About a ``part`` of the lines that count, weighted so that costs stay comparable."""
         kept, weight = self.lines.spread(part, evenly)
-        more = np.sqrt(weight)
-        aliases = self.lines.aliases
+        return self._some(kept, np.sqrt(weight))
+
+    def moving(self) -> SpectralExperiment:
+        """The same without the line at zero where a constant of unknown size takes it up."""
+        if not self.offsets:
+            return self
+        at = np.flatnonzero(self.lines.omega)
+        return dataclasses.replace(self._some(at, np.ones(len(at))), offsets=False)
+
+    def _some(self, kept: IntArray, more: FloatArray) -> SpectralExperiment:
+        aliases, added = self.lines.aliases, self.added
+        if added is not None:
+            each = added.view(complex).reshape(len(added), -1, self.n_lines)[..., kept] * more
+            rows = each.reshape(len(added), -1)
+            added = np.ascontiguousarray(rows[rows.any(axis=1)]).view(float)
         return dataclasses.replace(
-            self,
-            lines=self.lines.some(kept, more),
+            self, lines=self.lines.some(kept, more), added=added, line_noise=None,
             points=self.points.some(runs(kept, aliases), np.repeat(more, aliases)),
             transient=self.transient and self.transient.some(kept, more),
-            added=self._some_added(kept, more),
-            line_noise=None,
-        )
-
-    def _some_added(self, kept: IntArray, more: FloatArray) -> FloatArray | None:
-        if self.added is None:
-            return None
-        each = self.added.view(complex).reshape(len(self.added), -1, self.n_lines)
-        some = np.ascontiguousarray((each[..., kept] * more).reshape(len(self.added), -1))
-        return some.view(float)
+        )  # fmt: skip
 
     def at(self, realisation: Realisation) -> Evaluation:
         """Evaluate at one trial point."""

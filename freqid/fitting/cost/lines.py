@@ -59,9 +59,11 @@ class Lines:
             scale=like.scale if same else self.scale,
         )  # fmt: skip
 
-    def moving(self, zero: BoolArray) -> Lines:
-        """The same without what the outputs have at the lines (K,) at zero."""
-        return dataclasses.replace(self, Y=np.where(zero, 0, self.Y))
+    def energy(self, moving: bool = False) -> float:
+        """Weighted energy of the data, or that of what is ``moving``, constants left out."""
+        Y = self.error(self.Y)
+        Y = Y[..., self.omega != 0] if moving else Y
+        return float(np.vdot(Y, Y).real)
 
     @property
     def aliases(self) -> int:
