@@ -66,7 +66,7 @@ def log_of(path: str | Path) -> Mapping[str, Channel]:
     frame = frame_of(path)
     units = frame.attrs.get("units", {})
     try:
-        frame, _ = with_time(frame, None, units, None)
+        frame, _ = with_time(frame, None, units, None, one_clock=False)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     times = frame["time"].to_numpy() if "time" in frame else np.full(len(frame), np.nan)

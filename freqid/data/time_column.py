@@ -49,18 +49,24 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
 
 
 def with_time(
-    frame: pd.DataFrame, time: str | None, units: dict[str, str], dt: float | None
+    frame: pd.DataFrame,
+    time: str | None,
+    units: dict[str, str],
+    dt: float | None,
+    one_clock: bool = True,
 ) -> tuple[pd.DataFrame, list[str]]:
     """The frame with its time in s as the column ``time``, and what was taken for it, in words.
 
-    Raises ValueError for a column that is not there or holds no time.
+    Raises ValueError for a column that is not there or holds no time, and where rows that are to be
+    of ``one_clock`` hold another one's times beside it.
     """
     frame = _joined(frame) if time is None else frame
     name = _found(frame, time, units, dt)
     if name is None:
         return frame, []
     seconds, said = in_seconds(name, frame[name], units.get(name, ""))
-    same = same_clock(frame, name, seconds, units) if time is None else []
+    looked = one_clock and time is None
+    same = same_clock(frame, name, seconds, units) if looked else []
     rest = frame.drop(columns=[name, *same])
     if "time" in rest.columns:
         raise InputError(f"time={name!r}: the column 'time' is another; rename it")

@@ -80,6 +80,7 @@ def test_signals_with_clocks_of_their_own_are_no_rows(tmp_path, names, other):
     assert f"time={names[0].removesuffix(' [s]')!r}" in str(said.value)
     kept = fq.read(path, time=names[0], inputs="u", outputs="y")
     assert kept.dt == pytest.approx(DT)
+    assert {"u", "y"} <= set(fq.channels(path).index)
 
 
 @pytest.mark.parametrize("second", ["time.1", "time_ms", "time since 1970"])
