@@ -79,6 +79,8 @@ def converted(column: Column) -> Column | None:
     dated = bool(column.astype(str).str.match(_DATED).any())
     ways: list[Callable[[], Any]] = [
         lambda: pd.to_datetime(column, format="ISO8601"),
+        # where summer time begins or ends two offsets are beside one another
+        lambda: pd.to_datetime(column, format="ISO8601", utc=True),
         # of a date and a time of day without seconds it makes nanoseconds
         *([] if dated else [lambda: pd.to_timedelta(column)]),
         lambda: pd.to_datetime(column, format="mixed", dayfirst=first),

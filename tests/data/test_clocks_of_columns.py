@@ -28,6 +28,18 @@ def test_dates_without_seconds(tmp_path, pattern, minutes):
     assert fq.read(path, sep=";").dt == pytest.approx(60 * minutes, rel=1e-9)
 
 
+def test_stamps_across_a_change_of_summer_time(tmp_path):
+    """Found: a valid stamp was neither a number nor a time."""
+    begin = datetime.datetime(2024, 10, 27, 0, 30, tzinfo=datetime.UTC)
+    steps = []
+    for k in range(N):
+        at = begin + k * datetime.timedelta(minutes=1)
+        hours = 2 if at < datetime.datetime(2024, 10, 27, 1, 0, tzinfo=datetime.UTC) else 1
+        steps.append(at.astimezone(datetime.timezone(datetime.timedelta(hours=hours))).isoformat())
+    path = write(tmp_path / "log.csv", ["time", "u", "y"], steps, U, np.cumsum(U))
+    assert fq.read(path).dt == pytest.approx(60)
+
+
 def test_days_alone(tmp_path):
     days = [(BEGIN + k * datetime.timedelta(days=1)).strftime("%d.%m.%Y") for k in range(N)]
     path = write(
