@@ -108,14 +108,25 @@ def test_of_one_output_nothing_is_named():
     assert str(est.warnings[0]).startswith("offset: an output has a constant of ")
 
 
-@pytest.mark.parametrize(
-    ("channel", "number", "factor"),
-    [("input", 1, 1.2), ("output", 1, 1.2), ("input", 0, 1.1), ("output", 1, 0.9),
-     ("output", 0, 1.5)],
-)  # fmt: skip
-@pytest.mark.parametrize("weights", [None, "noise"])
-def test_a_wrong_gain_lacks_no_mode(weights, channel, number, factor):
+GAINS = [
+    ("input", 1, 1.2, None), ("output", 1, 1.2, "noise"), ("input", 0, 1.1, None),
+    ("output", 1, 0.9, "noise"), ("output", 0, 1.5, None),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("channel", "number", "factor", "weights"), GAINS)
+def test_a_wrong_gain_lacks_no_mode(channel, number, factor, weights):
     """It was "another mode" or "structure". One of two scales is only known beside the other."""
+    is_named(channel, number, factor, weights)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("channel", "number", "factor", "other"), GAINS)
+def test_a_wrong_gain_is_named_by_other_weights(channel, number, factor, other):
+    is_named(channel, number, factor, None if other else "noise")
+
+
+def is_named(channel, number, factor, weights):
     u, y = measured(3)
     (u if channel == "input" else y)[:, number] *= factor
     est = fq.fit(plant(), record(u, y), weights=weights)
