@@ -93,6 +93,17 @@ def test_a_sensor_that_is_turned_round_has_the_same_friction(model):
     assert here.suspects.loc["friction", "size"] == pytest.approx(there["size"], rel=1e-3)
 
 
+@pytest.mark.parametrize("direct", [-1e-3, 1e-3])
+def test_a_direct_term_that_is_nearly_none_turns_no_friction(direct):
+    plant = fq.GreyBox(
+        lambda a, b, d: ([[-a]], [[b]], [[1.0]], [[d]]),
+        [fq.Parameter("a", 20.0), fq.Parameter("b", 50.0), fq.Parameter("d", direct)],
+    )
+    record = measured(LAG, inputs("white"), "friction", 0.1)
+    record = fq.Record(record.u, record.y + direct * record.u, DT)
+    assert fq.fit(plant, record).warnings[0].kind == "friction"
+
+
 @pytest.mark.parametrize(
     ("model", "kind", "fault", "size", "what"),
     [

@@ -192,19 +192,22 @@ def _pairs(model: Model) -> list[tuple[int, int]]:
 
 
 def _way(plant: Model, pairs: list[tuple[int, int]]) -> FloatArray:
-    """Which way an input moves an output at first, ±1 for each pair: a sensor may be turned."""
+    """Which way an input moves an output at first, ±1 for each pair: a sensor may be turned.
+
+    By its states: a direct term may be any that is nearly none.
+    """
     A, B, C, D = plant.state_space()
     found = []
     for i, o in pairs:
-        x, row, way = B[:, i], C[o], float(D[o, i])
+        x, way = B[:, i], 0.0
         for _ in range(len(A)):
-            if way:
-                break
-            told = float(row @ x)
+            told = float(C[o] @ x)
             # what is but rounding of the sum is none
-            way = told if abs(told) > _ROUNDING * float(np.abs(row) @ np.abs(x)) else 0.0
+            if abs(told) > _ROUNDING * float(np.abs(C[o]) @ np.abs(x)):
+                way = told
+                break
             x = A @ x
-        found.append(np.sign(way) or 1.0)
+        found.append(np.sign(way or D[o, i]) or 1.0)
     return np.array(found)
 
 
