@@ -120,7 +120,7 @@ def read(
         if not signals and looks_like_response(frame, frame.attrs.get("units", {})):
             raise ResponseFile(path)
         told = {**frame.attrs.get("units", {}), **(units or {})}
-        frame, said = with_time(frame, time, told, dt)
+        frame, said = with_time(frame, time, told, dt, signals=asked if signals else ())
         # which is in s now
         told.pop("time", None)
 

@@ -54,19 +54,20 @@ def with_time(
     units: dict[str, str],
     dt: float | None,
     one_clock: bool = True,
+    signals: Sequence[str] = (),
 ) -> tuple[pd.DataFrame, list[str]]:
     """The frame with its time in s as the column ``time``, and what was taken for it, in words.
 
     Raises ValueError for a column that is not there or holds no time, and where rows that are to be
-    of ``one_clock`` hold another one's times beside it.
+    of ``one_clock`` hold another one's times beside it, which ``signals`` are not.
     """
     frame = _joined(frame) if time is None else frame
     name = _found(frame, time, units, dt)
     if name is None:
         return frame, []
     seconds, said = in_seconds(name, frame[name], units.get(name, ""))
-    looked = one_clock and time is None
-    same = same_clock(frame, name, seconds, units) if looked else []
+    others = frame.drop(columns=[*signals], errors="ignore")
+    same = same_clock(others, name, seconds, units) if one_clock and time is None else []
     rest = frame.drop(columns=[name, *same])
     if "time" in rest.columns:
         raise InputError(f"time={name!r}: the column 'time' is another; rename it")
@@ -165,7 +166,7 @@ def same_clock(
     stem = _stem(name)
     with np.errstate(all="ignore"):
         steps, span = np.diff(seconds), float(np.ptp(seconds)) if len(seconds) else 0.0
-    if stem not in _NAMES or len(steps) < _FEW or not (steps > 0).all():
+    if stem.casefold() not in _NAMES or len(steps) < _FEW or not (steps > 0).all():
         return found
     for other in map(str, frame.columns):
         alike = other != name and _stem(other) == stem and _may_be_time(units.get(other, ""))
@@ -193,5 +194,5 @@ def _may_be_time(unit: str) -> bool:
 
 
 def _stem(name: str) -> str:
-    """A name up to its first underscore, blank, dot or digit."""
-    return re.split(r"[\W_\d]", name.strip().casefold(), maxsplit=1)[0]
+    """A name up to its first underscore, blank, dot or digit; T is another one than t."""
+    return re.split(r"[\W_\d]", name.strip(), maxsplit=1)[0]

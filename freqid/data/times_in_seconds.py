@@ -43,6 +43,8 @@ LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours
 DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _DATED = rf"\s*{DATE.pattern}\s"
 _DAY = 86_400.0
+# the end of a stamp that says how far it is from universal time
+_OFFSET = r"(?:Z|[+-]\d{2}:?\d{2})\s*$"
 # beyond it a difference may be more than a double holds
 _BEYOND = 1e300
 # a number, however its thousands are marked
@@ -75,12 +77,12 @@ def converted(column: Column) -> Column | None:
             f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
         )
     # with dots the day comes first
-    first = bool(column.astype(str).str.contains(r"\d\.\d+\.").any())
-    dated = bool(column.astype(str).str.match(_DATED).any())
+    first = bool(texts.contains(r"\d\.\d+\.").any())
+    dated, apart = bool(texts.match(_DATED).any()), bool(texts.contains(_OFFSET).all())
     ways: list[Callable[[], Any]] = [
         lambda: pd.to_datetime(column, format="ISO8601"),
         # where summer time begins or ends two offsets are beside one another
-        lambda: pd.to_datetime(column, format="ISO8601", utc=True),
+        *([lambda: pd.to_datetime(column, format="ISO8601", utc=True)] if apart else []),
         # of a date and a time of day without seconds it makes nanoseconds
         *([] if dated else [lambda: pd.to_timedelta(column)]),
         lambda: pd.to_datetime(column, format="mixed", dayfirst=first),

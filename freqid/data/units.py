@@ -63,7 +63,6 @@ _OTHERS = {
     "Pa": {"hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "mbar": 1e2, "bar": 1e5, "psi": 6894.757},
     "m^3/s": {"l/s": 1e-3, "L/s": 1e-3, "l/min": 1e-3 / 60, "L/min": 1e-3 / 60, "lpm": 1e-3 / 60,
               "l/h": 1e-3 / 3600, "m³/h": 1 / 3600, "m^3/h": 1 / 3600, "m3/h": 1 / 3600},
-    "kg": {"t": 1e3},
 }  # fmt: skip
 
 
@@ -75,8 +74,8 @@ _LENGTH = r"/\s*\(?m\b|kg(?!\s*m)|^m(/s)?/|^m([²³]|\^[23])|s/m([²³]|\^[23])"
 _MENTIONS = {
     "rad": rf"rad|{_INERTIA}", "rad/s": rf"rad|{_INERTIA}",
     "N m": rf"N\s*m|{_INERTIA}", "N": r"N(?!\s*m)|kg(?!\s*m)", "m": _LENGTH, "m/s": _LENGTH,
-    "m/s^2": _LENGTH, "m^3/s": rf"{_LENGTH}|m³", "A": r"A\b", "V": r"V\b", "W": r"W\b",
-    "K": r"K\b", "Pa": r"Pa\b", "kg": r"kg",
+    "m/s^2": _LENGTH, "m^3/s": rf"{_LENGTH}|m³", "A": r"A\b", "V": r"V\b", "W": r"(?<![A-Za-z])W\b",
+    "K": r"(?<![A-Za-z])K\b", "Pa": r"(?<![A-Za-z])Pa\b",
 }  # fmt: skip
 # those that mean one thing however they are written
 _ANY_CASE = {

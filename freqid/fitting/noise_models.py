@@ -26,6 +26,8 @@ from freqid.fitting.uncertainty.noise_spectrum import noise_weights, settled
 
 # lines on either side of one that a window makes err together
 _NEAR = 2
+# part of an output's power that no sensor's noise is below
+_DIGITS = 1e-20
 
 
 def tells_variance(frf: FrequencyResponse) -> bool:
@@ -198,7 +200,14 @@ class MeasuredNoise(NoiseModel):
         return True
 
     def weights(self, data: DataSet, shape: tuple[int, ...]) -> FloatArray:
-        return np.ones(shape) if self.found is None else self.found
+        if self.found is None:
+            return np.ones(shape)
+        if not isinstance(data, Record):
+            return self.found
+        # beyond its digits an output tells nothing, however little a fit leaves of it
+        power = ((data.outputs - data.outputs.mean(axis=0)) ** 2).sum(axis=0)
+        most = len(data.outputs) / 2 / np.maximum(_DIGITS * power, 1e-300)
+        return np.minimum(self.found, most[:, None])
 
     def learnt(self, error: ComplexArray, n_samples: int) -> NoiseModel:
         return MeasuredNoise(noise_weights(error, n_samples))

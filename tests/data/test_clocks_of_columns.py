@@ -125,3 +125,33 @@ def test_channels_that_a_file_lists_by_name_are_said_to_be(tmp_path):
     named = fq.read(path, inputs="voltage", outputs="speed")
     assert (named.input_names, named.output_names) == (("voltage",), ("speed",))
     assert not any("taken for the input" in note for note in named.notes)
+
+
+@pytest.mark.parametrize("names", [("t", "t_set", "t_out"), ("t", "T_set", "T_out")])
+def test_what_rises_and_is_asked_for_is_no_clock(tmp_path, names):
+    t = np.arange(N) * DT
+    path = write(tmp_path / "log.csv", names, t, 3 * t, 2 * t - 1 + np.exp(-t))
+    record = fq.read(path, inputs=names[1], outputs=names[2])
+    assert (record.input_names, record.output_names) == ((names[1],), (names[2],))
+
+
+def test_signals_of_the_time_are_no_tonnes():
+    table = pd.DataFrame({"time": np.arange(N) * DT, "u(t)": U, "y(t)": np.cumsum(U)})
+    record = fq.Record.from_frame(table)
+    assert (record.input_names, record.output_names) == (("u(t)",), ("y(t)",))
+
+
+def test_stamps_of_which_some_lack_their_offset_are_not_guessed(tmp_path):
+    steps = [f"2024-10-27T02:00:{k:02d}" + ("+02:00" if k < 30 else "") for k in range(N)]
+    path = write(tmp_path / "log.csv", ["time", "u", "y"], steps, U, np.cumsum(U))
+    with pytest.raises(ValueError, match="neither a number nor a time"):
+        fq.read(path)
+
+
+def test_a_row_without_samples_is_no_line_of_names(tmp_path):
+    rows = [f"idle,{k * DT:g},{u:g}" for k, u in enumerate(U)]
+    rows[5] = "idle,nan,nan"
+    path = tmp_path / "log.csv"
+    path.write_text("state,time,u\n" + "\n".join(rows) + "\n")
+    with pytest.raises(ValueError, match="columns state, time, u"):
+        fq.read(path)

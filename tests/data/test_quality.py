@@ -85,3 +85,26 @@ def test_a_code_for_no_value_is_named(code, rows):
 def test_commands_and_what_is_rough_are_not_misread(x):
     kinds = {finding for _, finding in _found(x, np.cumsum(x))}
     assert not kinds & {"wrapped", "code"}
+
+
+LAG = np.exp(-np.arange(1000) / 3)
+
+
+@pytest.mark.parametrize(
+    "y",
+    [
+        np.repeat([0.0, 355.0], 500), np.repeat([0.0, 255.0, 3.0], 300), 355 * (1 - LAG),
+        360 * (1 - 0.01 * LAG) * (np.arange(1000) > 3),
+        np.repeat([0.0, 359.0], 500) + 0.2 * np.abs(np.sin(np.arange(1000.0) ** 2)),
+    ],
+    ids=["step", "counts", "fast lag", "faster lag", "noisy step"],
+)  # fmt: skip
+def test_a_step_through_a_whole_range_is_no_turn(y):
+    assert ("y", "wrapped") not in _found(np.arange(len(y)) * 1.0, y)
+
+
+@pytest.mark.parametrize("size", [99.0, 999.0, -9999.0])
+def test_a_pulse_from_rest_is_no_code(size):
+    u = np.zeros(1000)
+    u[100:150] = size
+    assert ("u", "code") not in _found(u)

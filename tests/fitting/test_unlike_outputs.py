@@ -71,3 +71,21 @@ def test_the_unit_of_an_output_does_not_matter_to_noise_that_is_learnt():
         assert there.parameters["std"].to_numpy() == pytest.approx(
             here.parameters["std"].to_numpy(), rel=1e-4
         )
+
+
+@pytest.mark.parametrize(("way", "speed"), [(0.0, 0.03), (1e-9, 0.03), (0.03, 0.0)])
+def test_an_output_without_noise_is_weighed_by_its_digits(way, speed):
+    """What rounding leaves of it is no fault: "scale"."""
+    truth = {"m": 1.0, "c": 2.0, "k": 100.0, "g": 1.0}
+    plant = fq.GreyBox(
+        lambda m, c, k, g: (
+            [[0, 1], [-k / m, -c / m]], [[0], [1 / m]], [[1, 0], [0, g]], None,
+        ),
+        [fq.Parameter(n, 1.1 * v) for n, v in truth.items()],
+    )  # fmt: skip
+    clean = fq.simulate(plant.with_values(**truth), fq.white_noise(1000, seed=1), DT)
+    noise = np.random.default_rng(0).standard_normal(clean.y.shape)
+    y = clean.y + [way, speed] * clean.y.std(axis=0) * noise
+    est = fq.fit(plant, fq.Record(clean.u, y, DT), weights="noise")
+    assert est.verdict.grade == "trust", est.warnings
+    assert est["g"] == pytest.approx(1, abs=4 * est.parameters.loc["g", "std"])

@@ -261,7 +261,8 @@ def _below_settings(
     """
     for at in range(first, min(first + _SETTINGS, len(rows) - 1)):
         cells = rows[at]
-        if len(cells) == width and all(cells) and _are_names(cells) and good[at + 1]:
+        headed = len(cells) == width and _are_names(cells) and good[at + 1]
+        if headed and not any(c.lower() in _BLANK for c in cells):
             return at + 1
         if not any(cells) or not good[at]:
             continue

@@ -127,8 +127,8 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     """
     variance = _spectrum(error)
     floor = 1e-12 * variance.max(axis=-1, keepdims=True, initial=0)
-    # an output without errors has no variance: it counts as much as what is hardly none of others
-    floor = np.where(floor > 0, floor, 1e-12 * floor.max(initial=0))
+    # an output without errors has no variance: it counts as what is hardly any of the others
+    floor = np.where(floor > 0, floor, floor.max(initial=0))
     weights: FloatArray = n_samples / 2 / np.maximum(variance, np.maximum(floor, 1e-300))
     return weights
 
