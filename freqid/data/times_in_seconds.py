@@ -43,8 +43,8 @@ LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours
 DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _DATED = rf"\s*{DATE.pattern}\s"
 _DAY = 86_400.0
-# the end of a stamp that says how far it is from universal time
-_OFFSET = r"(?:Z|[+-]\d{2}:?\d{2})\s*$"
+# the end of a stamp whose time of day says how far it is from universal time
+_OFFSET = r":\d{2}[\d.,]*\s*(?:Z|[+-]\d{2}:?\d{2})\s*$"
 # beyond it a difference may be more than a double holds
 _BEYOND = 1e300
 # a number, however its thousands are marked
@@ -78,11 +78,13 @@ def converted(column: Column) -> Column | None:
         )
     # with dots the day comes first
     first = bool(texts.contains(r"\d\.\d+\.").any())
-    dated, apart = bool(texts.match(_DATED).any()), bool(texts.contains(_OFFSET).all())
+    dated, apart = bool(texts.match(_DATED).any()), texts.contains(_OFFSET)[column.notna()]
+    if apart.any() and not apart.all():
+        return None  # which hour the others mean would be a guess
     ways: list[Callable[[], Any]] = [
         lambda: pd.to_datetime(column, format="ISO8601"),
         # where summer time begins or ends two offsets are beside one another
-        *([lambda: pd.to_datetime(column, format="ISO8601", utc=True)] if apart else []),
+        *([lambda: pd.to_datetime(column, format="ISO8601", utc=True)] if apart.any() else []),
         # of a date and a time of day without seconds it makes nanoseconds
         *([] if dated else [lambda: pd.to_timedelta(column)]),
         lambda: pd.to_datetime(column, format="mixed", dayfirst=first),
@@ -92,9 +94,12 @@ def converted(column: Column) -> Column | None:
             with warnings.catch_warnings():
                 # what pandas will call by another name is no matter of the file's
                 warnings.simplefilter("ignore")
-                return pd.Series(way())
+                times = pd.Series(way())
         except (ValueError, TypeError, OverflowError):
             continue
+        # older versions of pandas return two offsets as objects
+        if times.dtype.kind in "mM":
+            return times
     return None
 
 
