@@ -14,7 +14,7 @@ import cyclopts
 import freqid as fq
 from freqid.checks import InputError
 from freqid.cli.estimates import USUAL_READING, fit, fit_many, new_model
-from freqid.cli.options import Band, Between, Force, Reading, in_words, part_of
+from freqid.cli.options import Band, Between, Force, Reading, in_words
 from freqid.cli.planned import bias
 from freqid.cli.plants import in_python, model_of
 from freqid.cli.shown import channels, show_file
@@ -114,7 +114,7 @@ def frf(
     """
     may_write(out, [data], force, TABLES)
     may_write(plot, [data], force, PICTURES)
-    record, reference = part_of(reading.record(data), between), reading.reference
+    record, reference = reading.record(data, between), reading.reference
     if reference is not None and method == "etfe":
         raise InputError("--reference needs --method h1, lpm or lrm")
     if segment is not None and method != "h1":
@@ -196,7 +196,7 @@ for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_mo
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point: 0 done, 1 the fit did not converge, 2 bad arguments or bad input."""
-    ended = _end_tidily_when_told_to()
+    codes = _end_tidily_when_told_to()
     try:
         with plain_warnings():
             status = app(arguments, exit_on_error=False, print_error=False)
@@ -214,20 +214,26 @@ def main(arguments: list[str] | None = None) -> None:
         _fail(str(error))
     except KeyboardInterrupt:
         _fail("interrupted", _INTERRUPTED)
-    sys.exit(ended[0] if ended else status if isinstance(status, int) else 0)
+    except _ToldToEnd:
+        status = codes[0]
+    sys.exit(codes[0] if codes else status if isinstance(status, int) else 0)
+
+
+class _ToldToEnd(BaseException):
+    """A signal to end: no exit of a user's function, which is a failure of its own record."""
 
 
 def _end_tidily_when_told_to() -> list[int]:
-    """A signal to end is an exit like another, which leaves no half-written file behind.
+    """A signal to end is raised like an interrupt, and leaves no half-written file behind.
 
     The exit codes that were told are returned as they come: a library's callback that is running
-    then may drop the exit on its way, and what goes on to its end says still that it was told to.
+    then may drop it on its way, and what goes on to its end says still that it was told to.
     """
     told: list[int] = []
 
     def end(number: int, frame: object) -> None:
         told.append(128 + number)
-        sys.exit(told[0])
+        raise _ToldToEnd
 
     with contextlib.suppress(ValueError):
         # only the main thread may say so

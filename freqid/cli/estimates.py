@@ -10,7 +10,7 @@ from cyclopts import Parameter as Option
 import freqid as fq
 from freqid.checks import InputError
 from freqid.cli.fleets import engine, matching
-from freqid.cli.options import Asked, Between, Force, Reading, Search, part_of
+from freqid.cli.options import Asked, Between, Force, Reading, Search
 from freqid.cli.plants import TEMPLATE, pairs
 from freqid.cli.terminal import PICTURES, may_write, progress, show, write_picture
 from freqid.cli.words import typed
@@ -67,7 +67,7 @@ def fit(
     read = [data, *([] if validate is None else [validate])]
     for path, kinds in ((out, (".json",)), (plot, PICTURES), (report, (".html", ".htm"))):
         may_write(path, read, force, kinds)
-    record = part_of(reading.data(data), between)
+    record = reading.data(data, between)
     other = None if validate is None else reading.data(validate)
     if conditions:
         record = record.with_conditions(**pairs("--conditions", conditions))

@@ -9,7 +9,7 @@ import math
 import re
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 from cyclopts import Parameter as Option
 
@@ -35,9 +35,11 @@ Hold = Annotated[
 Force = Annotated[
     bool, Option(help="overwrite files that are there already; never those that are read")
 ]
-Recorded = TypeVar("Recorded", fq.Record, fq.Record | fq.FrequencyResponse)
 # options by their name as arguments, where that is another
 RENAMED = {"input": "inputs", "output": "outputs"}
+Group = Annotated[
+    str | None, Option(help="which of several tables: an HDF5 group, a sheet, a structure")
+]
 Limits = list[tuple[str, float, float]] | None
 
 
@@ -63,9 +65,7 @@ class Reading:
     sep: Annotated[str | None, Option(help="what parts the cells of a text table")] = None
     decimal: Annotated[str | None, Option(help="its decimal sign")] = None
     columns: Annotated[list[str] | None, _several("names for a table that has none")] = None
-    group: Annotated[
-        str | None, Option(help="which of several tables: an HDF5 group, a sheet, a structure")
-    ] = None
+    group: Group = None
     units: Annotated[
         list[str] | None, _several("NAME=UNIT of columns, such as time=ms torque='N m'")
     ] = None
@@ -79,15 +79,20 @@ class Reading:
         asked["units"] = texts("--units", self.units) or None
         return {RENAMED.get(k, k): v for k, v in asked.items() if v is not None and v is not False}
 
-    def record(self, path: Path) -> fq.Record:
-        """The record of a file."""
-        return fq.read(path, **self.given())
+    def record(self, path: Path, between: tuple[float, float] | None = None) -> fq.Record:
+        """The record of a file, or what ``--between`` leaves of it."""
+        start, stop = ends(between)
+        return fq.read(path, start=start, stop=stop, **self.given())
 
-    def data(self, path: Path) -> fq.Record | fq.FrequencyResponse:
+    def data(
+        self, path: Path, between: tuple[float, float] | None = None
+    ) -> fq.Record | fq.FrequencyResponse:
         """The record of a file, or the frequency response that an analyser wrote."""
         try:
-            return self.record(path)
+            return self.record(path, between)
         except ResponseFile:
+            if between is not None:
+                raise InputError("--between is for records; a response has no samples") from None
             return self._response(path)
 
     def _response(self, path: Path) -> fq.FrequencyResponse:
@@ -99,13 +104,13 @@ class Reading:
             "units": texts("--units", self.units) or None,
         }  # fmt: skip
         for option in ("input", "output"):
-            ends = getattr(self, option)
-            if ends is not None and len(ends) > 1:
+            asked = getattr(self, option)
+            if asked is not None and len(asked) > 1:
                 raise InputError(
-                    f"--{option} {' '.join(ends)}: of a response one {option} is read, or all; "
+                    f"--{option} {' '.join(asked)}: of a response one {option} is read, or all; "
                     "give one, or leave it out"
                 )
-            one = ends[0] if ends else None
+            one = asked[0] if asked else None
             told[option] = int(one) if one and one.isdecimal() else one
         found = fq.read_response(path, **told)
         if self.dt is None:
@@ -198,19 +203,17 @@ class Search:
         return {k: v for k, v in asked.items() if v is not None}
 
 
-def part_of(data: Recorded, between: tuple[float, float] | None) -> Recorded:
-    """The part of a record that ``--between`` leaves."""
+def ends(between: tuple[float, float] | None) -> tuple[float | None, float | None]:
+    """What ``--between`` leaves of a record: its start and its stop (s)."""
     if between is None:
-        return data
+        return None, None
     start, stop = between
-    if not isinstance(data, fq.Record):
-        raise InputError("--between is for records; a response has no samples")
     if not 0 <= start < stop:
         raise InputError(
             f"--between {start:g} {stop:g}: expected two times in s, the first one not below 0 and "
             "before the second one"
         )
-    return data.slice(start, None if math.isinf(stop) else stop)
+    return start, None if math.isinf(stop) else stop
 
 
 def hold_of(text: str | None) -> holds.Hold | str | None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import freqid as fq
 from freqid.checks import InputError
 from freqid.cli.estimates import USUAL_READING, print_estimate
-from freqid.cli.options import Between, Force, Reading, part_of
+from freqid.cli.options import Between, Force, Group, Reading
 from freqid.cli.plants import model_of
 from freqid.cli.terminal import PICTURES, may_write, write_picture
 from freqid.cli.words import typed
@@ -49,14 +50,21 @@ def show_file(
         return
     if model is not None:
         raise InputError(f"--model={model}: {file} is no estimate, which alone has a plant")
-    record = part_of(reading.data(file), between)
+    try:
+        record = reading.data(file, between)
+    except InputError:
+        if reading == USUAL_READING:
+            # from these it is seen what has to be said
+            with contextlib.suppress(InputError):
+                _print_channels(file)
+        raise
     if isinstance(record, fq.FrequencyResponse):
         print(repr(record).strip("<>"))
         if plot is not None:
             write_picture(plot, fq.bode(record, labels=[file.name], unit="Hz"))
         return
     if reading == USUAL_READING or file.suffix.lower() not in TEXTS:
-        _print_channels(file)
+        _print_channels(file, reading.group)
     print(repr(record).strip("<>"))
     for note in record.notes:
         print(f"note: {typed(note)}")
@@ -67,7 +75,7 @@ def show_file(
         write_picture(plot, fq.plot_record(record))
 
 
-def channels(log: Path) -> None:
+def channels(log: Path, *, group: Group = None) -> None:
     """The channels of a file or log: rate, jitter, length and unit of each.
 
     Parameters
@@ -75,14 +83,16 @@ def channels(log: Path) -> None:
     log
         any file that freqid reads; of logs that need an extra the message names it.
     """
-    _print_channels(log)
+    _print_channels(log, group)
 
 
-def _print_channels(file: Path) -> None:
-    found = fq.channels(file)
+def _print_channels(file: Path, group: str | None = None) -> None:
+    found = fq.channels(file, group)
     # below that a clock is exact
     exact = found["jitter"].abs() * found["rate"].abs() < 1e-9
     found["jitter"] = found["jitter"].mask(exact, 0.0)
     units = {"rate": "rate / Hz", "jitter": "jitter / s", "length": "length / s"}
     shown = found.rename(columns=units)
     print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}", na_rep=""))
+    for note in found.attrs["notes"]:
+        print(f"note: {note}")

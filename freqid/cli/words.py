@@ -20,6 +20,12 @@ _ARGUMENT = re.compile(
     rf"(?:^|(?<=\s)|(?<=\s\())(?:({_SWITCHES})=True\b|"
     rf"({'|'.join(_OPTIONS)})=(None\b|(?=[\s:;,.)]|$)))"
 )
+# what is typed in another way than it is called
+_OTHERWISE = {
+    "offset='estimate'": "--offset",
+    "read(start=, stop=)": "--between START STOP",
+    "load(path, model=plant)": "--model your_file.py:plant",
+}
 # what stands within the brackets of a call
 _CALL = re.compile(r"\w\([^()]*$")
 _UNITS = re.compile(r"units=\{(['\"])(.+?)\1: '([^']*)'\}")
@@ -40,4 +46,6 @@ def typed(sentence: str) -> str:
     def units(found: re.Match[str]) -> str:
         return f"--units {shlex.quote(f'{found[2]}={found[3]}')}"
 
+    for called, option_of in _OTHERWISE.items():
+        sentence = sentence.replace(called, option_of)
     return _UNITS.sub(units, _ARGUMENT.sub(option, sentence))

@@ -22,6 +22,37 @@ _STEADY = 0.1
 _EVEN = 0.5
 # a period's and a start's part that rounding hides at best
 _DIGITS, _EXACT = 1e-13, 1e-7
+# rows on either side of where a time begins anew
+_ANEW = 10
+
+
+def begins_anew(times: FloatArray) -> int | None:
+    """The row in which times go back to where they were many rows before, as where a file holds
+    two experiments, one after another; None where they do not.
+    """
+    steps = np.diff(times)
+    back = np.flatnonzero(steps < 0) + 1 if np.median(steps) > 0 else ()
+    for row in back:
+        if _ANEW <= row <= len(times) - _ANEW:
+            later = times[row : row + _ANEW]
+            if later[0] <= times[row - _ANEW] and later.max() <= times[row - 1]:
+                return int(row)
+    return None
+
+
+def out_of_order(name: str, times: FloatArray, row: int) -> InputError:
+    """The error for times that do not increase, first in that row."""
+    anew = begins_anew(times)
+    if anew is not None:
+        return InputError(
+            f"{name} begins anew in row {anew}, at {times[anew]:g} s after {times[anew - 1]:g} s: "
+            "one experiment after another, each of which needs a file, or a table, of its own: "
+            f"rows 0 to {anew - 1}, and from {anew} on"
+        )
+    return InputError(
+        f"{name} does not increase in row {row}, at {times[row]:g} s after {times[row - 1]:g} s; "
+        "sort or repair the rows"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +85,7 @@ class Clock:
         if printed is not None:
             return cls._rounded(t, *printed)
         if (gaps <= 0).any():
-            at = int(np.argmax(gaps <= 0))
-            raise InputError(
-                f"{name} goes back or stands still at row {at + 1} ({t[at]:g} s, then "
-                f"{t[at + 1]:g} s); sort or repair the rows"
-            )
+            raise out_of_order(name, t, int(np.argmax(gaps <= 0)) + 1)
         number = _numbered(t - t[0], gaps)
         kept = np.ones(len(t), bool)
         for _ in range(5):

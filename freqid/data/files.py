@@ -17,6 +17,7 @@ import numpy as np
 from freqid.checks import InputError, an, finite, flag, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
 from freqid.data.argument_order import read_in_either_order
+from freqid.data.clocks import begins_anew
 from freqid.data.column_names import known
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
@@ -164,6 +165,8 @@ def _cut_rows(
     ``start`` (s), and how much later (s) that is: a slower output begins with such a row.
     """
     if stop is not None:
+        # of experiments one after another the first
+        frame = frame.iloc[: begins_anew(frame["time"].to_numpy(dtype=float))]
         frame = frame[~(frame["time"] > frame["time"].iloc[0] + finite("stop", stop))]
     t = frame["time"].to_numpy(dtype=float)
     if start is None or len(t) == 0 or not np.isfinite(t).all() or (np.diff(t) <= 0).any():

@@ -9,6 +9,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, listed, positive, real, unknown
 from freqid.data.cells import no_number
+from freqid.data.clocks import out_of_order
 from freqid.data.column_names import known, without_units
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.printed_times import printed_period
@@ -213,8 +214,7 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
         if abs(positive("dt", dt, "s") / period - 1) < 1e-3:
             return float(dt)
     if not np.isfinite(times).all() or (gaps <= 0).any():
-        row = int(np.argmax(~(gaps > 0))) + 1
-        raise InputError(f"column 'time' does not increase in row {row}; sort or repair the rows")
+        raise out_of_order("column 'time'", times, int(np.argmax(~(gaps > 0))) + 1)
     if np.abs(gaps - step).max() > 0.01 * step:
         raise InputError(uneven(times))
     if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:

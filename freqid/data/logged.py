@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, path_of, unknown
+from freqid.data.clocks import begins_anew
 from freqid.data.logs import record_from_logs
 from freqid.data.readers.kinds import LOGS, Channel, Log
 from freqid.data.record import Record
@@ -23,12 +24,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def channels(path: str | Path) -> pd.DataFrame:
+def channels(path: str | Path, group: str | None = None) -> pd.DataFrame:
     """What a file holds: a row for each channel, with its rate and how regular that is.
 
     Columns: ``channel``, ``rate`` (Hz, the mean one), ``jitter`` (s, standard deviation of the
     steps), ``samples``, ``missing`` (samples that steps of several median ones lack), ``length``
-    (s) and ``unit``. Takes every file that ``read`` takes; raises ValueError like it.
+    (s) and ``unit``; ``attrs["notes"]`` says where the time begins anew. Takes every file that
+    ``read`` takes, and a ``group`` of it; raises ValueError like it.
 
     >>> import tempfile, pathlib, freqid as fq
     >>> path = pathlib.Path(tempfile.mkdtemp()) / "step.csv"
@@ -38,32 +40,43 @@ def channels(path: str | Path) -> pd.DataFrame:
     """
     import pandas as pd
 
-    found = log_of(path)
+    found = log_of(path, group)
     rows = {name: _row(c) for name, c in found.items()}
     columns = ["channel", "rate", "jitter", "samples", "missing", "length", "unit"]
-    return pd.DataFrame([(name, *row) for name, row in rows.items()], list(rows), columns)
+    made = pd.DataFrame([(name, *row) for name, row in rows.items()], list(rows), columns)
+    anew = {name: begins_anew(c.times) for name, c in found.items()}
+    made.attrs["notes"] = list(dict.fromkeys(
+        f"the time begins anew in row {row}: one experiment after another"
+        for row in anew.values() if row is not None
+    ))  # fmt: skip
+    return made
 
 
 def _row(c: Channel) -> tuple[float, float, int, int, float, str]:
     count = len(c.times)
-    if count < 2 or not np.isfinite(c.times).all() or c.times[-1] <= c.times[0]:
+    if count < 2 or not np.isfinite(c.times).all() or c.times.max() <= c.times[0]:
         return float("nan"), float("nan"), count, 0, 0.0, c.unit
-    length, gaps = float(c.times[-1] - c.times[0]), np.diff(c.times)
-    period = float(np.median(gaps))
+    gaps = np.diff(c.times)
+    if begins_anew(c.times) is not None:
+        # where one experiment follows another is no step
+        gaps = gaps[gaps > 0]
+    period, length = float(np.median(gaps)), float(gaps.sum())
     missing = lost_between(gaps, period) if period > 0 else 0
-    return (count - 1) / length, float(np.std(gaps)), count, missing, length, c.unit
+    return len(gaps) / length, float(np.std(gaps)), count, missing, length, c.unit
 
 
-def log_of(path: str | Path) -> Mapping[str, Channel]:
-    """Every numeric channel of a file by name."""
+def log_of(path: str | Path, group: str | None = None) -> Mapping[str, Channel]:
+    """Every numeric channel of a file, or of one ``group`` of it, by name."""
     path = path_of("path", path)
     kind = kind_of(path)
     if kind in LOGS:
+        if group is not None:
+            raise InputError(f"{path}: group= is for files of several tables; leave it out")
         try:
             return LOGS[kind](path)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
-    frame = frame_of(path)
+    frame = frame_of(path, group=group)
     units = frame.attrs.get("units", {})
     try:
         frame, _ = with_time(frame, None, units, None, one_clock=False)

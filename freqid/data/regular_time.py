@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.data.clocks import Clock
+from freqid.data.clocks import Clock, out_of_order
 from freqid.data.printed_times import plain_period, printed_period
 
 # rows of a regular time for each that is there, beyond which a stamp is wrong and no gap
@@ -35,7 +35,7 @@ def on_a_grid(
         times = rounded[0] * np.arange(len(times))
     gaps = np.diff(times)
     if not np.isfinite(times).all() or (gaps <= 0).any():
-        raise InputError("column 'time' must increase; sort or repair the rows")
+        raise out_of_order("column 'time'", times, int(np.argmax(~(gaps > 0))) + 1)
     if len(times) < 3:
         raise InputError("resample=True needs three rows or more")
     clock = Clock.of("time", times)

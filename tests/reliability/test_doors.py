@@ -240,7 +240,7 @@ import os, signal, freqid.cli.commands as commands
 def work(*arguments, **options):
     try:
         os.kill(os.getpid(), signal.SIGTERM)
-    except SystemExit:
+    except BaseException:
         pass
 commands.app = work
 commands.main([])
@@ -248,6 +248,40 @@ commands.main([])
         check=False, timeout=100,
     )  # fmt: skip
     assert run.returncode == 128 + signal.SIGTERM
+
+
+def test_many_fits_end_where_they_are_told_to(day):
+    """They went on to their end, and the record in progress was a failed row."""
+    pytest.importorskip("pyarrow")
+    (day / "slow.py").write_text("""
+import pathlib, time
+import freqid as fq
+calls = []
+def matrices(a):
+    calls.append(a)
+    if len(calls) == 100:
+        pathlib.Path("begun").touch()
+    time.sleep(0.01)
+    return [[-a]], [[a]], [[1]], None
+plant = fq.GreyBox(matrices, [fq.Parameter("a", 30.0)])
+""")
+    for k in range(8):
+        plant = fq.first_order(a=20.0 + k, b=20.0 + k)
+        fq.write(fq.simulate(plant, fq.white_noise(300, seed=k), 0.01), day / f"log{k}.csv")
+    process = subprocess.Popen(
+        [*FREQID, "fit-many", "log*.csv", "--model", "slow.py:plant", "--out", "table.parquet",
+         "--jobs", "1"],
+        cwd=day, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    for _ in range(1200):
+        if (day / "begun").exists():
+            break
+        time.sleep(0.05)
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert "Traceback" not in said
+    assert not (day / "table.parquet").exists()
 
 
 def test_a_full_disk_leaves_no_file(day, tmp_path):

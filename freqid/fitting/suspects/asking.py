@@ -9,6 +9,7 @@ from freqid.data import FrequencyResponse
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.parts import Parting
+from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
 from freqid.models import Model
@@ -39,6 +40,15 @@ class Asking(Protocol):
 
     def apart(self, parting: Parting) -> list[Estimate | None]:
         """Fits to each part of the data alone."""
+        ...
+
+
+class Naming(Asking, Protocol):
+    """A fit that is asked about, with what speaks against it."""
+
+    @property
+    def named(self) -> Sequence[Asked]:
+        """Suspects that speak, the one that explains most first."""
         ...
 
 

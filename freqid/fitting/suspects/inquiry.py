@@ -39,7 +39,7 @@ from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import constant, constant_instead, silent, unheard
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.ticks import late_stamps
-from freqid.fitting.suspects.turned import turned
+from freqid.fitting.suspects.turned import turned, turned_and_complete
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.fitting.witness import Share
 from freqid.lti import tuned
@@ -198,14 +198,14 @@ class Inquiry:
         if any(f.severity == "serious" for f in first):
             return first
         found = [*self._on_suspects(), *first]
-        found = constant_instead(self, self.scene, self._std, found, self.named) or found
+        found = constant_instead(self, self.scene, self._std, found) or found
         if any(f.severity == "serious" for f in found):
             return found
         other = [*beyond_noise(self.minimum), *coarse(self.scene, self._std)]
         return [*other, *(f for f in found if f.kind not in [o.kind for o in other])]
 
     def _on_suspects(self) -> list[Finding]:
-        scene, named = self.scene, self.named
+        scene = self.scene
         if scene is None:
             nothing = unheard(self.minimum, self.model, self.readings)
             return nothing or turned(self, None) or late_stamps(self.minimum, self.readings)
@@ -215,9 +215,10 @@ class Inquiry:
         found = leaking(*asked) or still_moving(*asked, self.readings)
         if found := found or begun_in_motion(self.minimum, scene, self.readings):
             return found
-        turn = turned(self, scene)
-        if turn and not outdone(turn[0].number or 0.0, named, scene):
+        turn, complete = turned_and_complete(self, scene)
+        if turn and (complete or not outdone(turn[0].number or 0.0, self.named, scene)):
             return instead_of_swapped(self, turn) or turn
+        named = self.named
         if not named or (other := instead(self, scene, named)):
             return other if named else []
         # a change beside a fault of a sensor is another thing, however weak

@@ -15,12 +15,11 @@ from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.offsets import with_offset
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.interrupted import INTERRUPTED
-from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.asking import Naming
 from freqid.fitting.suspects.order import BENT
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
-from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import eliminate
 from freqid.models import GreyBox, Model
@@ -98,14 +97,13 @@ def constant(scene: Scene, model: Model) -> list[Finding]:
 
 
 def constant_instead(
-    inquiry: Asking, scene: Scene | None, std: FloatArray, found: Sequence[Finding],
-    named: Sequence[Asked],
-) -> list[Finding]:  # fmt: skip
+    inquiry: Naming, scene: Scene | None, std: FloatArray, found: Sequence[Finding]
+) -> list[Finding]:
     """A finding where a fit in trouble is none with a constant of each output free: sensors whose
     zero is elsewhere, of inputs too, may drive it so far that no suspect is near.
 
     A fit is in trouble where what was ``found`` is serious, or a standard error (P,) tells nothing;
-    what is ``named`` must not explain more.
+    what the inquiry has ``named`` must not explain more.
     """
     minimum, model = inquiry.minimum, inquiry.model
     structure = minimum.structure
@@ -117,11 +115,12 @@ def constant_instead(
     serious = [f.kind for f in found if f.severity == "serious"]
     if not (serious or vague or not minimum.solution.converged) or "offset" in serious[:1]:
         return []
-    if any(a.name in BENT for a in named[:1]):
-        # about a level that is not zero what bends is a constant beside a gain
-        return []
     readings = inquiry.readings
     if any(r.offset for r in readings) or not any(_has_constant(r.data) for r in readings):
+        return []
+    named = inquiry.named
+    if any(a.name in BENT for a in named[:1]):
+        # about a level that is not zero what bends is a constant beside a gain
         return []
     begun = model.with_values(**dict(zip(structure.physical_names, structure.values, strict=False)))
     try:

@@ -53,16 +53,23 @@ _LEFT, _MOST_LEFT = 0.05, 0.3
 
 
 def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Finding]:
-    """A finding where the plant explains the data turned back, and them alone, with sense.
+    """A finding where the plant explains the data turned back, and them alone, with sense."""
+    return turned_and_complete(inquiry, scene, quiet)[0]
+
+
+def turned_and_complete(
+    inquiry: Asking, scene: Scene | None, quiet: bool = False
+) -> tuple[list[Finding], bool]:
+    """The same, and whether the data turned back leave nothing but noise.
 
     Asked where values are not physical, a mode has gone out of sight, or much is left of an
     output; where the fit is ``quiet``, the input not heard in it, whatever is no chance is enough.
     """
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
-        return []
+        return [], False
     if isinstance(structure, PlacedStructure) or inquiry.minimum.solution.message == INTERRUPTED:
-        return []
+        return [], False
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
     asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
@@ -70,8 +77,9 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
     hidden = _hidden(model, inquiry) and not _hidden(begun, inquiry)
     unphysical = _unphysical(inquiry.minimum, model) or (hidden and asked.share < _BETTER)
     if not (unphysical or quiet or asked.shares.max() > _LEFT):
-        return []
+        return [], False
     best: tuple[float, Turn] | None = None
+    complete = False
     for turn in _likeliest(all_turns(model, inquiry.readings[0].data), begun, inquiry.readings):
         try:
             readings = [turn.back(r) for r in inquiry.readings]
@@ -92,19 +100,20 @@ def turned(inquiry: Asking, scene: Scene | None, quiet: bool = False) -> list[Fi
             continue
         if best is None or left < best[0]:
             best = left, turn
-        if est.witness.verdict == "complete":
+        if complete := est.witness.verdict == "complete":
             break
     if best is None:
-        return []
+        return [], False
     left, turn = best
-    if late := late_instead(inquiry, begun, options, _BETTER * left):
-        return [late]
+    # nothing leaves half of what is but noise
+    if not complete and (late := late_instead(inquiry, begun, options, _BETTER * left)):
+        return [late], False
     swapped = turn.kind == "swapped channels"
     text = (
         f"{turn.what}: turned back, {100 * (1 - np.sqrt(left)):.4g} % of the data are explained by "
         f"physical values; {'exchange them' if swapped else 'turn the channel'}"
     )
-    return [Finding(turn.kind, text, number=float(left))]
+    return [Finding(turn.kind, text, number=float(left))], complete
 
 
 def shares(minimum: Minimum, scene: Scene | None) -> FloatArray:
