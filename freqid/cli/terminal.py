@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,9 +24,10 @@ if TYPE_CHECKING:
 notes = Console(stderr=True)
 
 
-def progress() -> Progress:
+@contextmanager
+def progress() -> Iterator[Progress]:
     """A spinner on a terminal, nothing elsewhere."""
-    return Progress(
+    bar = Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
         TimeElapsedColumn(),
@@ -34,6 +35,9 @@ def progress() -> Progress:
         transient=True,
         disable=not notes.is_terminal,
     )
+    # one that shows nothing ends with a line break where rich is older
+    with nullcontext() if bar.disable else bar:
+        yield bar
 
 
 TABLES, PICTURES = (".csv",), (".png", ".pdf", ".svg", ".jpg", ".eps", ".webp")

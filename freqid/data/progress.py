@@ -41,7 +41,9 @@ class Bar:
         self.task = self.progress.add_task(what, total=total, completed=done)
 
     def __enter__(self) -> Callable[[int], None]:
-        self.progress.start()
+        # one that shows nothing ends with a line break where rich is older
+        if not self.progress.disable:
+            self.progress.start()
         return self.advance
 
     def advance(self, count: int) -> None:
@@ -54,4 +56,5 @@ class Bar:
             print(f"{self.what}: {self.done} of {self.total}", file=sys.stderr, flush=True)
 
     def __exit__(self, *reason: object) -> None:
-        self.progress.stop()
+        if not self.progress.disable:
+            self.progress.stop()

@@ -64,6 +64,10 @@ class Inquired(Protocol):
         """Modes of a black box that are noise, or, unless a change was said, move midway."""
         ...
 
+    def on_memory(self, est: Estimate) -> list[Finding]:
+        """A hold in place of the one that the data remember."""
+        ...
+
     def spread(self, est: Estimate) -> pd.DataFrame:
         """How far the numbers of an estimate move between parts of its data."""
         ...

@@ -54,7 +54,10 @@ class Questioned:
         # what decimation has folded looks like a loop, another hold, or a plant that bends
         folded = [s for s in self.signs if _much_folded(s)]
         others = [s for s in self.signs if not _much_folded(s)]
-        return [*folded, *asked, *others, *exchangeable(self.problem)]
+        found = [*folded, *asked, *others, *exchangeable(self.problem)]
+        if self.inquiry is None or any(f.severity == "serious" for f in found):
+            return found
+        return [*found, *self.inquiry.on_memory(self)]  # type: ignore[arg-type]
 
     @cached_property
     def verdict(self) -> Verdict:

@@ -169,7 +169,7 @@ def taper(window: Window, length: int) -> FloatArray:
     try:
         given = isinstance(window, (list, np.ndarray))
         w = np.asarray(window) if given else _by_name(window, length)  # type: ignore[arg-type]
-    except (TypeError, ValueError, IndexError) as error:
+    except (TypeError, ValueError, IndexError, OverflowError) as error:
         raise InputError(f"window={window!r:.60} is none that scipy knows: {error}") from None
     if w.dtype.kind not in "fiu" or not np.isfinite(w).all() or not w.any():
         raise InputError("window must hold finite real numbers that are not all zero")

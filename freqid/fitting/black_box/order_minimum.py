@@ -61,8 +61,18 @@ class Orders:
 
     def least(self, spec: OutputError) -> Descent:
         """The minimum of an order, not above that of stable ones where it grows or is none, nor
-        above that of the order below with one pole more.
+        above that of the order below with one pole more, nor that without a direct term.
         """
+        found = self._least(spec)
+        if not spec.feedthrough or _chained(self.lines):
+            return found
+        chart, without, _ = self._least(dataclasses.replace(spec, feedthrough=False))
+        if found[1].cost <= without.cost:
+            return found
+        return self._better(spec, self.lines, found, [chart.matrices(without.x)])
+
+    def _least(self, spec: OutputError) -> Descent:
+        """The same, begun from the data alone."""
         found = self._alike(spec) if spec.stable else self._tamed(spec)
         if not self._odd(found) or not 1 < spec.order <= HIGH:
             return found

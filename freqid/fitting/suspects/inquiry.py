@@ -11,31 +11,31 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
-from freqid.fitting.findings import Finding, Severity, between_parts, suspects_table
+from freqid.fitting.findings import Finding, between_parts, suspects_table
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.all_suspects import SUSPECTS
-from freqid.fitting.suspects.asking import equally_weighted
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.coarse import coarse
 from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
-from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE, confirmed, modes_differ
+from freqid.fitting.suspects.halves import LITTLE, confirmed, modes_differ
 from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.no_values import no_values
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
+from freqid.fitting.suspects.overruled import overruled
 from freqid.fitting.suspects.parts import Parting, confirming, fitted_apart, partings
 from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.rest import begun_in_motion
+from freqid.fitting.suspects.said import finding_of, negligible
 from freqid.fitting.suspects.scales import instead, instead_of_swapped
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, Score, score
-from freqid.fitting.suspects.sentences import sentence, words
 from freqid.fitting.suspects.silence import constant, constant_instead, silent, unheard
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.ticks import late_stamps
@@ -53,12 +53,8 @@ if TYPE_CHECKING:
 # part of the strongest one's evidence from which another is said, how many are, and the chance
 # from which one is no certainty
 _WORTH, _SAID, _SURE = 0.5, 3, 1e-6
-# standard errors by which a suspect moves no parameter, and the part of it that harms nobody
-_SMALL, _HARMLESS = 0.3, 1e-3
-# part of the data's energy that is nothing, and what is left of data without noise to speak of
-_NOTHING, _QUIET = 1e-5, 1e-4
-# part of what is left that is most of it, and that is hardly any
-_MOST, _HARDLY = 0.5, 0.1
+# part of what is left that is hardly any
+_HARDLY = 0.1
 # level at which all suspects together speak of good data
 LEVEL = 0.0065
 
@@ -230,41 +226,14 @@ class Inquiry:
             a for a in named
             if a in apart or a.p_value < chance or evidence(scene, a) >= least
         ]  # fmt: skip
-        said = [a for a in near if not self._negligible(scene, a)]
+        said = [a for a in near if not negligible(scene, a)]
         said = [a for i, a in enumerate(said) if i < _SAID or a.certain]
-        found = [self._finding(scene, a) for a in said]
+        found = [finding_of(scene, a, self.readings) for a in said]
         if isinstance(self.model, GreyBox) or not said or said[0].name in LIKELY:
             return found
         lacking = [a for a in named if a.harm >= LITTLE]
-        more = [self._finding(scene, a) for a in lacking if a not in said]
+        more = [finding_of(scene, a, self.readings) for a in lacking if a not in said]
         return [*confirmed(self, scene, said, found), *more]
-
-    def _negligible(self, scene: Scene, a: Asked) -> bool:
-        """Whether it is certain only because next to nothing else is left of the data."""
-        moves = a.test.largest_change > _HARMLESS
-        # a constant is much of the data, and tells nothing of what explains most of the rest
-        energy = scene.moving if a.test.gain > _MOST * scene.cost else scene.energy
-        little = a.test.gain < _NOTHING * energy and scene.cost < _QUIET * energy
-        return bool(little and not moves)
-
-    def _finding(self, scene: Scene, a: Asked) -> Finding:
-        if a.name == "hold rejected":
-            holds = {repr(r.hold) for r in self.readings}
-            what = f"the data contradict {', '.join(sorted(holds))}"
-            what += f"; {a.detail} explains them better" if a.detail else ""
-        else:
-            what = words(a.name, a.test.size, a.unit, a.detail, a.channel)
-        text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
-        if a.name in LACKING and all(equally_weighted(r) for r in self.readings):
-            text += "; where errors are a share of the response, fit with error='log'"
-        small = (
-            a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS or a.harm < LITTLE
-        )
-        if a.name == "unsteady":
-            # halves that differ leave the mean of both where it is
-            small = bool(a.unit) and abs(a.test.size) < HOLDS_GOOD
-        severity: Severity = "minor" if small else "serious"
-        return Finding(a.name, text, severity, float(a.test.statistic), float(a.p_value))
 
     @tuned
     def spread(self, est: Estimate) -> pd.DataFrame:
@@ -285,6 +254,11 @@ class Inquiry:
             return ghosts
         found = modes_differ(est, halves, self.apart(halves))
         return [] if found is None else [found]
+
+    @tuned
+    def on_memory(self, est: Estimate) -> list[Finding]:
+        """A hold in place of the one that the data remember."""
+        return [] if est.problem is None or est.minimum.exact else overruled(self, est)
 
     @tuned
     def table(self) -> pd.DataFrame:

@@ -83,6 +83,10 @@ class EvenInquiry:
         """Modes of a black box that are noise, or move midway."""
         return self.inquiry.on_modes(est, changed)
 
+    def on_memory(self, est: Estimate) -> list[Finding]:
+        """A hold in place of the one that the data remember."""
+        return self.inquiry.on_memory(est)
+
     def spread(self, est: Estimate) -> pd.DataFrame:
         """How far the numbers move between parts of the data."""
         return self.inquiry.spread(est)

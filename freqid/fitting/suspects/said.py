@@ -1,0 +1,49 @@
+"""A suspect that is no chance as a finding: its sentence, and how much it weighs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from freqid.fitting.findings import Finding, Severity
+from freqid.fitting.reading import Reading
+from freqid.fitting.suspects.asking import equally_weighted
+from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE
+from freqid.fitting.suspects.order import LACKING
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked
+from freqid.fitting.suspects.sentences import sentence, words
+
+# standard errors by which a suspect moves no parameter, and the part of it that harms nobody
+_SMALL, _HARMLESS = 0.3, 1e-3
+# part of the data's energy that is nothing, and what is left of data without noise to speak of
+_NOTHING, _QUIET = 1e-5, 1e-4
+# part of what is left that is most of it
+_MOST = 0.5
+
+
+def negligible(scene: Scene, a: Asked) -> bool:
+    """Whether it is certain only because next to nothing else is left of the data."""
+    moves = a.test.largest_change > _HARMLESS
+    # a constant is much of the data, and tells nothing of what explains most of the rest
+    energy = scene.moving if a.test.gain > _MOST * scene.cost else scene.energy
+    little = a.test.gain < _NOTHING * energy and scene.cost < _QUIET * energy
+    return bool(little and not moves)
+
+
+def finding_of(scene: Scene, a: Asked, readings: Sequence[Reading]) -> Finding:
+    """What is said of it to who reads the estimate."""
+    if a.name == "hold rejected":
+        holds = {repr(r.hold) for r in readings}
+        what = f"the data contradict {', '.join(sorted(holds))}"
+        what += f"; {a.detail} explains them better" if a.detail else ""
+    else:
+        what = words(a.name, a.test.size, a.unit, a.detail, a.channel)
+    text = sentence(a.name, what, a.test, a.p_value, scene.freedom)
+    if a.name in LACKING and all(equally_weighted(r) for r in readings):
+        text += "; where errors are a share of the response, fit with error='log'"
+    small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS or a.harm < LITTLE
+    if a.name == "unsteady":
+        # halves that differ leave the mean of both where it is
+        small = bool(a.unit) and abs(a.test.size) < HOLDS_GOOD
+    severity: Severity = "minor" if small else "serious"
+    return Finding(a.name, text, severity, float(a.test.statistic), float(a.p_value))
