@@ -40,4 +40,11 @@ from freqid.data.stamped_record import StampedRecord
 from freqid.data.stream_chain import files_of
 from freqid.data.stream_sources import open
 from freqid.data.streams import Stream
-from freqid.data.units import coherent, is_count, is_of_time, mentions, units_of_channels
+from freqid.data.units import (
+    is_count,
+    is_of_time,
+    is_share,
+    meant,
+    multiple,
+    units_of_channels,
+)

@@ -45,20 +45,23 @@ _OTHERS = {
               "1/min": np.pi / 30, "r/min": np.pi / 30, "U/min": np.pi / 30,
               "rev/min": np.pi / 30, "min^-1": np.pi / 30, "min-1": np.pi / 30,
               "rev/s": 2 * np.pi, "°/s": np.pi / 180, "deg/s": np.pi / 180,
-              "deg/sec": np.pi / 180, "dps": np.pi / 180, "mrad/s": 1e-3},
+              "deg/sec": np.pi / 180, "dps": np.pi / 180, "mrad/s": 1e-3, "Hz": 2 * np.pi,
+              "rps": 2 * np.pi, "r/s": 2 * np.pi, "rev/sec": 2 * np.pi},
     "N m": {"mNm": 1e-3, "mN m": 1e-3, "Nmm": 1e-3, "N mm": 1e-3, "Ncm": 1e-2, "N cm": 1e-2,
             "kNm": 1e3, "kN m": 1e3, "lbf ft": 1.3558179, "ft lbf": 1.3558179, "lb ft": 1.3558179,
-            "ft lb": 1.3558179, "lbf in": 0.11298483, "in lbf": 0.11298483},
-    "N": {"mN": 1e-3, "kN": 1e3, "lbf": 4.4482216},
+            "ft lb": 1.3558179, "lbf in": 0.11298483, "in lbf": 0.11298483, "kgf m": 9.80665,
+            "kgf cm": 0.0980665, "kgfcm": 0.0980665, "kg cm": 0.0980665, "oz in": 7.0615518e-3,
+            "ozf in": 7.0615518e-3},
+    "N": {"mN": 1e-3, "kN": 1e3, "lbf": 4.4482216, "kgf": 9.80665, "gf": 9.80665e-3},
     "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "µm": 1e-6, "in": 0.0254, "inch": 0.0254,
-          "ft": 0.3048},
+          "ft": 0.3048, "mil": 2.54e-5, "mils": 2.54e-5},
     "m/s": {"mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1 / 3.6, "kph": 1 / 3.6, "kmh": 1 / 3.6,
             "mph": 0.44704},
     "m/s^2": {"mm/s^2": 1e-3, "cm/s^2": 1e-2, "mm/s²": 1e-3, "cm/s²": 1e-2, "mm/s2": 1e-3,
               "cm/s2": 1e-2},
-    "A": {"mA": 1e-3},
-    "V": {"mV": 1e-3, "kV": 1e3},
-    "W": {"mW": 1e-3, "kW": 1e3, "MW": 1e6},
+    "A": {"mA": 1e-3, "uA": 1e-6, "µA": 1e-6, "kA": 1e3},
+    "V": {"mV": 1e-3, "uV": 1e-6, "µV": 1e-6, "kV": 1e3},
+    "W": {"mW": 1e-3, "kW": 1e3, "MW": 1e6, "BTU/h": 0.29307107, "hp": 745.69987},
     "K": {"mK": 1e-3, "°F": 1 / 1.8, "degF": 1 / 1.8},
     "Pa": {"hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "mbar": 1e2, "bar": 1e5, "psi": 6894.757},
     "m^3/s": {"l/s": 1e-3, "L/s": 1e-3, "l/min": 1e-3 / 60, "L/min": 1e-3 / 60, "lpm": 1e-3 / 60,
@@ -71,10 +74,13 @@ _TIMED = re.compile(r"|1|%|m?s|k?Hz|(1|rad)/s(²|\^2)?")
 # how the unit of a parameter has that of a channel in it, a moment of inertia N m s²/rad
 _INERTIA = r"kg\s*m(²|\^2|2)"
 _LENGTH = r"/\s*\(?m\b|kg(?!\s*m)|^m(/s)?/|^m([²³]|\^[23])|s/m([²³]|\^[23])"
+# resistances, inductances and capacities, which have volts and amperes in them
+_CIRCUIT = r"(?<![A-Za-z])(Ω|ohms?|Ohms?|H|F|Wb)\b|Ω"
 _MENTIONS = {
     "rad": rf"rad|{_INERTIA}", "rad/s": rf"rad|{_INERTIA}",
     "N m": rf"N\s*m|{_INERTIA}", "N": r"N(?!\s*m)|kg(?!\s*m)", "m": _LENGTH, "m/s": _LENGTH,
-    "m/s^2": _LENGTH, "m^3/s": rf"{_LENGTH}|m³", "A": r"A\b", "V": r"V\b", "W": r"(?<![A-Za-z])W\b",
+    "m/s^2": _LENGTH, "m^3/s": rf"{_LENGTH}|m³", "A": rf"A\b|{_CIRCUIT}",
+    "V": rf"V\b|{_CIRCUIT}", "W": r"(?<![A-Za-z])W\b",
     "K": r"(?<![A-Za-z])K\b", "Pa": r"(?<![A-Za-z])Pa\b",
 }  # fmt: skip
 # those that mean one thing however they are written
@@ -85,7 +91,10 @@ _ANY_CASE = {
 # what a converter counts, which are no multiples of anything that is known here
 _COUNTS = {"count", "counts", "cnt", "cnts", "lsb", "lsbs", "tick", "ticks", "bit", "bits", "inc"}
 # units that names end in: angle_deg, speed_rpm; x_cm may be the centre of mass
-_ENDS = {"deg", "rpm", "mrad", "mNm", "Nmm", "Ncm", "mm", "mA", "dps", "counts", "ticks"}
+_ENDS = {"deg", "rpm", "mrad", "mNm", "Nmm", "Ncm", "mm", "mA", "dps", "counts", "ticks", "psi",
+         "mbar"}  # fmt: skip
+# those that no other capitals spell: u_MV is a manipulated variable
+_SPELLED_ENDS = {"mV", "kV", "kN", "kPa", "kW", "krpm", "kgf"}
 
 
 def coherent(unit: str) -> tuple[str, float] | None:
@@ -102,6 +111,16 @@ def coherent(unit: str) -> tuple[str, float] | None:
             if written in others:
                 return base, others[written]
     return _ANY_CASE.get(plain.casefold())
+
+
+def multiple(unit: str) -> tuple[str, float] | None:
+    """The same, and 1 for a unit that is a coherent one; None for what is neither.
+
+    >>> multiple("mNm"), multiple("rad")
+    (('N m', 0.001), ('rad', 1.0))
+    """
+    spelled = re.sub(r"[·*]", " ", unit).strip()
+    return coherent(unit) or ((spelled, 1.0) if spelled in _OTHERS else None)
 
 
 def unlike(one: str, other: str) -> bool:
@@ -137,6 +156,28 @@ def mentions(unit: str, base: str) -> bool:
     return not is_of_time(unit) and re.search(_MENTIONS[base], unit) is not None
 
 
+def meant(unit: str, base: str) -> tuple[str, float] | None:
+    """The unit of a channel that the unit of a parameter has in it, and that in the coherent one,
+    the ``base``; None where it has none of that kind.
+
+    >>> meant("rad/s/V", "rad/s"), meant("mm/V", "m"), meant("rad/s/V", "m")
+    (('rad/s', 1.0), ('mm', 0.001), None)
+    """
+    if mentions(unit, base):
+        return base, 1.0
+    parts = {p for p in re.split(r"[\s/·*()]+", unit) if p in _OTHERS[base]}
+    return next(((p, _OTHERS[base][p]) for p in parts), None) if len(parts) == 1 else None
+
+
+def is_share(unit: str) -> bool:
+    """Whether a unit is a part of something whose size it does not tell.
+
+    >>> is_share("%"), is_share("V")
+    (True, False)
+    """
+    return unit.strip().casefold() in ("%", "percent", "pct")
+
+
 def units_of_channels(names: Sequence[str], units: Mapping[str, str]) -> list[tuple[str, str]]:
     """Channels and their units, of those that have one or whose name ends in one.
 
@@ -165,4 +206,6 @@ def unit_in_name(name: str) -> str:
     end = re.split(r"[_\s]+", name.strip())[-1]
     if end == name or (coherent(end) is None and not is_count(end)):
         return ""
+    if end in _SPELLED_ENDS:
+        return end
     return next((u for u in _ENDS if end in (u, u.upper(), u.capitalize())), "")

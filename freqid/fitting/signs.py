@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray
-from freqid.data import coherent, is_count, is_of_time, mentions
+from freqid.data import is_count, is_of_time, is_share, meant, multiple
 from freqid.fitting.findings import FOLDED, Finding, Severity
 from freqid.models import Parameter
 
@@ -150,12 +150,15 @@ def edge_of_a_bound(e: Evidence) -> Iterator[Finding]:
 @sign
 def other_units(e: Evidence) -> Iterator[Finding]:
     """A channel in multiples of the unit that parameters are printed in."""
+    written = [p.unit.replace("·", " ") for p in e.parameters]
     for channel, unit in e.units:
-        told = coherent(unit)
+        told = multiple(unit)
         if told is None:
-            named = sorted({p.unit for p in e.parameters if not is_of_time(p.unit)})
+            named = sorted({u for u in written if not is_of_time(u)})
             counted = unit.casefold().removesuffix("s")
-            if is_count(unit) and named and not any(counted in u.casefold() for u in named):
+            # what a share is of may be in a parameter that has no unit
+            alone = is_count(unit) or (is_share(unit) and all(written))
+            if alone and named and not any(counted in u.casefold() for u in named):
                 yield Finding(
                     "units",
                     f"{channel} is in {unit}, and parameters are in {', '.join(named)}: their "
@@ -165,15 +168,19 @@ def other_units(e: Evidence) -> Iterator[Finding]:
             continue
         base, factor = told
         # who has the channel's own unit in his parameters means it
-        units = {p.unit.replace("·", " ") for p in e.parameters}
-        met = sorted(u for u in units if unit not in u and mentions(u, base))
+        others = {u: meant(u, base) for u in written if unit not in u}
+        met = {u: m for u, m in others.items() if m and abs(m[1] / factor - 1) > _ROUNDED}
+        if factor == 1:
+            # a length in mm may be converted in the model, a gain in mm/V is not
+            met = {u: m for u, m in met.items() if "/" in u}
         if met:
+            wanted, size = next(iter(met.values()))
             yield Finding(
                 "units",
-                f"{channel} is in {unit}, and parameters in {', '.join(met)} are those of a "
-                f"channel in {base}: their numbers are of another unit than is printed beside "
-                f"them; multiply the samples of {channel} by {factor:.6g}",
-                number=factor,
+                f"{channel} is in {unit}, and parameters in {', '.join(sorted(met))} are those of "
+                f"a channel in {wanted}: their numbers are of another unit than is printed beside "
+                f"them; multiply the samples of {channel} by {factor / size:.6g}",
+                number=factor / size,
             )
 
 

@@ -100,6 +100,17 @@ def test_a_channel_of_another_unit_is_doubted(tmp_path, name, in_file):
         ("speed [kph]", ("m/s/V", "s"), True), ("a [cm/s^2]", ("m/s^2/V", "s"), True),
         ("speed [rpm]", ("rpm/V", "s"), False), ("angle [deg]", ("", "rad/s"), False),
         ("pressure [bar]", ("Pa/V", "s"), True), ("flow [l/min]", ("m³/s/V", "s"), True),
+        ("pressure [mbar]", ("bar", "s"), True), ("pressure_psi", ("bar/V", "s"), True),
+        ("pressure [Pa]", ("bar/V", "s"), True), ("pressure [bar]", ("bar/V", "s"), False),
+        ("pressure [Pa]", ("bar", "s"), False), ("speed [Hz]", ("rad/s/V", "s"), True),
+        ("f [Hz]", ("Hz/V", "Hz"), False), ("voltage_mV", ("ohm", "H"), True),
+        ("current [uA]", ("Ω", "H"), True), ("v_MV", ("V", "s"), False),
+        ("v [V]", ("ohm", "mH"), False), ("force [kgf]", ("kg", "N s/m"), True),
+        ("torque [kgf cm]", ("kg m²", "N m/rad"), True), ("speed [rps]", ("rad/s/V", "s"), True),
+        ("heater [%]", ("J/K", "W/K"), True), ("heater [%]", ("K", "s"), True),
+        ("heater [%]", ("", "s"), False), ("heater [%]", ("K/%", "s"), False),
+        ("heater [%]", ("1/s", "s"), False), ("heater [BTU/h]", ("J/K", "W/K"), True),
+        ("angle [rad]", ("N m/deg", "s"), True), ("x [m]", ("mm", "kg"), False),
     ],
 )  # fmt: skip
 def test_parameters_of_a_gain_say_the_unit_of_its_channel(channel, parameters, doubted):
