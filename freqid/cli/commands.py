@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import signal
 import sys
@@ -197,10 +198,15 @@ for command in (reproduce, demo, show_file, channels, frf, fit, fit_many, new_mo
 def main(arguments: list[str] | None = None) -> None:
     """Entry point: 0 done, 1 the fit did not converge, 2 bad arguments or bad input."""
     codes = _end_tidily_when_told_to()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # a terminal that has no ± still shows the rest
+            stream.reconfigure(errors="replace")
     try:
         with plain_warnings():
             status = app(arguments, exit_on_error=False, print_error=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except cyclopts.CycloptsError as error:
         _fail(str(error))
     except BrokenPipeError:
@@ -248,7 +254,8 @@ _INTERRUPTED = 128 + signal.SIGINT
 def _fail(message: str, status: int = 2) -> None:
     with contextlib.suppress(OSError):
         # what was not said cannot be said later, either
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     print(f"freqid: {typed(' '.join(message.split()))}", file=sys.stderr)
     if sys.stdout is sys.__stdout__ and sys.stdout is not None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

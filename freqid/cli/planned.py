@@ -38,7 +38,8 @@ def bias(
     factor
         decimation factors.
     hold
-        what the fit assumes: any of zoh, foh, bl and remembered; by default zoh, foh, remembered.
+        what the fit assumes: any of zoh, foh, bl and remembered; by default zoh, foh
+        (not of a plant with a delay), remembered.
     base_dt
         sample time of the converter in s.
     parameter
@@ -48,12 +49,13 @@ def bias(
     plot
         heat map over upper frequency and factor, one panel a hold.
     """
-    names = ["zoh", "foh", "remembered"] if hold is None else hold
-    for name in names:
+    for name in hold or ():
         choice("--hold", name, (*holds.Hold.named, "remembered"))
-    assumed = [None if name == "remembered" else name for name in names]
     factors = [whole("--factor", f) for f in factor]
     plant = asked.grey_box()
+    # behind a delay straight lines are not exact, and refused
+    usual = ["zoh", *([] if plant.delay_sources else ["foh"]), "remembered"]
+    assumed = [None if name == "remembered" else name for name in hold or usual]
     if parameter is not None:
         choice("--parameter", parameter, [p.name for p in plant.free_parameters])
     low, high = chirp
@@ -65,7 +67,9 @@ def bias(
     if out is not None:
         write_table(out, table)
     shown = table.drop(columns=["spectrum", "message"])
-    shown["relative_bias"] = [f"{100 * b:+.3g} %" for b in shown["relative_bias"]]
+    shown["relative_bias"] = [
+        f"{100 * b:+.3g} %" if np.isfinite(b) else "" for b in shown["relative_bias"]
+    ]
     show(f"{asked.model}, chirp {swept} Hz held for {1e3 * base_dt:g} ms", shown)
     finite = table[np.isfinite(table["relative_bias"])]
     if parameter is None and len(finite):

@@ -59,6 +59,8 @@ def may_write(
         raise InputError(f"{path} is the file that is read, which is never overwritten")
     if path.is_dir():
         raise InputError(f"{path} is a folder; give a file")
+    if there and not path.is_file():
+        raise InputError(f"{path} is no file but a device or a pipe; give a file")
     if there and not force:
         raise InputError(f"{path} is there already; give another name, or --force")
     if kinds and path.suffix.lower() not in kinds:

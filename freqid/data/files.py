@@ -259,6 +259,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def _renamed(path: Path) -> Iterator[Path]:
     if path.is_dir():
         raise InputError(f"{path} is a folder; expected the name of a file")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path} is no file but a device or a pipe; give the name of a file")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):

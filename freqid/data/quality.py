@@ -100,11 +100,15 @@ def _findings(x: FloatArray, measured: bool) -> list[dict[str, str | float]]:
                 f" up to {int(runs[plateaus].max())} in a row: the sensor or the drive was "
                 "overloaded")  # fmt: skip
     longest = int(inner.max(initial=0))
-    if longest > max(_STUCK * N, 20) and not at_limit and not stairs and len(values) > 3:
+    steps = np.diff(values) / q
+    stepped = bool(np.allclose(steps, np.round(steps), atol=1e-3))
+    # what is no converter's count repeats no value while it is alive
+    lively = measured and not stepped and np.mean(runs == 1) > _ALIKE
+    least = 20 if lively else max(_STUCK * N, 20)
+    if longest > least and not at_limit and not stairs and len(values) > 3:
         where = int(edges[1:-2][int(inner.argmax())]) if len(inner) else 0
         add("stuck", longest, f"{longest} samples in a row are equal, from sample {where}")
-    steps = np.diff(values) / q
-    if 3 < len(values) < _FEW * N and np.allclose(steps, np.round(steps), atol=1e-3):
+    if 3 < len(values) < _FEW * N and stepped:
         add("quantised", q, f"steps of {q:g} make a noise of {q / np.sqrt(12):.3g} rms, "
             f"{100 * q / np.sqrt(12) / x.std():.2g} % of the signal")  # fmt: skip
     if abs(x.mean()) > 3 * x.std():

@@ -75,6 +75,25 @@ def test_from_a_file_and_a_plant_to_a_report(day, capsys):
     assert Path("est.html").stat().st_size > 1000
 
 
+def test_a_plant_of_ones_own_is_asked_for_as_it_is_typed(day, capsys):
+    words = ["train.csv", "--model", "my_plant.py:plant", "--n-starts", "1"]
+    assert run("fit", *words, "--out", "est.json") == 0
+    assert run("show", "est.json") == 2
+    assert "--model your_file.py:plant" in capsys.readouterr().err
+    assert run("show", "est.json", "--model", "my_plant.py:plant") == 0
+
+
+def test_the_bias_of_a_plant_with_a_delay(day, capsys):
+    """Straight lines, which a delay refuses, were asked for by default."""
+    late = PLANT + """
+plant = fq.GreyBox(matrices, [*plant.parameters, fq.Parameter("T", 0.01)], input_delay="T")
+"""
+    (day / "late.py").write_text(late)
+    words = ["--model", "late.py:plant", "--chirp", "1", "20", "--factor", "2"]
+    assert run("bias", *words, "--base-dt", "0.005") == 0
+    assert "nan" not in capsys.readouterr().out
+
+
 def test_options_of_the_plant(day, capsys):
     assert run("fit", "train.csv", "--model", "my_plant.py:made", "--fix", "d", "--bounds", "k",
                "50", "95", "--prior", "J", "0.1", "0.01", "--n-starts", "2") == 0  # fmt: skip

@@ -108,3 +108,18 @@ def test_a_pulse_from_rest_is_no_code(size):
     u = np.zeros(1000)
     u[100:150] = size
     assert ("u", "code") not in _found(u)
+
+
+@pytest.mark.parametrize(
+    ("step", "which", "found"), [(0.0, "y", True), (0.0, "u", False), (1e-3, "y", False)]
+)
+def test_a_sensor_that_stands_still_for_a_while(step, which, found):
+    """A twentieth of the record was none; an encoder that rests, and a command, may stand still."""
+    rng = np.random.default_rng(5)
+    x = np.cumsum(rng.standard_normal(6000))
+    x[3000:3300] = x[3000]
+    x = np.round(x / step) * step if step else x
+    other = rng.standard_normal(6000)
+    record = fq.Record(x, other, 1e-3) if which == "u" else fq.Record(other, x, 1e-3)
+    told = fq.check_record(record)
+    assert ("stuck" in set(told["finding"])) == found

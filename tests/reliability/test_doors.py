@@ -3,6 +3,7 @@
 import os
 import random
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -302,3 +303,36 @@ def test_a_full_disk_leaves_no_file(day, tmp_path):
         assert not list(small.iterdir())
     finally:
         subprocess.run(["umount", str(small)], check=True)
+
+
+def test_what_is_no_file_is_not_replaced(day):
+    """A link to a device had the device itself replaced by a file."""
+    (day / "est.json").symlink_to("/dev/full")
+    os.mkfifo(day / "pipe.json")
+    for name in ("est.json", "pipe.json"):
+        words = "a.csv", "--model", "first-order", "--out", name, "--force"
+        code, said = told(day, "fit", *words)
+        assert code == 2
+        assert "no file but a device or a pipe" in said
+        with pytest.raises(ValueError, match="device or a pipe"):
+            fq.write(fq.read(day / "a.csv"), (day / name).rename(day / name.replace("json", "csv")),
+                     overwrite=True)  # fmt: skip
+    assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+
+
+@pytest.mark.parametrize("words", [["--version"], ["frf", "a.csv"], ["show", "none.csv"]])
+def test_without_a_screen_nothing_breaks(day, words):
+    run = subprocess.run(
+        ["sh", "-c", f"{' '.join([*FREQID, *words])} >&-"], cwd=day, capture_output=True, text=True,
+        check=False, timeout=100,
+    )  # fmt: skip
+    assert "Traceback" not in run.stderr
+
+
+def test_a_screen_without_a_sign_shows_the_rest(day):
+    run = subprocess.run(
+        [*FREQID, "fit", "a.csv", "--model", "first-order"], cwd=day, capture_output=True,
+        check=False, timeout=100, env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    assert b"verdict" in run.stdout
+    assert not run.stderr

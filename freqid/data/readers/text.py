@@ -133,6 +133,8 @@ def _text(path: Path) -> str:
                 raw = stream.read(limit + 1)
                 if len(raw) > limit:
                     check_size(path, _TWICE * len(raw), "its text")
+    except PermissionError:
+        raise
     except (OSError, EOFError, lzma.LZMAError, zlib.error, *_NO_ARCHIVE) as error:
         raise damaged("a compressed table", error) from None
     if b"\x00" in raw[:1000] and not raw.startswith((b"\xff\xfe", b"\xfe\xff")):
