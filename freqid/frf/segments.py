@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import repeat
 
 import numpy as np
 import scipy
@@ -22,8 +24,9 @@ _WHOLE = ("boxcar", "rectangular")
 _TIED = 0.01
 # samples whose segments are taken at once
 _PIECE = 1 << 19
-# samples that are transformed at once: more leave the processor's cache
-_NEAR = 160_000
+# samples that are transformed at once: more leave the processor's cache; fewer than so many are
+# transformed before a thread has begun
+_NEAR, _BESIDE = 160_000, 1 << 15
 
 # segments that show where in one the input acts; relative difference of some that are the same
 _SHOWN, _SAME = 16, 1e-6
@@ -95,15 +98,23 @@ class Averaging:
             )
             for name, x in channels.items()
         }
-        for at in range(0, count, batch):
-            found = {}
-            for name, view in views.items():
-                some = view[:, at : at + batch]
-                tapered, lines = (each[:, : some.shape[1]] for each in near[name])
-                self._level(some, tapered)
-                tapered *= window
-                found[name] = np.fft.rfft(tapered, out=lines)
-            yield found
+
+        def transformed(name: str, at: int) -> ComplexArray:
+            some = views[name][:, at : at + batch]
+            tapered, lines = (each[:, : some.shape[1]] for each in near[name])
+            self._level(some, tapered)
+            tapered *= window
+            return np.fft.rfft(tapered, out=lines)
+
+        starts = range(0, count, batch)
+        if batch * length < _BESIDE or callable(self.detrend):
+            for at in starts:
+                yield {name: transformed(name, at) for name in views}
+            return
+        # inputs and outputs beside one another: numpy lets other threads run meanwhile
+        with ThreadPoolExecutor(max_workers=2) as pool:
+            for at in starts:
+                yield dict(zip(views, pool.map(transformed, views, repeat(at)), strict=True))
 
     def density(self, length: int, dt: float) -> tuple[FloatArray, FloatArray]:
         """Frequencies (Hz), and what makes |X|² a density of one side, in units squared per Hz."""
