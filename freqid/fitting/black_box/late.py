@@ -53,6 +53,25 @@ def in_step(reading: Reading, shifts: Sequence[int], least: int = 0) -> Reading:
     return reading.of_part(moved).with_(delayed=False)
 
 
+def outputs_in_step(reading: Reading, shifts: Sequence[int]) -> Reading:
+    """The reading with each output that many samples sooner, where all are known."""
+    record = reading.data
+    if not isinstance(record, Record) or record.factor > 1:
+        raise InputError("outputs are moved on a record whose input and output go in step")
+    if not any(shifts):
+        return reading
+    first = max(*(-q for q in shifts), 0)
+    count = record.n_samples - first - max(*shifts, 0)
+    if 2 * count < record.n_samples:
+        raise InputError("the delay outlasts half of the data")
+    outputs = [record.outputs[first + q : first + q + count, o] for o, q in enumerate(shifts)]
+    moved = Record(
+        record.inputs[first : first + count], np.column_stack(outputs), record.dt, record.hold,
+        input_names=record.input_names, output_names=record.output_names,
+    )  # fmt: skip
+    return reading.of_part(moved)
+
+
 def plant_in_step(model: GreyBox, readings: Sequence[Reading]) -> tuple[GreyBox, list[Reading]]:
     """The plant with less than a sample of delay, on the data with the rest taken off."""
     shifts = whole_samples(model, readings[0])

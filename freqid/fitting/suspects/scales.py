@@ -21,6 +21,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.late_instead import late_for_another
+from freqid.fitting.suspects.late_outputs import late_output
 from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
@@ -85,7 +86,11 @@ class _Channel:
 
 def instead(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
     """A finding where what speaks is another thing: a channel on another scale, or late."""
-    return on_another_scale(inquiry, scene, named) or late_for_another(inquiry, scene, named)
+    return (
+        on_another_scale(inquiry, scene, named)
+        or late_output(inquiry, scene, named)
+        or late_for_another(inquiry, scene, named)
+    )
 
 
 def on_another_scale(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:

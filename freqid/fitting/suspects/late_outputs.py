@@ -1,0 +1,125 @@
+"""One of several outputs late, as where its channel comes over another bus: a plant in which each
+answers at once explains that by parameters that are none, or by one mode more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from freqid.checks import FloatArray, InputError
+from freqid.data import Record
+from freqid.fitting.black_box.late import outputs_in_step
+from freqid.fitting.findings import Finding
+from freqid.fitting.fitters import SearchOptions, fitter_of
+from freqid.fitting.reading import Reading
+from freqid.fitting.residuals import errors_of
+from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
+from freqid.fitting.suspects.refits import plain
+from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked
+from freqid.models import GreyBox
+
+# what a late output looks like, and the part of a mode's evidence that one unknown needs
+_LOOKS_LIKE = (*LACKING, *BENT, *LIKELY, "asymmetric", "unsteady", "feedback", "jump", "backlash")
+_AS_MUCH = 0.8
+# samples by which an output is late at the most, and parts of them that are tried on the way
+_FARTHEST, _STEPS = 64, (1, -1)
+
+
+def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
+    """A finding where one output some samples late explains the data better than what speaks, each
+    unknown counted.
+    """
+    model, structure, readings = inquiry.model, inquiry.minimum.structure, inquiry.readings
+    if named[0].name not in _LOOKS_LIKE or not isinstance(model, GreyBox) or not plain(structure):
+        return []
+    if model.n_outputs < 2 or not all(_in_step(r) for r in readings):
+        return []
+    start = dict(zip(structure.physical_names, structure.values, strict=False))
+    shifted = _Shifted(model.with_values(**start), readings)
+    now = shifted.spread(0, 0)
+    if now is None:
+        return []
+    tried = [t for o in range(model.n_outputs) if (t := shifted.best(o, now)) is not None]
+    if not tried:
+        return []
+    left, lag, output = min(tried)
+    n = max(scene.freedom, 2)
+    told = n * (now - left) - np.log(n) - 2 * np.log(2 * _FARTHEST * model.n_outputs)
+    enough = [
+        (_AS_MUCH if a.name in LACKING else 1.0) * max(evidence(scene, a), 0.0) for a in named
+    ]
+    if told <= max(enough):
+        return []
+    record = readings[0].data
+    assert isinstance(record, Record)
+    rows = f"{abs(lag)} sample{'s' if abs(lag) > 1 else ''}"
+    when, way = ("later", "up") if lag > 0 else ("earlier", "down")
+    text = (
+        f"output {record.output_names[output]!r} comes {1e3 * abs(lag) * record.dt:.4g} ms {when} "
+        f"than the other outputs say, as where its channel is logged {rows} "
+        f"{'late' if lag > 0 else 'early'}; move that channel {way} by {rows}, or give the model "
+        "what delays it"
+    )
+    return [Finding("delay", text, number=lag * record.dt)]
+
+
+def _in_step(reading: Reading) -> bool:
+    record = reading.data
+    return isinstance(record, Record) and record.factor == 1 and not reading.in_time
+
+
+@dataclass(frozen=True)
+class _Shifted:
+    """The plant fitted to the data with one output some samples sooner."""
+
+    begun: GreyBox
+    readings: Sequence[Reading]
+
+    def best(self, output: int, now: float) -> tuple[float, int, int] | None:
+        """The least spread on the way from none, ``now``, to where it no longer falls: that, the
+        samples, and the output; None where it rises both ways.
+        """
+        least, lag = now, 0
+        for step in _STEPS:
+            far = step
+            while abs(far) <= _FARTHEST:
+                left = self.spread(output, far)
+                if left is None or left >= least:
+                    break
+                least, lag, far = left, far, 2 * far
+            if lag:
+                break
+        if not lag:
+            return None
+        # it lies within half of the last step and twice it
+        width = abs(lag) // 2
+        while width:
+            for near in (lag - width, lag + width):
+                left = self.spread(output, near) if near else None
+                if left is not None and left < least:
+                    least, lag = left, near
+            width //= 2
+        return least, lag, output
+
+    def spread(self, output: int, lag: int) -> float | None:
+        """Mean over outputs of the logarithm of what is left of them, which is what the data are
+        worth where each has noise of a size of its own; None where nothing can be fitted.
+        """
+        shifts = [lag * (o == output) for o in range(self.begun.n_outputs)]
+        try:
+            moved = [outputs_in_step(r, shifts) for r in self.readings]
+            est = fitter_of(self.begun)(self.begun, moved, SearchOptions(n_starts=1))
+            found = [errors_of(est.model, r) for r in moved]
+        except (InputError, np.linalg.LinAlgError, ArithmeticError):
+            return None
+        power: FloatArray = np.sum(
+            [(e.multiplicity * np.abs(e.error) ** 2).sum(axis=1) / e.n_samples for e in found],
+            axis=0,
+        )
+        samples = sum(e.n_samples for e in found)
+        return float(np.mean(np.log(np.maximum(power / samples, 1e-300))))
