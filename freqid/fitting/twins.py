@@ -226,11 +226,12 @@ def _apart(start: float, value: float) -> float:
 def _alike(structure: GreyStructure, x: FloatArray, other: FloatArray) -> bool:
     """Whether the responses of the plant at both are equal, as a look at a few frequencies says."""
     try:
-        one, two = structure.at(x), structure.at(other)
-        poles = np.abs(np.linalg.eigvals(one.state_space().A))
-        poles = poles[poles > 0]
-        at = np.geomspace(0.3 * poles.min(), 3 * poles.max(), 4) if poles.size else np.ones(1)
-        first, second = _response(one, at), _response(two, at)
+        with np.errstate(all="ignore"):
+            one, two = structure.at(x), structure.at(other)
+            poles = np.abs(np.linalg.eigvals(one.state_space().A))
+            poles = poles[poles > 0]
+            at = np.geomspace(0.3 * poles.min(), 3 * poles.max(), 4) if poles.size else np.ones(1)
+            first, second = _response(one, at), _response(two, at)
     except Exception:  # the user's function may raise anything at a point
         return False
     return bool(np.abs(first - second).max() <= _EQUAL * np.abs(first).max())

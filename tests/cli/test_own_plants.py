@@ -85,9 +85,12 @@ def test_a_plant_of_ones_own_is_asked_for_as_it_is_typed(day, capsys):
 
 def test_the_bias_of_a_plant_with_a_delay(day, capsys):
     """Straight lines, which a delay refuses, were asked for by default."""
-    late = PLANT + """
+    late = (
+        PLANT
+        + """
 plant = fq.GreyBox(matrices, [*plant.parameters, fq.Parameter("T", 0.01)], input_delay="T")
 """
+    )
     (day / "late.py").write_text(late)
     words = ["--model", "late.py:plant", "--chirp", "1", "20", "--factor", "2"]
     assert run("bias", *words, "--base-dt", "0.005") == 0

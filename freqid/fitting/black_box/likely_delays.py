@@ -29,27 +29,30 @@ def likely_delays(
 ) -> list[float]:
     """Delays to begin from (s): the known one, or those at which black boxes explain most.
 
-    Where no record can be put in step, delays that are half a turn apart at the top of the band.
+    Where no data can be put in step, delays that are half a turn apart at the top of the band.
     """
     if spec.delay != "estimate":
         return [float(spec.delay)]
     shape, tried = channel_counts(readings[0].data), []
-    responses = all(isinstance(r.data, FrequencyResponse) and unheld(r) for r in readings)
-    # a response tells delays of up to a turn between its lines
-    gap = min(float(np.diff(r.data.omega).max()) for r in readings) if responses else 0.0  # type: ignore[union-attr]
-    step = np.pi / 4 / omega[-1]
+    responses = all(isinstance(r.data, FrequencyResponse) for r in readings)
+    continuous = responses and all(unheld(r) for r in readings)
+    step = np.pi / 4 / omega[-1] if continuous else unit
     if responses:
+        # one tells delays of up to a turn between its lines
+        gap = min(float(np.diff(r.data.omega).max(initial=1e-300)) for r in readings)  # type: ignore[union-attr]
         lags = [*range(min(int(np.pi / gap / step), _TURNS))]
     else:
         far = far_lags(readings[0], spec.poles, _LONGEST)
         lags = sorted({*range(_LONGEST), *(q for q in around(far) if q >= 0)})
     for q in lags:
         try:
-            if responses:
-                delay = q * step
+            # to a sampled plant a delay is whole samples and a part of one, begun at its middle
+            delay = q * step if continuous else max(q - 0.5, 0.0) * unit
+            if continuous:
                 point = folded(spec.poles, readings, omega, delay)[2]
+            elif responses:
+                point = _behind_cost(spec.poles, readings, q * unit)
             else:
-                delay = max(q - 0.5, 0.0) * unit
                 point = _in_step_cost(spec.poles, readings, (q,) * shape[1])
         except (InputError, np.linalg.LinAlgError):
             # longer ones leave even fewer samples
@@ -63,6 +66,15 @@ def likely_delays(
         return list(dict.fromkeys(delay for _, delay in chosen))
     apart = min(max(np.pi / omega[-1], unit), 20 * unit)
     return (apart * np.arange(8)).tolist()
+
+
+def _behind_cost(order: int, readings: Sequence[Reading], delay: float) -> float:
+    """What a sampled black box leaves of responses whose inputs are late by whole samples (s)."""
+    lines, plane = lines_in_plane(readings)
+    late = [e.behind(delay) for e in lines]
+    chart = Chart(identify(late, order, True), True, plane, readings[0].sample_time)
+    point = Objective(chart, late).point(np.zeros(chart.size))
+    return np.inf if point is None else point.cost
 
 
 def _in_step_cost(order: int, readings: Sequence[Reading], shifts: Sequence[int]) -> float:

@@ -53,6 +53,8 @@ _PARALLEL, _PART = 1e-4, 0.1
 _SAME = 1e-6
 # variances that an output left open takes at the most, and samples between such delays
 _OPEN, _NEXT = 10.0, 0.5
+# samples beside the best delay from which it is found again
+_BESIDE = 0.4
 
 
 @fits(TransferFunction, black_box=True)
@@ -110,6 +112,12 @@ def fit_transfer_function(
     rng = np.random.default_rng(options.seed if options is not None else 0)
     for _ in range(asked - len(ends)):
         descend(_by_chance(spec.poles, omega, rng), best[2])
+    if estimated and asked == 1 and before is None:
+        # other delays end in lobes of their own: whether a lobe has one end its neighbours tell
+        for apart in (-_BESIDE, _BESIDE):
+            delay = max(float(best[0].x[-1]) + apart, 0.0) * unit
+            for poles in _starting_poles(spec, readings, omega, delay)[:1]:
+                descend(poles, delay)
     solution, objective, _ = min(ends, key=left)
     open_end = _OPEN * solution.cost / objective.n_rows if estimated else 0.0
     agreed = sum(_alike(end[0], solution, open_end) for end in ends)

@@ -103,7 +103,9 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     with np.errstate(all="ignore"):
         shift = np.abs(np.array(steps)) / np.sqrt(variance)
     largest = float(np.nanmax(np.where(np.isfinite(shift), shift, np.nan), initial=0.0))
-    chance = scene.tied(scene.left, ways)
+    # an experiment that tells fewer of them has no part in the rest
+    most_told = max(map(len, ways))
+    chance = scene.tied(scene.left, [np.pad(V, ((0, most_told - len(V)), (0, 0))) for V in ways])
     f = chi / degrees / (scene.together(scene.left) * chance.times)
     below = min(freedom, scene.noise_freedom, chance.lines)
     p = float(scipy.stats.f.sf(f, min(chance.degrees, degrees), below))

@@ -4,7 +4,7 @@ answers at once explains that by parameters that are none, or by one mode more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +26,9 @@ from freqid.models import GreyBox
 # what a late output looks like, and the part of a mode's evidence that one unknown needs
 _LOOKS_LIKE = (*LACKING, *BENT, *LIKELY, "asymmetric", "unsteady", "feedback", "jump", "backlash")
 _AS_MUCH = 0.8
-# samples by which an output is late at the most, and parts of them that are tried on the way
-_FARTHEST, _STEPS = 64, (1, -1)
+# samples by which an output is late at the most, and those that are tried both ways, for the cost
+# may rise between none and the right ones
+_FARTHEST, _TRIED = 64, (1, 2, 3, 4, 6, 8)
 
 
 def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
@@ -81,30 +82,29 @@ class _Shifted:
     readings: Sequence[Reading]
 
     def best(self, output: int, now: float) -> tuple[float, int, int] | None:
-        """The least spread on the way from none, ``now``, to where it no longer falls: that, the
-        samples, and the output; None where it rises both ways.
+        """The least spread, the samples that have it, and the output; None where it is ``now``,
+        with none.
         """
-        least, lag = now, 0
-        for step in _STEPS:
-            far = step
-            while abs(far) <= _FARTHEST:
-                left = self.spread(output, far)
-                if left is None or left >= least:
-                    break
-                least, lag, far = left, far, 2 * far
-            if lag:
-                break
+        known: dict[int, float] = {0: now}
+
+        def best_of(lags: Iterable[int]) -> int:
+            for lag in lags:
+                if lag not in known and abs(lag) <= _FARTHEST:
+                    left = self.spread(output, lag)
+                    known[lag] = np.inf if left is None else left
+            return min(known, key=lambda lag: known[lag])
+
+        lag = best_of(sign * q for q in _TRIED for sign in (1, -1))
         if not lag:
             return None
+        while abs(lag) >= _TRIED[-1] and best_of([2 * lag]) == 2 * lag:
+            lag *= 2
         # it lies within half of the last step and twice it
         width = abs(lag) // 2
         while width:
-            for near in (lag - width, lag + width):
-                left = self.spread(output, near) if near else None
-                if left is not None and left < least:
-                    least, lag = left, near
+            lag = best_of((lag - width, lag + width))
             width //= 2
-        return least, lag, output
+        return known[lag], lag, output
 
     def spread(self, output: int, lag: int) -> float | None:
         """Mean over outputs of the logarithm of what is left of them, which is what the data are
