@@ -265,3 +265,24 @@ def test_a_mode_of_the_noise_next_to_one_that_is_there_is_named():
         right, high = (fq.fit(fq.TransferFunction(n - 1, n), found) for n in (2, 4))
         assert "order too high" in [w.kind for w in high.warnings]
         assert "order too high" not in [w.kind for w in right.warnings]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5])
+def test_weights_by_what_is_left_hide_no_mode(seed):
+    """One pole for a resonance, its motion learnt as noise: trusted, 95 to 97 % explained in those
+    weights, none of the data.
+    """
+    rng = np.random.default_rng(seed)
+    dt, n = 0.01, 600
+    u = rng.standard_normal(n)
+    u = u if seed % 2 else np.convolve(u, np.ones(10) / 3, "same")
+    mode = np.array([[-0.09, 7.14], [-7.14, -0.09]]), np.array([[1], [0.3]]), np.array([[0.5, 1]])
+    sampled = scipy.signal.cont2discrete((*mode, np.zeros((1, 1))), dt)[:4]
+    y = scipy.signal.dlsim((*sampled, dt), u)[1][:, 0]
+    noise = scipy.signal.lfilter([1], [1, -0.9], rng.standard_normal(n + 200))[200:]
+    record = fq.Record(u, y + 0.005 * y.std() * noise / noise.std(), dt)
+    est = fq.fit(fq.OutputError(1), record, weights="noise")
+    assert fq.compare(est, record).fit_percent[0] < 10
+    assert est.verdict.grade == "doubt"
+    assert est.warnings[0].kind == "another mode"
+    assert fq.fit(fq.OutputError(2), record, weights="noise").verdict.trusted

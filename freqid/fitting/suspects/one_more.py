@@ -23,10 +23,9 @@ from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_variance
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
-from freqid.fitting.sight import poles_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.behind_delay import InStep, without_delay
-from freqid.fitting.suspects.halves import HOLDS_GOOD, modes_moved
+from freqid.fitting.suspects.harm import harming, hidden
 from freqid.fitting.suspects.lacking_mode import lacking_mode
 from freqid.fitting.suspects.scene import Scene, lines_beside
 from freqid.fitting.suspects.scores import Asked, Score
@@ -151,8 +150,9 @@ class _Comparison:
         found = Asked("another mode", test, "", p, trials=int(places))
         if isinstance(inquiry.model, GreyBox):
             alike = p < _RARE and self._without_a_mode(weighted, told[0][0])
-            return dataclasses.replace(found, name="structure") if alike else found
-        return _weighed(found, inquiry, scene, begun.on(inquiry.readings))
+            found = dataclasses.replace(found, name="structure") if alike else found
+            return hidden(found, inquiry, scene, begun)
+        return harming(found, inquiry, scene, begun)
 
     def _without_a_mode(self, readings: Sequence[Reading], more: float) -> bool:
         """Whether a black box of the plant's own order explains as much: it lacks no mode then."""
@@ -167,21 +167,6 @@ class _Comparison:
         minimum = self.inquiry.minimum
         seen = lines_beside(minimum.structure, readings)
         return polish(Objective(minimum.structure, seen), minimum.solution.x).cost
-
-
-def _weighed(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> Asked:
-    """One mode more than a black box, whose unknowns mean nothing by themselves: it harms by what
-    it explains where all lines count alike, and where modes move for it.
-    """
-    more = max(scene.cost - box.cost, 0.0) / max(scene.moving, 1e-300)
-    moved = modes_moved(poles_of(inquiry.model), [box.poles])
-    order = observed_order(inquiry.model) + 2
-    # where all lines count alike it may have gained nothing
-    share = (
-        f"another {100 * more:.2g} % of the data" if more > 0 else "more where the noise is weak"
-    )
-    words = f"a black box of order {order} explains {share}"
-    return dataclasses.replace(found, detail=words, harm=np.inf if moved > HOLDS_GOOD else more)
 
 
 def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:

@@ -27,7 +27,8 @@ def negligible(scene: Scene, a: Asked) -> bool:
     # a constant is much of the data, and tells nothing of what explains most of the rest
     energy = scene.moving if a.test.gain > _MOST * scene.cost else scene.energy
     little = a.test.gain < _NOTHING * energy and scene.cost < _QUIET * energy
-    return bool(little and not moves)
+    # what weights by what is left have taken for noise may be much where all lines count alike
+    return bool(little and not moves and not a.harm >= LITTLE)
 
 
 def finding_of(scene: Scene, a: Asked, readings: Sequence[Reading]) -> Finding:
