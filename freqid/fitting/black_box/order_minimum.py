@@ -36,6 +36,8 @@ _FAR = 0.3
 _CHARTS = 5
 # how far inside of the unit circle a pole of a stable start lies at the least
 _EDGE = 1e-9
+# starts where a pole lies at the end of the circle, how near to its axis, and how near to it
+_AWRY, _TURNING, _FAST = 6, 0.98, 0.9
 # a first descent that ends at so many times the cost of another is not followed
 _AWAY = 1.2
 # part of the data that a descent may leave that ends next to a line
@@ -110,10 +112,11 @@ class Orders:
         """The best of the starts, and of those that hold the order below."""
         chained = _chained(lines)
         own = self._begun_well(spec, lines, self.more)
-        if not chained and self.more:
+        more = self.more or (_AWRY if self.more is None and _mirrored(own) else 0)
+        if not chained and more:
             rng = np.random.default_rng(self.seed)
             others = [
-                scattered_model(lines, spec.order, spec.feedthrough, rng) for _ in range(self.more)
+                scattered_model(lines, spec.order, spec.feedthrough, rng) for _ in range(more)
             ]
             own = self._better(spec, lines, own, others)
         if chained or not 1 < spec.order <= HIGH:
@@ -168,6 +171,15 @@ def _unstable(found: Descent) -> bool:
     """Whether a pole lies outside of the unit circle."""
     chart, solution, _ = found
     return bool((np.abs(np.linalg.eigvals(chart.in_z(solution.x).A)) > 1).any())
+
+
+def _mirrored(found: Descent) -> bool:
+    """Whether a pole has run to where samples turn round each time, which no plant that is sampled
+    does and a descent that has lost its way may.
+    """
+    chart, solution, _ = found
+    poles = np.linalg.eigvals(chart.in_z(solution.x).A)
+    return bool((poles.real < -_TURNING * np.maximum(np.abs(poles), _FAST)).any())
 
 
 def with_poles_on_lines(found: Descent, experiments: Sequence[Experiment]) -> Descent:

@@ -118,11 +118,13 @@ def unlike(inquiry: Asking, scene: Scene) -> list[Asked]:
     names = np.array(getattr(scene.structure, "names", ()))
     # unknowns of a black box are none that anybody knows
     named = str(names[free][told]) if len(names) == len(free) else ""
-    stepped = Asked("unlike experiments", test, "relative", p, named)
-    if len(scene.seen) > _APART:
-        return [stepped]
-    parted = _fitted_apart(inquiry, scene, each(inquiry.readings), "unlike experiments")
-    return [stepped if parted is None else _better(stepped, parted)]
+    # of two either may be the odd one
+    odd = f"data[{most}]" if len(scene.seen) > 2 else ""
+    found = Asked("unlike experiments", test, "relative", p, named, channel=odd)
+    if len(scene.seen) <= _APART:
+        parted = _fitted_apart(inquiry, scene, each(inquiry.readings), found.name)
+        found = found if parted is None else _better(found, parted)
+    return [dataclasses.replace(found, channel=odd)]
 
 
 def _lengths(rows: FloatArray) -> FloatArray:

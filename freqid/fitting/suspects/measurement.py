@@ -230,6 +230,11 @@ def amplitude(scene: Scene, model: Model) -> Columns | None:
     levels = [_level(s) for s in records]
     if len(levels) < 2 or np.ptp(levels) < _LEVELS * max(levels):
         return None
+    ends = np.argmin(levels), np.argmax(levels)
+    others = min(np.ptp(np.delete(levels, i)) for i in ends)
+    if len(levels) > 2 and others < _LEVELS * max(levels):
+        # the only one of another level may be odd for whatever reason
+        return None
     middle = float(np.mean(levels))
     free = ~scene.held
     return Columns(

@@ -63,9 +63,9 @@ class Asked:
     """A suspect with its test, its unit, what it was found at, and its corrected p.
 
     What is ``certain`` the data themselves show, however little it explains; ``odd`` is a hold that
-    no converter has; ``channel`` is the output that it is said of. ``harm`` is the part of the
-    data's energy that a black box lacks for it, infinite where its modes move; ``much`` says that
-    its size makes a black box another.
+    no converter has; ``channel`` is the output, or the experiment, that it is said of. ``harm`` is
+    the part of the data's energy that a black box lacks for it, infinite where its modes move;
+    ``much`` says that its size makes a black box another.
     """
 
     name: str

@@ -97,6 +97,7 @@ def words(name: str, size: float, unit: str, detail: str, channel: str = "") -> 
         "feedback": "what the model leaves goes together with inputs still to come",
         "unlike experiments": (
             f"separate fits of the experiments differ by {100 * size:.3g} %{parameter}"
+            f"{f', {channel} from the others most of all' if channel else ''}"
         ),
         "amplitude": "the parameters change with the level of the input",
         "unsteady": f"the second half of the record differs from the first{halves}",
