@@ -30,6 +30,8 @@ def begins_anew(times: FloatArray) -> int | None:
     """The row in which times go back to where they were many rows before, as where a file holds
     two experiments, one after another; None where they do not.
     """
+    if len(times) < 2 * _ANEW or not np.isfinite(times).all():
+        return None
     steps = np.diff(times)
     back = np.flatnonzero(steps < 0) + 1 if np.median(steps) > 0 else ()
     for row in back:
@@ -50,8 +52,8 @@ def out_of_order(name: str, times: FloatArray, row: int) -> InputError:
             f"rows 0 to {anew - 1}, and from {anew} on"
         )
     return InputError(
-        f"{name} does not increase in row {row}, at {times[row]:g} s after {times[row - 1]:g} s; "
-        "sort or repair the rows"
+        f"{name} does not increase in row {row}: it goes back or stands still, at {times[row]:g} s "
+        f"after {times[row - 1]:g} s; sort or repair the rows"
     )
 
 
