@@ -130,3 +130,35 @@ def test_a_direct_term_takes_nothing_away(measured):
     )  # fmt: skip
     own, direct = (fq.fit(fq.OutputError(4, feedthrough=D), record).cost for D in (False, True))
     assert direct <= own
+
+
+def driven_by_levels(seed):
+    """A random plant of two inputs or outputs, its record, order and the energy of its noise."""
+    rng = np.random.default_rng(seed)
+    n, (p, m) = int(rng.integers(2, 5)), [(1, 2), (2, 1), (2, 2)][rng.integers(3)]
+    count, poles, A, i = int(rng.integers(300, 1000)), [], np.zeros((n, n)), 0
+    while len(poles) < n:
+        r = rng.uniform(0.8, 0.99)
+        if n - len(poles) > 1 and rng.random() < 0.5:
+            a = rng.uniform(0.05, 0.6)
+            poles += [r * np.exp(1j * a), r * np.exp(-1j * a)]
+        else:
+            poles.append(r if rng.random() < 0.6 else rng.uniform(0, 0.5))
+    while i < n:
+        z, pair = poles[i], 2 if np.iscomplex(poles[i]) else 1
+        own = [[z.real, z.imag], [-z.imag, z.real]]
+        A[i : i + pair, i : i + pair] = np.array(own)[:pair, :pair]
+        i += pair
+    B, C = rng.standard_normal((n, m)), rng.standard_normal((p, n))
+    u = np.repeat(rng.choice([-1.0, 1.0], (count // 3 + 1, m)), 3, axis=0)[:count]
+    y = scipy.signal.dlsim((A, B, C, np.zeros((p, m)), 1.0), u)[1]
+    noise = 10 ** rng.uniform(-2, -0.5) * y.std(axis=0) * rng.standard_normal(y.shape)
+    return fq.Record(u, y + noise, 1.0), n, float((noise**2).sum())
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("seed", [427, 441, 484])
+def test_a_pole_at_the_end_of_the_circle_is_looked_at_again(seed):
+    """These left more than their noise: a pole had run to -1, where nothing was."""
+    record, order, noise = driven_by_levels(seed)
+    assert fq.fit(fq.OutputError(order), record).cost < noise

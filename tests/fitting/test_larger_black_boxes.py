@@ -267,6 +267,7 @@ def test_a_mode_of_the_noise_next_to_one_that_is_there_is_named():
         assert "order too high" not in [w.kind for w in right.warnings]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [0, 1, 5])
 def test_weights_by_what_is_left_hide_no_mode(seed):
     """One pole for a resonance, its motion learnt as noise: trusted, 95 to 97 % explained in those

@@ -66,6 +66,7 @@ def test_a_black_box_that_explains_little_is_not_trusted(spec):
         assert not est.verdict.trusted
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("delay", "estimate", "weights"),
     [(0.1559, "local_rational", None), (0.1882, "local_rational", "noise"),

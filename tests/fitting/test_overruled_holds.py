@@ -26,6 +26,7 @@ def measured(seed, noise=0.2, h=H):
     return u, y + noise * y.std() * np.random.default_rng(seed).standard_normal(len(u))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("model", [PLANT, fq.TransferFunction(1, 2)])
 @pytest.mark.parametrize("seed", range(3))
 def test_what_another_hold_does_unseen_is_said(model, seed):

@@ -320,7 +320,8 @@ def test_what_is_no_file_is_not_replaced(day):
     assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
 
 
-@pytest.mark.parametrize("words", [["--version"], ["frf", "a.csv"], ["show", "none.csv"]])
+@pytest.mark.study
+@pytest.mark.parametrize("words", [["show", "none.csv"], ["--version"], ["frf", "a.csv"]])
 def test_without_a_screen_nothing_breaks(day, words):
     run = subprocess.run(
         ["sh", "-c", f"{' '.join([*FREQID, *words])} >&-"], cwd=day, capture_output=True, text=True,

@@ -37,7 +37,7 @@ _CHARTS = 5
 # how far inside of the unit circle a pole of a stable start lies at the least
 _EDGE = 1e-9
 # starts where a pole lies at the end of the circle, how near to its axis, and how near to it
-_AWRY, _TURNING, _FAST = 6, 0.98, 0.9
+_AWRY, _TURNING, _FAST = 6, 0.9, 0.9
 # a first descent that ends at so many times the cost of another is not followed
 _AWAY = 1.2
 # part of the data that a descent may leave that ends next to a line

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import InputError
-from freqid.data import input_dt
+from freqid.data import Record, input_dt
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
@@ -41,6 +41,15 @@ def possible_hold(inquiry: Asking, a: Asked) -> bool:
     hold, dt = inquiry.readings[0].hold, input_dt(inquiry.readings[0].data)
     own = hold.period if isinstance(hold, PeriodicHold) else dt
     return a.test.size < 0 or own + a.test.size <= dt
+
+
+def beyond_the_data(inquiry: Asking, a: Asked) -> bool:
+    """Whether a delay outlasts the records: a step that is much too long is told by a fit that is
+    far from any.
+    """
+    records = [r.data for r in inquiry.readings if isinstance(r.data, Record)]
+    longest = max((r.n_samples * r.dt for r in records), default=np.inf)
+    return a.name == "delay" and abs(a.test.size) > longest
 
 
 def fitted_again(inquiry: Asking, scene: Scene, a: Asked) -> Asked:

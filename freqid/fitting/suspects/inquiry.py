@@ -21,7 +21,14 @@ from freqid.fitting.suspects.coarse import coarse
 from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import LITTLE, confirmed, modes_differ
-from freqid.fitting.suspects.holds import HOLDS, fitted_again, possible_hold, remembered, unmirrored
+from freqid.fitting.suspects.holds import (
+    HOLDS,
+    beyond_the_data,
+    fitted_again,
+    possible_hold,
+    remembered,
+    unmirrored,
+)
 from freqid.fitting.suspects.leakage import leaking
 from freqid.fitting.suspects.no_values import no_values
 from freqid.fitting.suspects.one_more import one_more_mode
@@ -159,6 +166,7 @@ class Inquiry:
             if other is None or a.test.gain > other.test.gain:
                 merged[kind] = dataclasses.replace(a, name=kind)
         merged = {kind: fitted_again(self, scene, a) for kind, a in merged.items()}
+        merged = {kind: a for kind, a in merged.items() if not beyond_the_data(self, a)}
         if "saturation" in merged:
             # samples at a limit are what is left of peaks
             merged.pop("spikes", None)
