@@ -170,17 +170,20 @@ def other_units(e: Evidence) -> Iterator[Finding]:
         # who has the channel's own unit in his parameters means it
         others = {u: meant(u, base) for u in written if unit not in u}
         met = {u: m for u, m in others.items() if m and abs(m[1] / factor - 1) > _ROUNDED}
+        weight: Severity = "serious"
         if factor == 1:
-            # a length in mm may be converted in the model, a gain in mm/V is not
-            met = {u: m for u, m in met.items() if "/" in u}
+            # what is printed in mm the model may convert, which nobody sees
+            met, weight = {u: m for u, m in met.items() if "/" in u}, "minor"
         if met:
             wanted, size = next(iter(met.values()))
+            converted = " unless the model converts them" if factor == 1 else ""
             yield Finding(
                 "units",
                 f"{channel} is in {unit}, and parameters in {', '.join(sorted(met))} are those of "
                 f"a channel in {wanted}: their numbers are of another unit than is printed beside "
-                f"them; multiply the samples of {channel} by {factor / size:.6g}",
-                number=factor / size,
+                f"them{converted}; multiply the samples of {channel} by {factor / size:.6g}",
+                weight,
+                factor / size,
             )
 
 

@@ -71,7 +71,9 @@ def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[F
 
 def _in_step(reading: Reading) -> bool:
     record = reading.data
-    return isinstance(record, Record) and record.factor == 1 and not reading.in_time
+    # through a reference a plant is fitted in another way
+    plain = isinstance(record, Record) and record.factor == 1 and record.reference is None
+    return plain and not reading.in_time
 
 
 @dataclass(frozen=True)

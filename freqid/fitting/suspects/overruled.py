@@ -28,7 +28,7 @@ def overruled(inquiry: Asking, est: Estimate) -> list[Finding]:
     Nothing where the record remembers what any would be taken to have.
     """
     told = [_told(r) for r in inquiry.readings]
-    if all(hold is None for hold in told):
+    if all(hold is None for hold in told) or inquiry.minimum.prior is not None:
         return []
     readings = [
         r if hold is None else r.with_(hold=hold)
