@@ -22,7 +22,7 @@ _AT_BOUND = 1e-6
 _INSIDE = 5.0
 # beyond its physical range by so many standard errors a value is unphysical for certain
 _CERTAIN = 2.0
-# part of where a value began that is rounding, in data without noise
+# part of where a value began, or of a response, that is rounding
 _ROUNDED = 1e-6
 # standard deviations between data and prior that are chance once in two thousand fits, and part of
 # a prior's own that is the least which data can be seen to have taken off
@@ -31,8 +31,6 @@ _CONTRADICTED, _LEAST_TAKEN = 3.5, 0.05
 _FULL = 0.75
 # and one of so small a part is none: no converter is run so much faster than its log
 _NONE = 0.02
-# a response that rounding moves by so much is worth a word beside noise
-_ROUNDED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -279,15 +277,17 @@ def decimated(e: Evidence) -> Iterator[Finding]:
     if e.hold_period is None:
         return
     period, std = e.hold_period
-    if period < _NONE * e.dt:
+    if period < _NONE * e.dt and std > _FULL * e.dt:
+        told = f"the hold, {period:.2g} ± {std:.2g} s at {e.dt:.4g} s each; give the converter's"
+        yield Finding("not identifiable", told)
+    elif period < _NONE * e.dt:
         yield Finding(
             "no hold",
             f"a hold of {period:.3g} s is none at a sample time of {e.dt:.4g} s: the input is "
             "band-limited, or was measured and not commanded; use hold='bl'",
             number=period,
         )
-        return
-    if np.isfinite(std) and e.dt - period >= 3 * std and period <= _FULL * e.dt:
+    elif np.isfinite(std) and e.dt - period >= 3 * std and period <= _FULL * e.dt:
         yield Finding(
             "decimated",
             f"the input was held for {period:.4g} s and the sample time is {e.dt:.4g} s; this "

@@ -100,3 +100,20 @@ def test_what_an_estimated_hold_mends_is_no_doubt():
         assert any("decimated by about 10" in w for w in est.warnings)
         trusted += est.verdict.grade == "trust"
     assert trusted >= 3
+
+
+def test_a_hold_that_the_data_leave_open_is_not_said_to_be_none():
+    """ "The input is band-limited" of a hold of 0 ± 8 s at 2 ms: a direct term takes it up."""
+    lead = fq.GreyBox(
+        lambda g, z, p: ([[-p]], [[1.0]], [[g * (z - p)]], [[g]]),
+        [fq.Parameter("g", 3.0), fq.Parameter("z", 5.0), fq.Parameter("p", 40.0)],
+    )
+    said = []
+    for seed in range(4):
+        record = fq.simulate(lead, fq.chirp(0.5, 20, 8, 1e-3), 1e-3)
+        record = record.with_noise(0.02 * float(record.y.std()), seed=seed).decimate(2)
+        est = fq.fit(lead, record, band=(0.5, 20), hold="estimate", start={"z": 6.0, "p": 30.0})
+        open_ended = est.hold.period < 0.02 * record.dt
+        said += [w.kind for w in est.warnings] if open_ended else []
+    assert "no hold" not in said
+    assert "not identifiable" in said
