@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from freqid.data import DataSet, Record
 from freqid.fitting.cost.trends import trends_taken
 
 # notes of the data that an estimate repeats
 _MOST = 8
+# samples by which records are told apart at a glance
+_BEGIN = 32
 # trends by their number
 _TRENDS = ("", "constant", "straight line")
 
@@ -23,6 +27,25 @@ def notes_of(sets: Sequence[DataSet]) -> list[str]:
             f"no channel holds a {which}, as where that was taken off: what is left of it in the "
             "outputs is free"
         ] = None
+    each |= dict.fromkeys(_twice(sets))
     told = [f"data: {note}" for note in list(each)[:_MOST]]
     more = len(each) - len(told)
     return told if more < 1 else [*told, f"data: and {more} more (record.notes)"]
+
+
+def _twice(sets: Sequence[DataSet]) -> Iterator[str]:
+    """Records that are there twice: they count as experiments, and tell nothing new."""
+    seen: dict[tuple[object, bytes], int] = {}
+    for i, data in enumerate(sets):
+        if not isinstance(data, Record):
+            continue
+        # those that begin alike are looked at
+        first = seen.setdefault((data.y.shape, data.y[:_BEGIN].tobytes()), i)
+        one = sets[first]
+        if first == i or not isinstance(one, Record):
+            continue
+        if np.array_equal(one.y, data.y) and np.array_equal(one.u, data.u):
+            yield (
+                f"data[{first}] and data[{i}] are the same samples, which count as two "
+                "experiments: error bars are too small by that; leave one out"
+            )

@@ -254,3 +254,14 @@ def test_a_response_has_no_samples_at_rest():
     for data in (fq.h1(record, segment=100), [record, fq.h1(record, segment=100)]):
         with pytest.raises(ValueError, match="initial_state='zero' needs samples: a record"):
             fq.fit(fq.first_order(), data, initial_state="zero")
+
+
+def test_a_record_that_is_given_twice_is_noted():
+    """Its error bars were smaller by the root of two, without a word."""
+    plant = fq.first_order(b=20.0, a=20.0)
+    record = fq.simulate(plant, fq.white_noise(400, seed=1), 5e-3).with_noise(0.05, seed=1)
+    other = fq.simulate(plant, fq.white_noise(400, seed=2), 5e-3).with_noise(0.05, seed=2)
+    same = fq.Record(record.u.copy(), record.y.copy(), record.dt)
+    est = fq.fit(plant, [record, other, same])
+    assert [n for n in est.notes if "data[0] and data[2] are the same samples" in n]
+    assert not [n for n in fq.fit(plant, [record, other]).notes if "same samples" in n]
