@@ -27,7 +27,7 @@ def notes_of(sets: Sequence[DataSet]) -> list[str]:
             f"no channel holds a {which}, as where that was taken off: what is left of it in the "
             "outputs is free"
         ] = None
-    each |= dict.fromkeys(_twice(sets))
+    each |= dict.fromkeys([*_twice(sets), *_by_place(sets)])
     told = [f"data: {note}" for note in list(each)[:_MOST]]
     more = len(each) - len(told)
     return told if more < 1 else [*told, f"data: and {more} more (record.notes)"]
@@ -49,3 +49,16 @@ def _twice(sets: Sequence[DataSet]) -> Iterator[str]:
                 f"data[{first}] and data[{i}] are the same samples, which count as two "
                 "experiments: error bars are too small by that; leave one out"
             )
+
+
+def _by_place(sets: Sequence[DataSet]) -> Iterator[str]:
+    """Data of which some channels have the names of the first, and others do not."""
+    for i, data in enumerate(sets[1:], 1):
+        for side in ("input_names", "output_names"):
+            own, first = getattr(data, side), getattr(sets[0], side)
+            other = [n for n in own if n not in first]
+            if other and len(other) < len(own):
+                yield (
+                    f"data[{i}] has {', '.join(other)} among its {side[:-6]}s, which the first has "
+                    f"not ({', '.join(first)}): taken by place"
+                )

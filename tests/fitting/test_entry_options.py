@@ -265,3 +265,21 @@ def test_a_record_that_is_given_twice_is_noted():
     est = fq.fit(plant, [record, other, same])
     assert [n for n in est.notes if "data[0] and data[2] are the same samples" in n]
     assert not [n for n in fq.fit(plant, [record, other]).notes if "same samples" in n]
+
+
+def test_channels_that_are_taken_by_place_are_noted():
+    plant = fq.GreyBox(
+        lambda a: ([[-a, 0], [0, -2 * a]], [[a], [a]], [[1, 0], [0, 1]], None),
+        [fq.Parameter("a", 10.0)],
+    )
+    records = [
+        fq.simulate(plant, fq.white_noise(300, seed=k), 5e-3).with_noise(0.05, seed=k)
+        for k in range(2)
+    ]
+    named = [
+        fq.Record(r.u, r.y, r.dt, output_names=["wm", name])
+        for r, name in zip(records, ("wl", "wx"), strict=True)
+    ]
+    est = fq.fit(plant, named)
+    assert [n for n in est.notes if "data[1] has wx among its outputs" in n]
+    assert not fq.fit(plant, [named[0], named[0].slice(0, 1)]).notes
