@@ -27,14 +27,14 @@ def notes_of(sets: Sequence[DataSet]) -> list[str]:
             f"no channel holds a {which}, as where that was taken off: what is left of it in the "
             "outputs is free"
         ] = None
-    each |= dict.fromkeys([*_twice(sets), *_by_place(sets)])
     told = [f"data: {note}" for note in list(each)[:_MOST]]
     more = len(each) - len(told)
+    told = [*_twice(sets), *_by_place(sets), *told]
     return told if more < 1 else [*told, f"data: and {more} more (record.notes)"]
 
 
 def _twice(sets: Sequence[DataSet]) -> Iterator[str]:
-    """Records that are there twice: they count as experiments, and tell nothing new."""
+    """The first record that is there twice: it counts as two experiments, and tells nothing new."""
     seen: dict[tuple[object, bytes], int] = {}
     for i, data in enumerate(sets):
         if not isinstance(data, Record):
@@ -46,19 +46,21 @@ def _twice(sets: Sequence[DataSet]) -> Iterator[str]:
             continue
         if np.array_equal(one.y, data.y) and np.array_equal(one.u, data.u):
             yield (
-                f"data[{first}] and data[{i}] are the same samples, which count as two "
+                f"data: records {first} and {i} are the same samples, which count as two "
                 "experiments: error bars are too small by that; leave one out"
             )
+            return
 
 
 def _by_place(sets: Sequence[DataSet]) -> Iterator[str]:
-    """Data of which some channels have the names of the first, and others do not."""
+    """The first data of which some channels have the names of the first, and others do not."""
     for i, data in enumerate(sets[1:], 1):
         for side in ("input_names", "output_names"):
             own, first = getattr(data, side), getattr(sets[0], side)
             other = [n for n in own if n not in first]
             if other and len(other) < len(own):
                 yield (
-                    f"data[{i}] has {', '.join(other)} among its {side[:-6]}s, which the first has "
-                    f"not ({', '.join(first)}): taken by place"
+                    f"data: record {i} has {', '.join(other)} among its {side[:-6]}s, which the "
+                    f"first has not ({', '.join(first)}): taken by place"
                 )
+                return

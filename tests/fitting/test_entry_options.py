@@ -263,7 +263,7 @@ def test_a_record_that_is_given_twice_is_noted():
     other = fq.simulate(plant, fq.white_noise(400, seed=2), 5e-3).with_noise(0.05, seed=2)
     same = fq.Record(record.u.copy(), record.y.copy(), record.dt)
     est = fq.fit(plant, [record, other, same])
-    assert [n for n in est.notes if "data[0] and data[2] are the same samples" in n]
+    assert [n for n in est.notes if "records 0 and 2 are the same samples" in n]
     assert not [n for n in fq.fit(plant, [record, other]).notes if "same samples" in n]
 
 
@@ -281,5 +281,5 @@ def test_channels_that_are_taken_by_place_are_noted():
         for r, name in zip(records, ("wl", "wx"), strict=True)
     ]
     est = fq.fit(plant, named)
-    assert [n for n in est.notes if "data[1] has wx among its outputs" in n]
+    assert [n for n in est.notes if "record 1 has wx among its outputs" in n]
     assert not fq.fit(plant, [named[0], named[0].slice(0, 1)]).notes
