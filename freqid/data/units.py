@@ -119,7 +119,7 @@ def multiple(unit: str) -> tuple[str, float] | None:
     >>> multiple("mNm"), multiple("rad")
     (('N m', 0.001), ('rad', 1.0))
     """
-    spelled = re.sub(r"[·*]", " ", unit).strip()
+    spelled = _spelled(unit)
     return coherent(unit) or ((spelled, 1.0) if spelled in _OTHERS else None)
 
 

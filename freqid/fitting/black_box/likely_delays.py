@@ -14,8 +14,10 @@ from freqid.fitting.black_box.late import description_length, in_step
 from freqid.fitting.black_box.response_poles import folded, unheld
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
 from freqid.fitting.cost.charts import Chart
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading
+from freqid.lti import Plane
 from freqid.models import TransferFunction
 
 # samples of delay that are tried beside the likely ones, and how many delays are followed
@@ -44,6 +46,7 @@ def likely_delays(
     else:
         far = far_lags(readings[0], spec.poles, _LONGEST)
         lags = sorted({*range(_LONGEST), *(q for q in around(far) if q >= 0)})
+    seen: tuple[Sequence[SpectralExperiment], Plane] | None = None
     for q in lags:
         try:
             # to a sampled plant a delay is whole samples and a part of one, begun at its middle
@@ -51,7 +54,8 @@ def likely_delays(
             if continuous:
                 point = folded(spec.poles, readings, omega, delay)[2]
             elif responses:
-                point = _behind_cost(spec.poles, readings, q * unit)
+                seen = seen or lines_in_plane(readings)
+                point = _behind_cost(spec.poles, *seen, q * unit, readings[0].sample_time)
             else:
                 point = _in_step_cost(spec.poles, readings, (q,) * shape[1])
         except (InputError, np.linalg.LinAlgError):
@@ -68,11 +72,12 @@ def likely_delays(
     return (apart * np.arange(8)).tolist()
 
 
-def _behind_cost(order: int, readings: Sequence[Reading], delay: float) -> float:
+def _behind_cost(
+    order: int, lines: Sequence[SpectralExperiment], plane: Plane, delay: float, dt: float
+) -> float:
     """What a sampled black box leaves of responses whose inputs are late by whole samples (s)."""
-    lines, plane = lines_in_plane(readings)
     late = [e.behind(delay) for e in lines]
-    chart = Chart(identify(late, order, True), True, plane, readings[0].sample_time)
+    chart = Chart(identify(late, order, True), True, plane, dt)
     point = Objective(chart, late).point(np.zeros(chart.size))
     return np.inf if point is None else point.cost
 

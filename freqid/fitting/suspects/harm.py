@@ -16,13 +16,16 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.models import observed_order
 
+# from here on nothing is said of what is found
+_CHANCE = 0.01
+
 
 def harming(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> Asked:
     """One mode more than a black box, whose unknowns mean nothing by themselves: it harms by what
     it explains in the fit's own weights, or where all lines count alike, and where modes move for
     it.
     """
-    plain = _unweighted(inquiry, scene, box)
+    plain = _unweighted(found, inquiry, scene, box)
     box = box.on(inquiry.readings)
     more = max(max(scene.cost - box.cost, 0.0) / max(scene.moving, 1e-300), plain)
     moved = modes_moved(poles_of(inquiry.model), [box.poles])
@@ -38,16 +41,16 @@ def hidden(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> Asked
     """The same beside a grey box, to which whatever is lacking is harm, where weights by what it
     leaves hide how much that is.
     """
-    more = _unweighted(inquiry, scene, box)
+    more = _unweighted(found, inquiry, scene, box)
     return found if more < LITTLE else dataclasses.replace(found, harm=more)
 
 
-def _unweighted(inquiry: Asking, scene: Scene, box: Reference) -> float:
+def _unweighted(found: Asked, inquiry: Asking, scene: Scene, box: Reference) -> float:
     """Part of the energy of the data that a black box explains besides where all lines count alike:
-    what a model lacks may have been learnt as noise. 0 where the weights are these.
+    what a model lacks may have been learnt as noise. 0 where the weights are these, or by chance.
     """
     readings = inquiry.readings
-    if all(r.noise.plain for r in readings):
+    if found.p_value > _CHANCE or all(r.noise.plain for r in readings):
         return 0.0
     box = box.on([r.with_(noise=BiasIntegral()) for r in readings])
     left = energy = 0.0

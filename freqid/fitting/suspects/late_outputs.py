@@ -21,7 +21,7 @@ from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
-from freqid.models import GreyBox
+from freqid.models import GreyBox, Model
 
 # what a late output looks like, and the part of a mode's evidence that one unknown needs
 _LOOKS_LIKE = (*LACKING, *BENT, *LIKELY, "asymmetric", "unsteady", "feedback", "jump", "backlash")
@@ -42,9 +42,8 @@ def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[F
         return []
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     shifted = _Shifted(model.with_values(**start), readings)
-    now = shifted.spread(0, 0)
-    if now is None:
-        return []
+    # as the fit itself has left them: one start again may end elsewhere
+    now = _spread(model, readings)
     tried = [t for o in range(model.n_outputs) if (t := shifted.best(o, now)) is not None]
     if not tried:
         return []
@@ -109,19 +108,23 @@ class _Shifted:
         return known[lag], lag, output
 
     def spread(self, output: int, lag: int) -> float | None:
-        """Mean over outputs of the logarithm of what is left of them, which is what the data are
-        worth where each has noise of a size of its own; None where nothing can be fitted.
-        """
+        """What is left with that output so much sooner; None where nothing can be fitted."""
         shifts = [lag * (o == output) for o in range(self.begun.n_outputs)]
         try:
             moved = [outputs_in_step(r, shifts) for r in self.readings]
             est = fitter_of(self.begun)(self.begun, moved, SearchOptions(n_starts=1))
-            found = [errors_of(est.model, r) for r in moved]
+            return _spread(est.model, moved)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return None
-        power: FloatArray = np.sum(
-            [(e.multiplicity * np.abs(e.error) ** 2).sum(axis=1) / e.n_samples for e in found],
-            axis=0,
-        )
-        samples = sum(e.n_samples for e in found)
-        return float(np.mean(np.log(np.maximum(power / samples, 1e-300))))
+
+
+def _spread(model: Model, readings: Sequence[Reading]) -> float:
+    """Mean over outputs of the logarithm of what a model leaves of them, which is what the data are
+    worth where each has noise of a size of its own.
+    """
+    found = [errors_of(model, r) for r in readings]
+    power: FloatArray = np.sum(
+        [(e.multiplicity * np.abs(e.error) ** 2).sum(axis=1) / e.n_samples for e in found], axis=0
+    )
+    samples = sum(e.n_samples for e in found)
+    return float(np.mean(np.log(np.maximum(power / samples, 1e-300))))

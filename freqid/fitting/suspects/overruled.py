@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.data import StampedRecord, input_dt
+from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.findings import Finding
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import Asking
@@ -29,6 +30,9 @@ def overruled(inquiry: Asking, est: Estimate) -> list[Finding]:
     """
     told = [_told(r) for r in inquiry.readings]
     if all(hold is None for hold in told) or inquiry.minimum.prior is not None:
+        return []
+    if HoldPeriod.name in est.names:
+        # it was left to the data
         return []
     readings = [
         r if hold is None else r.with_(hold=hold)
