@@ -12,6 +12,7 @@ from freqid.bias.apparent import Sampling, held_response
 from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
 from freqid.bias.maps import bias_map, hold_label
+from freqid.bias.sweeps import Sweep
 from freqid.checks import (
     FloatArray,
     InputError,
@@ -73,6 +74,9 @@ def experiment_design(
         d_optimal: add for each rate the multisine that determines the parameters best together.
         criterion: ``"worst"`` or ``"rms"`` of the parameters' relative errors makes the ranking.
         n_jobs: as in ``bias_map``.
+
+    A chirp starts from rest, and the fit's initial state is free; of a multisine one period in
+    steady state is logged. What the plant's priors tell is left out.
 
     Returns a DataFrame, best first: excitation, low, high, factor, dt, hold, error, worst (the
     parameter that is worst), then bias, std and error of each parameter, relative to its value:
@@ -136,17 +140,19 @@ def experiment_design(
         )
         keys = ["hold", "factor", "spectrum"]
         parts = dict(tuple(biases.groupby(keys, sort=False)))
-        for given, factor, name in itertools.product(assumed, some, chosen):
-            label = hold_label(given)
-            sampling = Sampling(hold, base_dt, factor)
-            part = parts[(label, factor, name)]
-            bias, std = _bias_and_scatter(
-                plant, chosen[name], sampling, given, part, noise_std, duration
-            )
-            low, high = edges[name]
-            row = {"excitation": name, "low": low, "high": high, "factor": factor}
-            row |= {"dt": sampling.dt, "hold": label}
-            rows.append(row | _score(names, bias, std, criterion))
+        for name, spectrum in chosen.items():
+            sweep = Sweep.of(plant, spectrum, duration, hold, base_dt)
+            for given, factor in itertools.product(assumed, some):
+                label = hold_label(given)
+                sampling = Sampling(hold, base_dt, factor)
+                part = parts[(label, factor, name)]
+                bias, std = _bias_and_scatter(
+                    plant, spectrum, sampling, given, part, noise_std, duration, sweep
+                )
+                low, high = edges[name]
+                row = {"excitation": name, "low": low, "high": high, "factor": factor}
+                row |= {"dt": sampling.dt, "hold": label}
+                rows.append(row | _score(names, bias, std, criterion))
     table = pd.DataFrame(rows).sort_values("error", kind="stable", ignore_index=True)
     table.attrs["best"] = table.iloc[0].to_dict()
     return table
@@ -170,6 +176,7 @@ def _bias_and_scatter(
     biases: pd.DataFrame,
     noise_std: float,
     duration: float,
+    sweep: Sweep | None,
 ) -> tuple[FloatArray, FloatArray]:
     """Relative bias and relative standard error of each parameter, (P,)."""
     structure = GreyStructure(plant)
@@ -183,7 +190,12 @@ def _bias_and_scatter(
     expected = Conditions(spectrum, sampling).expected(held_response(plant, sampling.hold), seen)
     count = duration / sampling.dt
     x = values / structure.scale
-    covariance = error_covariance(x, structure, expected, assumed, noise_std, count)
+    seen = None if sweep is None else sweep.covariance(x, structure, sampling.factor, hold)
+    if seen is None:
+        covariance = error_covariance(x, structure, expected, assumed, noise_std, count)
+    else:
+        folded = error_covariance(x, structure, expected, assumed, 0.0, count)
+        covariance = noise_std**2 * seen + folded
     return (values - true) / size, np.sqrt(np.diag(covariance)) * structure.scale / size
 
 

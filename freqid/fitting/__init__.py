@@ -5,6 +5,7 @@ It may import checks, lti, data, excitation, models and frf; inside, ``cost`` st
 """
 
 from freqid.fitting.channel_order import in_order_of
+from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.digits import in_digits, of_error, rounded
 from freqid.fitting.entry import fit
@@ -20,6 +21,7 @@ from freqid.fitting.met import data_digest, met, offset_is_free, remembered
 from freqid.fitting.noise_models import GivenWeights, Weights
 from freqid.fitting.order_selection import select_order
 from freqid.fitting.reading import Reading
+from freqid.fitting.reading_sets import read_for
 from freqid.fitting.residuals import errors_at_stamps, errors_in_time, line_errors
 from freqid.fitting.search.batched import Answers, descend
 from freqid.fitting.search.descent import settled

@@ -175,54 +175,6 @@ def test_pictures_say_what_the_table_says(table, plant):
     assert len(plane.lines) == 3
 
 
-def test_experiment_design_finds_what_the_noise_and_the_hold_ask_for(plant):
-    table = fq.experiment_design(
-        plant, T1, noise_std=0.05, factors=[1, 10], holds=[None, "zoh"], d_optimal=True
-    )
-    best = table.attrs["best"]
-    assert best["excitation"].startswith("D-optimal")
-    assert best["factor"] == 1
-    names = [p.name for p in plant.free_parameters]
-    errors = table[[f"error {n}" for n in names]].to_numpy()
-    assert np.allclose(errors.max(axis=1), table["error"])
-    slow = table[table["factor"] == 10]
-    remembered, assumed = slow[slow["hold"] == "remembered"], slow[slow["hold"] == "zoh"]
-    assert remembered["error"].median() < 0.05 < assumed["error"].min()
-    below = remembered[remembered["high"] < 100]
-    assert (below[[f"bias {n}" for n in names]].abs() < 1e-6).all(axis=None)
-    # noise twice as strong doubles what is left without bias
-    twice = fq.experiment_design(plant, T1, noise_std=0.1, factors=[1], bands=[(10, 80)])
-    once = fq.experiment_design(plant, T1, noise_std=0.05, factors=[1], bands=[(10, 80)])
-    assert np.allclose(twice["error"], 2 * once["error"])
-    axes = fq.plot_design(table)
-    assert axes.shape == (2, 2)
-    with pytest.raises(ValueError, match="noise_std"):
-        fq.experiment_design(plant, T1, noise_std=0)
-
-
-def test_a_d_optimal_spectrum_satisfies_the_equivalence_theorem(plant):
-    """Kiefer and Wolfowitz: the variance of the response is at most P, and P where power is."""
-    best = fq.d_optimal_spectrum(plant, (2, 80), 10.0, 5e-3, TRUE)
-    assert best.power(5e-3) == pytest.approx(1)
-    assert len(best.frequencies) < 15
-    names = [p.name for p in plant.free_parameters]
-    f = np.arange(20, 801) / 10
-    step = 1e-5
-    J = []
-    for n in names:
-        up = plant.with_values(**{n: plant[n] * (1 + step)})
-        down = plant.with_values(**{n: plant[n] * (1 - step)})
-        at = [m.frequency_response(2 * np.pi * f, TRUE).response[0, 0] for m in (up, down)]
-        J.append((at[0] - at[1]) / (2 * step))
-    J = np.array(J)
-    each = np.real(J[:, None].conj() * J[None])
-    place = np.round(np.array(best.frequencies) * 10).astype(int) - 20
-    H = np.tensordot(each[:, :, place], best.powers, (2, 0))
-    variance = np.einsum("ijk,ji->k", each, np.linalg.inv(H))
-    assert variance.max() < 5 * 1.02
-    assert np.allclose(variance[place], 5, rtol=0.03)
-
-
 def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
     """Nodes that are too coarse for its end are no reason to call a row of the batch settled."""
     from freqid.bias import map_rows
@@ -245,28 +197,3 @@ def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
     )
     assert len(alone) == 2
     assert table["converged"].all()
-
-
-@pytest.mark.parametrize("plant", [fq.two_mass(), fq.first_order()], ids=["two-mass", "lag"])
-def test_a_d_optimal_multisine_keeps_within_the_amplitude(plant):
-    amplitude, duration, noise = 3.0, 4.0, 0.05
-    table = fq.experiment_design(
-        plant, 1e-3, noise_std=noise, amplitude=amplitude, duration=duration, factors=[1],
-        bands=[(5, 60)], d_optimal=True,
-    )  # fmt: skip
-    row = table[table["excitation"].str.startswith("D-optimal")].iloc[0]
-    best = fq.d_optimal_spectrum(plant, (5, 60), duration, 1e-3)
-    # the signal itself, as whoever runs the experiment makes it
-    share = np.zeros(round((best.frequencies[-1] - best.frequencies[0]) * duration) + 1)
-    lines = np.round((np.array(best.frequencies) - best.frequencies[0]) * duration).astype(int)
-    share[lines] = best.powers
-    ends = best.frequencies[0], best.frequencies[-1]
-    u = fq.multisine(ends, duration, 1e-3, powers=share)
-    u *= amplitude / np.abs(u).max()
-    power = np.array(best.powers) / np.sum(best.powers) * np.mean(u**2)
-    told = fq.asymptotic_fit(
-        plant, fq.LineSpectrum(best.frequencies, power), 1e-3, noise_std=noise, duration=duration
-    )
-    for p in plant.free_parameters:
-        std = told.parameters["std"][p.name] / abs(p.value)
-        assert row[f"std {p.name}"] == pytest.approx(std, rel=0.03)
