@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -55,7 +55,7 @@ def experiment_design(
     bands: Sequence[tuple[float, float]] | None = None,
     holds: Iterable[Hold | str | None] = (None,),
     true_hold: Hold | None = None,
-    method: str = "linear",
+    method: Literal["linear", "log"] = "linear",
     d_optimal: bool = False,
     criterion: str = "worst",
     n_jobs: int | None = None,
@@ -190,12 +190,13 @@ def _bias_and_scatter(
     expected = Conditions(spectrum, sampling).expected(held_response(plant, sampling.hold), seen)
     count = duration / sampling.dt
     x = values / structure.scale
-    seen = None if sweep is None else sweep.covariance(x, structure, sampling.factor, hold)
-    if seen is None:
+    told = None if sweep is None else sweep.covariance(x, structure, sampling.factor, hold)
+    if told is None:
         covariance = error_covariance(x, structure, expected, assumed, noise_std, count)
     else:
+        # what only the ends tell has no folds
         folded = error_covariance(x, structure, expected, assumed, 0.0, count)
-        covariance = noise_std**2 * seen + folded
+        covariance = noise_std**2 * told + np.where(np.isfinite(folded), folded, 0)
     return (values - true) / size, np.sqrt(np.diag(covariance)) * structure.scale / size
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -109,7 +109,7 @@ class ChirpSpectrum(InputSpectrum):
 
     low: float
     high: float
-    method: str = "linear"
+    method: Literal["linear", "log"] = "linear"
     amplitude: float = 1.0
 
     def __post_init__(self) -> None:
