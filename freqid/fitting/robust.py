@@ -46,10 +46,11 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     for _ in range(_STEPS):
         # what integrates without noise leaves out the line at zero
         readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
+        cut = [r.with_(skip_zero=s.skip_zero) for r, s in zip(cut, seen, strict=True)]
         if est.minimum.objective.noiseless(est.minimum.cost):
             # of what is but rounding no sample is off
             break
-        cut, inside, count = _cut(est, readings)
+        cut, inside, count = _cut(est, readings, cut)
         before, (est, seen) = est, work(cut, est)
         std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
@@ -65,13 +66,21 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     return est, cut
 
 
-def _cut(est: Estimate, readings: Sequence[Reading]) -> tuple[list[Reading], float, int]:
-    """The readings with their errors cut, the part that is not, and how many are far off."""
+def _cut(
+    est: Estimate, readings: Sequence[Reading], fitted: Sequence[Reading]
+) -> tuple[list[Reading], float, int]:
+    """The readings with their errors cut, the part that is not, and how many are far off.
+
+    ``fitted`` are those that the estimate is of: what is cut from them has no part in the initial
+    states, either.
+    """
     cut, inside, every, far = [], 0, 0, 0
-    for r in readings:
-        record = r.data
+    for r, own in zip(readings, fitted, strict=True):
+        record, seen = r.data, own.data
         assert isinstance(record, Record)
-        error = errors_of(met_by(est, r), r).in_time()
+        assert isinstance(seen, Record)
+        error = errors_of(met_by(est, own), own).in_time()
+        error = error + (seen.outputs - record.outputs)[: len(error)]
         scale = np.median(np.abs(error), axis=0) / _MEDIAN
         limit = _CUT * np.where(scale > 0, scale, np.inf)
         held = np.clip(error, -limit, limit)
