@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from freqid.data import FrequencyResponse
@@ -50,6 +51,20 @@ class Naming(Asking, Protocol):
     def named(self) -> Sequence[Asked]:
         """Suspects that speak, the one that explains most first."""
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class Lone:
+    """A part of what is asked about, fitted for itself."""
+
+    minimum: Minimum
+    model: Model
+    readings: Sequence[Reading]
+    share: Share | None = None
+
+    def apart(self, parting: Parting) -> list[Estimate | None]:
+        """Its parts are those of the whole."""
+        return []
 
 
 def equally_weighted(reading: Reading) -> bool:

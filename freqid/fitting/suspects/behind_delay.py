@@ -2,36 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 from freqid.fitting.black_box.late import plant_in_step
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
-from freqid.fitting.estimate import Estimate
-from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
-from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.parts import Parting
+from freqid.fitting.suspects.asking import Asking, Lone
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.witness import Share
-from freqid.models import Model
 
 
-@dataclass(frozen=True, eq=False)
-class InStep:
+class InStep(Lone):
     """A fit that is asked about, on data whose inputs come as soon as the plant answers."""
-
-    minimum: Minimum
-    model: Model
-    readings: Sequence[Reading]
-    share: Share | None = None
-
-    def apart(self, parting: Parting) -> list[Estimate | None]:
-        """Its parts are those of the data as they are."""
-        return []
 
 
 def without_delay(inquiry: Asking) -> tuple[InStep, Scene] | None:

@@ -24,11 +24,12 @@ from freqid.fitting.noise_models import MeasuredNoise, NoiseModel, tells_varianc
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.at_places import at_places
 from freqid.fitting.suspects.behind_delay import InStep, without_delay
 from freqid.fitting.suspects.harm import harming, hidden
 from freqid.fitting.suspects.lacking_mode import lacking_mode
 from freqid.fitting.suspects.scene import Scene, lines_beside
-from freqid.fitting.suspects.scores import Asked, Score
+from freqid.fitting.suspects.scores import Asked, Score, of_several
 from freqid.fitting.suspects.weighing import LOOSE
 from freqid.fitting.uncertainty.shared_noise import chance_of
 from freqid.lti import directions
@@ -45,6 +46,8 @@ _AS_MUCH, _KEPT = 0.9, 0.1
 
 def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
     """A black box with one mode more, which may lie at any of the lines."""
+    if isinstance(inquiry.minimum.structure, PlacedStructure):
+        return _at_places(inquiry)
     if getattr(inquiry.model, "delay_sources", ()) and not isinstance(inquiry, InStep):
         return _behind_delay(inquiry, scene)
     model = _met(inquiry)
@@ -65,6 +68,17 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
         both = [t for t in (told, comparison.told(readings)) if t is not None]
         told = min(both, key=lambda a: a.p_value, default=None)
     return [] if told is None else [told]
+
+
+def _at_places(inquiry: Asking) -> list[Asked]:
+    """The same at each place alone: what all of them lack is of one kind."""
+    found = [a for lone in at_places(inquiry) for a in one_more_mode(*lone)]
+    if not found:
+        return []
+    first = min(found, key=lambda a: a.p_value)
+    gain = sum(a.test.gain for a in found if a.p_value < _RARE or a is first)
+    p = min(of_several(first.p_value, len(found)), 1.0)
+    return [dataclasses.replace(first, test=dataclasses.replace(first.test, gain=gain), p_value=p)]
 
 
 def _behind_delay(inquiry: Asking, scene: Scene) -> list[Asked]:
@@ -174,7 +188,7 @@ def _met(inquiry: Asking) -> GreyBox | DiscreteModel | None:
     model, minimum = inquiry.model, inquiry.minimum
     structure = minimum.structure
     late = model.late and not isinstance(inquiry, InStep)
-    if late or isinstance(structure, PlacedStructure) or minimum.prior is not None:
+    if late or minimum.prior is not None:
         return None
     if isinstance(structure, GreyStructure):
         return structure.at(minimum.x, 0)
