@@ -11,6 +11,7 @@ import numpy as np
 from freqid.bias.apparent import Sampling, held_response
 from freqid.bias.asymptotic import error_covariance, model_responses
 from freqid.bias.conditions import Conditions
+from freqid.bias.d_optimal import d_optimal_spectrum
 from freqid.bias.maps import bias_map, hold_label
 from freqid.bias.sweeps import Sweep
 from freqid.checks import (
@@ -30,18 +31,16 @@ from freqid.excitation import (
     InputSpectrum,
     LineSpectrum,
     least_crest,
-    multisine_lines,
 )
 from freqid.fitting import GreyStructure
-from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold, sampled_response
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, as_hold, known_hold
 from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# lines of a D-optimal design, and a share of the power below which one is left out
-_GRID_LINES = 4000
-_LEAST_SHARE = 1e-4
+# nepers by which a plant may grow in an experiment
+_GROWTH = 5.0
 
 
 def experiment_design(
@@ -98,12 +97,15 @@ def experiment_design(
     choice("criterion", criterion, ("worst", "rms"))
     an("plant", plant, GreyBox)
     counts = [whole("factors", f) for f in listed("factors", factors)]
+    _long_enough(plant, duration, positive("base_dt", base_dt, "s") * max(counts, default=1))
     hold = ZeroOrderHold(base_dt) if true_hold is None else true_hold
     known_hold("true_hold", hold)
-    grid = (
+    grid = _long_bands(
         _bands(plant, base_dt)
         if bands is None
-        else [Band.of(each, 0.5 / base_dt, "bands") for each in listed("bands", bands)]
+        else [Band.of(each, 0.5 / base_dt, "bands") for each in listed("bands", bands)],
+        duration,
+        bands is None,
     )
     spectra: dict[str, InputSpectrum] = {
         f"chirp {low:g}-{high:g} Hz": ChirpSpectrum(low, high, method, amplitude)
@@ -156,6 +158,39 @@ def experiment_design(
     table = pd.DataFrame(rows).sort_values("error", kind="stable", ignore_index=True)
     table.attrs["best"] = table.iloc[0].to_dict()
     return table
+
+
+def _long_bands(
+    grid: Sequence[tuple[float, float]], duration: float, chosen: bool
+) -> list[tuple[float, float]]:
+    """Those that have a period; ValueError for one that has none, or where none of those ``chosen``
+    has.
+    """
+    kept = [b for b in grid if b[1] * duration >= 1]
+    if len(kept) == len(grid) or (chosen and kept):
+        return kept
+    low, high = next(b for b in grid if b[1] * duration < 1)
+    raise InputError(
+        f"bands hold {low:g} to {high:g} Hz, of which duration={duration:g} s is no period; take "
+        "longer"
+    )
+
+
+def _long_enough(plant: GreyBox, duration: float, dt: float) -> None:
+    """ValueError for a record of fewer samples than unknowns, or a plant that runs away in it."""
+    least = len(plant.free_parameters) + len(plant.poles)
+    if duration < least * dt:
+        raise InputError(
+            f"duration={duration:g} s has {int(duration / dt)} samples of {dt:g} s, the slowest of "
+            f"factors; {least} unknowns, initial states among them, need as many"
+        )
+    growth = float(plant.poles.real.max(initial=0.0))
+    if growth * duration > _GROWTH:
+        raise InputError(
+            f"plant has a pole at {growth:.4g} rad/s: within duration={duration:g} s it grows by "
+            f"10^{growth * duration / np.log(10):.0f} in open loop; design the experiment for the "
+            "closed loop"
+        )
 
 
 def _within(amplitude: float, spectrum: LineSpectrum, period: float, dt: float) -> LineSpectrum:
@@ -225,58 +260,3 @@ def _bands(plant: GreyBox, base_dt: float) -> list[tuple[float, float]]:
         for high in np.unique(highs)
         if high > 1.2 * low
     ]
-
-
-def d_optimal_spectrum(
-    plant: GreyBox,
-    band: tuple[float, float],
-    period: float,
-    dt: float,
-    hold: Hold | None = None,
-    *,
-    power: float = 1.0,
-) -> LineSpectrum:
-    """The multisine of a given power that makes the information's determinant largest.
-
-    Args: ``plant`` at its values; ``band`` in Hz, lines at multiples of 1/``period`` (s); ``dt`` of
-    the record in s; ``hold`` of the input, a zero-order hold at ``dt`` where not given; ``power``
-    in u².
-    Multiplicative updates (Fedorov and Hackl, Model-Oriented Design of Experiments, 1997, section
-    3.2) raise the determinant at each step. Returns a LineSpectrum of the few lines that carry
-    power. Raises ValueError for a band without lines, or lines that do not determine the
-    parameters.
-
-    >>> import freqid as fq
-    >>> best = d_optimal_spectrum(fq.first_order(), (1, 60), 1.0, 1e-3)
-    >>> len(best.frequencies) <= 3
-    True
-    """
-    an("plant", plant, GreyBox)
-    k = multisine_lines(band, period)
-    k = k[np.unique(np.linspace(0, len(k) - 1, _GRID_LINES).astype(int))]
-    structure = GreyStructure(plant)
-    between = ZeroOrderHold(dt) if hold is None else known_hold("hold", hold)
-    omega = 2 * np.pi * k / period
-    if isinstance(between, PeriodicHold) and omega[-1] * dt > np.pi * (1 + 1e-9):
-        raise InputError(f"band={band} Hz reaches beyond {0.5 / dt:g} Hz, the Nyquist limit")
-    _, dG = sampled_response(structure.realise(structure.start), omega, between)
-    P = len(structure.names)
-    rows = np.moveaxis(dG, -1, 0).reshape(len(k), P, -1)
-    each = (rows @ rows.conj().swapaxes(-1, -2)).real
-    share = np.full(len(k), 1 / len(k))
-    for _ in range(3000):
-        H = np.tensordot(share, each, 1)
-        scale = np.sqrt(np.diag(H))
-        try:
-            inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
-        except np.linalg.LinAlgError:
-            raise InputError(
-                f"band={band} Hz with a period of {period:g} s does not determine the parameters"
-            ) from None
-        gain = np.einsum("kij,ji->k", each, inverse) / P
-        if gain.max() < 1 + 1e-4:
-            break
-        share = share * gain
-    keep = share > _LEAST_SHARE
-    kept: FloatArray = share[keep] / share[keep].sum() * positive("power", power)
-    return LineSpectrum((k[keep] / period).tolist(), kept.tolist())

@@ -28,16 +28,20 @@ from freqid.data import (
     references_of,
 )
 from freqid.frf.distortion_levels import between_levels, grouped
+from freqid.frf.distortion_lines import excited_lines, unlike
 from freqid.frf.measured import measured
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# part of the strongest line's amplitude below which a line is not excited, and the ratio of a gap
-# between lines that are and an actuator's own distortion at lines that were never asked for
-_SILENT, _GAP = 1e-3, 3.0
-# part of its rms by which an input may differ between periods, and a likeness that is no chance
-_APERIODIC, _ALIKE = 0.65, 0.99
+# part of its rms by which an input may differ between periods
+_APERIODIC = 0.65
+# of even lines alone
+_EVEN = (
+    "only even lines were left out, which show even distortion: what odd distortion adds at "
+    'excited lines is not in the variance; leave odd ones out (grid="odd-odd"), or give several '
+    "realisations"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +53,9 @@ class Distortion:
     for each line and output: frequency (Hz), line (excited, odd or even), output and noise, the rms
     of both, distortion, the rms that noise does not explain (NaN where nothing tells it), and the
     output's name. ``method`` is ``"robust"``, ``"fast"`` or ``"noise"``, of one realisation without
-    lines left out between the others. ``levels`` compares levels of the input, a row each, where
-    there are several; the rest is then that of the highest. ``warnings`` says where the response
-    depends on the amplitude.
+    odd lines left out between the others. ``levels`` compares levels of the input, a row each,
+    where there are several; the rest is then that of the highest. ``warnings`` says where the
+    response depends on the amplitude, and where odd distortion has no lines to show on.
     """
 
     response: FrequencyResponse
@@ -128,14 +132,14 @@ def distortion(
     R = U if commanded is None else lines(commanded)[:, :, 0]
     f = np.arange(n // 2 + 1) / period
     inside = chosen(f, as_band(band, first.nyquist), positive=True)
-    excited = _excited(np.abs(R.mean(axis=1)).mean(axis=0), inside)
+    excited = excited_lines(np.abs(R.mean(axis=1)).mean(axis=0), inside)
     if not excited.any():
         raise InputError(f"input has no energy in band={band}; widen it")
     driven = R.mean(axis=1)[:, None, excited] if commanded is not None else None
     size = np.sqrt((np.abs(R.mean(axis=1)[:, excited]) ** 2).sum(axis=1) / 2)
     groups = grouped(size)
     for g in groups:
-        _unlike(R.mean(axis=1)[g][:, excited])
+        unlike(R.mean(axis=1)[g][:, excited])
     # below and above the excited lines a distortion says nothing of what it is among them
     quiet = inside & ~excited & (f > f[excited][0]) & (f < f[excited][-1])
     every = [
@@ -148,7 +152,7 @@ def distortion(
     levels, said = between_levels(
         [float(size[g].mean()) for g in groups], [d.response for d in every], freedom
     )
-    return dataclasses.replace(every[-1], levels=levels, warnings=said)
+    return dataclasses.replace(every[-1], levels=levels, warnings=[*every[-1].warnings, *said])
 
 
 def _of_one_level(
@@ -163,31 +167,6 @@ def _of_one_level(
     if len(U) > 1:
         return _robust(first, f, U, Y, driven, excited)
     return _fast(first, f, U[0], Y[0], excited, quiet)
-
-
-def _unlike(R: ComplexArray) -> None:
-    """ValueError for realisations that are one and the same."""
-    unit = R / np.linalg.norm(R, axis=1, keepdims=True)
-    alike = np.abs(unit @ unit.conj().T) - np.eye(len(R))
-    if len(R) > 1 and alike.max() > _ALIKE:
-        i, j = np.unravel_index(int(alike.argmax()), alike.shape)
-        raise InputError(
-            f"two records of one level have the same phases ({i} and {j} of it): distortion is the "
-            "same in both; give realisations of other phases, or join them as periods of one"
-        )
-
-
-def _excited(level: FloatArray, inside: BoolArray) -> BoolArray:
-    """Lines that were driven, not ones that an actuator's own distortion reaches."""
-    # of all lines: a band may hold none that are excited
-    most = level[1:].max()
-    down = np.sort(np.maximum(level[1:], _SILENT * most))[::-1]
-    ratio = down[:-1] / down[1:]
-    least = _SILENT * most
-    if len(ratio) and ratio.max() >= _GAP:
-        i = int(ratio.argmax())
-        least = np.sqrt(down[i] * down[i + 1])
-    return inside & (level > least) & (level > 0)
 
 
 def _mean_variance(X: ComplexArray, axis: int) -> FloatArray:
@@ -252,16 +231,17 @@ def _fast(
     spread = np.where(excited, np.nan, beyond)
     # distortion at excited lines is that of the odd lines around them
     odd = quiet & (number % 2 == 1)
-    around = odd if odd.any() else quiet
-    if around.any():
+    if odd.any():
         for own, seen in zip(spread, beyond, strict=True):
-            own[excited] = np.interp(f[excited], f[around], seen[around])
+            own[excited] = np.interp(f[excited], f[odd], seen[odd])
     table = _table(
         first, f[shown], kind[shown], output[:, shown], noise_y[:, shown], spread[:, shown]
     )
     total = noise + np.nan_to_num(spread[:, excited] / level) ** 2
-    method = "fast" if around.any() else "noise"
-    return _found(first, f[excited], G, total, level, noise, table, method)
+    found = _found(
+        first, f[excited], G, total, level, noise, table, "fast" if odd.any() else "noise"
+    )
+    return dataclasses.replace(found, warnings=[_EVEN] if quiet.any() and not odd.any() else [])
 
 
 def _found(

@@ -67,7 +67,11 @@ def mechanical(
     conditions = named_values("conditions", conditions)
     known = {p.name for p in parameters} | set(conditions)
     for letter, part in zip("MKDBC", matrices.parts, strict=True):
-        for wanted in part.names if part is not None else ():
+        if part is None:
+            continue
+        # what a default stands for is passed where it is meant by name
+        part.names = tuple(n for n in part.names if n in known or n not in part.optional)
+        for wanted in part.names:
             if wanted not in known:
                 raise InputError(
                     f"{letter} is a function of {wanted!r}, which is neither a parameter nor a "
@@ -86,13 +90,15 @@ class _Named:
     def __init__(self, letter: str, given: MatrixLike) -> None:
         self.letter, self.given = letter, given
         self.names: tuple[str, ...] = ()
+        self.optional: frozenset[str] = frozenset()
         self.takes_all = False
         if callable(given):
-            taken = inspect.signature(given).parameters.values()
+            taken = list(inspect.signature(given).parameters.values())
             own = inspect.Parameter
             self.takes_all = any(p.kind is own.VAR_KEYWORD for p in taken)
             asked = own.KEYWORD_ONLY, own.POSITIONAL_OR_KEYWORD
-            self.names = tuple(p.name for p in taken if p.kind in asked and p.default is p.empty)
+            self.names = tuple(p.name for p in taken if p.kind in asked)
+            self.optional = frozenset(p.name for p in taken if p.default is not p.empty)
 
     def near(self, values: Mapping[str, object], changed: set[str], before: Array) -> Array:
         """The matrix where only some values have changed since it was ``before``."""

@@ -141,3 +141,21 @@ def test_a_sweep_promises_the_errors_that_fits_to_it_have(case):
     scatter = np.sqrt(np.mean(np.square(errors), axis=0)) / promised
     assert (scatter > 0.45).all()
     assert (scatter < 1.75).all()
+
+
+def test_designs_that_cannot_be_run_are_refused():
+    lag = fq.first_order()
+    for given, what in [
+        ({"duration": 1e-4, "factors": [1]}, "duration=0.0001 s has 0 samples"),
+        ({"factors": [1_000_000]}, "0 samples of 1000 s"),
+        ({"duration": 1, "bands": [(1e-3, 2e-3)]}, "no period"),
+    ]:
+        with pytest.raises(ValueError, match=what):
+            fq.experiment_design(lag, 1e-3, noise_std=0.1, **given)
+    k = fq.Parameter("k", 900.0)
+    magnet = fq.GreyBox(lambda k: ([[0, 1], [k, 0]], [[0], [10.0]], [[1, 0]], None), [k])
+    with pytest.raises(ValueError, match=r"10\^130 in open loop"):
+        fq.experiment_design(magnet, 1e-3, noise_std=0.1)
+    # of the bands around slow poles those remain that have a period
+    slow = fq.first_order(0.02, 0.01)
+    assert len(fq.experiment_design(slow, 1.0, noise_std=0.1, duration=600, factors=[1])) > 3

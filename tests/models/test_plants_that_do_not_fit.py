@@ -119,3 +119,21 @@ def test_a_filter_of_two_channels():
     shaped = fq.FilteredSpectrum(both)
     with pytest.raises(ValueError, match="system has 2 inputs and 2 outputs"):
         shaped.density(np.linspace(0, 1, 5), 0.1)
+
+
+def test_what_a_matrix_names_with_a_default_is_passed():
+    """A condition with a default was frozen there: 5 of 5 trusted, 64 % off at 86 error bars."""
+    load = {"load": 0.0}
+    values = [fq.Parameter("m", 2.0), fq.Parameter("k", 50.0), fq.Parameter("d", 1.0)]
+
+    def mass(m, load=0.0, scale=1.0):
+        return [[(m + load) * scale]]
+
+    body = fq.mechanical(
+        mass, lambda k=3.0: [[k]], lambda d: [[d]], parameters=values, conditions=load
+    )
+    assert np.abs(body.poles[0]) ** 2 == pytest.approx(50 / 2)
+    assert np.abs(body.with_conditions(load=3.0).poles[0]) ** 2 == pytest.approx(50 / 5)
+    assert np.abs(body.with_values(k=80.0).poles[0]) ** 2 == pytest.approx(80 / 2)
+    with pytest.raises(ValueError, match="wide"):
+        fq.mechanical(lambda m, wide: [[m]], [[1.0]], parameters=values)
