@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
-from freqid.checks import Array, BoolArray, FloatArray, InputError, IntArray, finite, unknown
+from freqid.checks import BoolArray, FloatArray, InputError, IntArray, finite
+from freqid.validation.fleet_rows import FEWEST, check_columns, fitted_rows, there
 from freqid.validation.scatter import (
     cautious_variance,
     farthest_row,
@@ -23,12 +26,12 @@ if TYPE_CHECKING:
 LEVEL = 0.01
 # rows of a machine from which on single ones, and its order, may tell of a change
 _LEAST, _FEWEST = 4, 6
+# machines that tell the scatter of rows together
+_MACHINES = 5
 # scatters beyond which a row counts as no more than that when the order is looked at
 _CUT = 4.0
 # orders that are tried for each unit of one over the level, and numbers in them at the most
 _ORDERS, _NUMBERS = 20, 20_000_000
-# fitted rows that a table has to have to be asked
-FEWEST = 3
 # runs of rows grow by this factor, and borders of one are looked for so many rows off at most
 _LONGER, _REACH = 1.4, 200
 
@@ -46,18 +49,20 @@ def fleet_alarms(
     Two kinds of change are looked for, each at half of the level: a row that lies farther from its
     neighbours' common value than its standard error and the scatter between rows allow, and a
     lasting one, a step or a drift, after which rows differ from those before it. The latter is
-    judged against other orders of the same rows, and needs them in the order of time.
+    judged against other orders of the same rows, or by Student's t where few rows have too few
+    orders, and needs them in the order of time.
 
     Args:
         table: of ``fit_many``.
         parameter: one of its parameters.
-        by: a column to order the rows by, a date or a number; they are in order else.
+        by: a column to order the rows by, dates, numbers or ordered categories; they are in order
+            else.
         machine: a column that tells machines apart, each of which is compared with itself alone.
         level: probability that any row of a table without a change is marked, rows being
             independent but for what their machine has in common, and normal.
 
-    A machine has to have four rows for a single one to tell, and some more for a lasting change:
-    half of eight rows may be by chance what they are.
+    A machine has to have four rows for a single one to tell, and six for a lasting change. How rows
+    scatter beside their errors five machines and more tell together.
 
     Raises ValueError for unknown columns, fewer than three fitted rows, or a level that is none.
 
@@ -79,75 +84,42 @@ def fleet_alarms(
         )
     rows = np.flatnonzero(kept)
     if by is not None:
-        at = _there(table, "by", by, rows)
+        at = there(table, "by", by, rows)
         try:
             rows = rows[np.argsort(at, kind="stable")]
         except TypeError:
             raise InputError(f"by={by!r} holds values that have no order") from None
     groups = [rows]
     if machine is not None:
-        names = _there(table, "machine", machine, rows)
+        names = there(table, "machine", machine, rows)
         groups = [rows[names == name] for name in dict.fromkeys(names.tolist())]
     found = np.zeros(len(table), bool)
-    for group in groups:
-        if len(group) >= _LEAST:
-            found[group] = _changed(values[group], std[group], level / len(groups))
+    # those that can tell share the level
+    told = [group for group in groups if len(group) >= _LEAST]
+    fleet = _scatter_of_all(values, std, told)
+    for group in told:
+        found[group] = _changed(values[group], std[group], level / len(told), fleet)
     return found
 
 
-def _there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> Array:
-    """Values of a column in some rows; ValueError where one is missing."""
-    seen = table[column].iloc[rows]
-    if seen.isna().any():
-        raise InputError(f"{argument}={column!r}: row {rows[int(seen.isna().argmax())]} has none")
-    return seen.to_numpy()
+def _scatter_of_all(values: FloatArray, std: FloatArray, groups: Sequence[IntArray]) -> float:
+    """The variance between rows beside their errors that machines show together: few rows of one
+    may lie close by chance. None of it is known of few machines.
+    """
+    if len(groups) < _MACHINES:
+        return 0.0
+    left = [(values[g] - np.median(values[g])) * np.sqrt(len(g) / (len(g) - 1)) for g in groups]
+    return float(variance_between(np.concatenate(left), std[np.concatenate(groups)]))
 
 
-def check_columns(table: pd.DataFrame, **named: str | None) -> None:
-    """ValueError for a column, by the argument that names it, that the table has not."""
-    columns = [str(c) for c in table.columns]
-    for argument, column in named.items():
-        if column is not None and (not isinstance(column, str) or column not in columns):
-            raise InputError(unknown(argument, column, columns))
-
-
-def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Values and standard errors of a parameter, and which rows have both; ValueError for none."""
-    if not hasattr(table, "columns"):
-        raise InputError(f"table is a {type(table).__name__}; expected what fit_many returns")
-    if not hasattr(table, "iloc"):
-        kind = type(table).__module__.partition(".")[0]
-        raise InputError(f"table is a table of {kind}; give table.to_pandas()")
-    columns = [str(c) for c in table.columns]
-    known = [c for c in columns if f"{c}_std" in columns]
-    if not isinstance(parameter, str) or parameter not in columns:
-        raise InputError(unknown("parameter", parameter, known))
-    if parameter not in known:
-        raise InputError(f"parameter={parameter!r}: the table has no column {parameter}_std")
-    try:
-        values = table[parameter].to_numpy(dtype=float)
-        std = table[f"{parameter}_std"].to_numpy(dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"parameter={parameter!r}: its column holds no numbers ({error})"
-        ) from None
-    kept = np.isfinite(values) & np.isfinite(std)
-    if (std[kept] < 0).any():
-        row = int(np.argmax(kept & (std < 0)))
-        raise InputError(f"table: {parameter}_std={std[row]:g} in row {row} is no standard error")
-    if not kept.any():
-        raise InputError(
-            f"parameter={parameter!r}: no row was fitted; the column error says why, where it is"
-        )
-    return values, std, kept
-
-
-def _changed(x: FloatArray, s: FloatArray, level: float) -> BoolArray:
-    """Rows of one machine, in the order of time, that have changed."""
-    borders = _borders(x, s, level / 2)
+def _changed(x: FloatArray, s: FloatArray, level: float, least: float) -> BoolArray:
+    """Rows of one machine, in the order of time, that have changed, where the variance between them
+    beside their errors is the ``least`` or more.
+    """
+    borders = _borders(x, s, level / 2, least)
     far = float(scipy.stats.norm.isf(level / 4 / max(len(borders) - 2, 1)))
     while True:
-        parts = _Parts(x, s, borders)
+        parts = _Parts(x, s, borders, least)
         if len(borders) == 2:
             break
         # a run cuts off what lies before it, which need not differ from what comes after
@@ -155,10 +127,9 @@ def _changed(x: FloatArray, s: FloatArray, level: float) -> BoolArray:
         if between.min() > far:
             break
         borders = np.delete(borders, int(np.argmin(between)) + 1)
-    between_rows = float(cautious_variance(parts.left, s))
-    found = np.abs(parts.left) > farthest_row(s, between_rows, level / 2) * np.sqrt(
-        s**2 + between_rows
-    )
+    between_rows = max(float(cautious_variance(parts.left, s)), least)
+    far_off = farthest_row(s, between_rows, level / 2, least)
+    found = np.abs(parts.left) > far_off * np.sqrt(s**2 + between_rows)
     away = np.abs(parts.mean - parts.mean[0]) > far * np.hypot(parts.std, parts.std[0])
     away[0] = False
     return np.asarray(found | away[parts.number])
@@ -169,12 +140,12 @@ class _Parts:
     middle of theirs, and means of the parts with their standard errors.
     """
 
-    def __init__(self, x: FloatArray, s: FloatArray, borders: IntArray) -> None:
+    def __init__(self, x: FloatArray, s: FloatArray, borders: IntArray, least: float) -> None:
         count = len(borders) - 1
         self.number = np.repeat(np.arange(count), np.diff(borders))
         each = [self.number == i for i in range(count)]
         rough = np.array([np.median(x[own]) for own in each])
-        size = np.sqrt(s**2 + variance_between(x - rough[self.number], s))
+        size = np.sqrt(s**2 + np.maximum(variance_between(x - rough[self.number], s), least))
         size = np.where(size > 0, size, 1e-150)
         middle = np.array([weighted_median(x[own], size[own]) for own in each])
         self.left = x - middle[self.number]
@@ -185,12 +156,12 @@ class _Parts:
         self.std = 1 / np.sqrt(weight)
 
 
-def _borders(x: FloatArray, s: FloatArray, level: float) -> IntArray:
+def _borders(x: FloatArray, s: FloatArray, level: float, least: float) -> IntArray:
     """First rows of the parts between lasting changes, and the number of rows."""
     borders, open_parts = {0, len(x)}, [(0, len(x))]
     while open_parts:
         begin, end = open_parts.pop()
-        run = _lasting(x[begin:end], s[begin:end], level)
+        run = _lasting(x[begin:end], s[begin:end], level, least)
         if run is not None:
             ends = sorted({begin, begin + run[0], begin + run[1], end})
             borders.update(ends)
@@ -198,7 +169,7 @@ def _borders(x: FloatArray, s: FloatArray, level: float) -> IntArray:
     return np.array(sorted(borders))
 
 
-def _lasting(x: FloatArray, s: FloatArray, level: float) -> tuple[int, int] | None:
+def _lasting(x: FloatArray, s: FloatArray, level: float, least: float) -> tuple[int, int] | None:
     """The run of rows, from one up to another, that lies elsewhere than the others; None where
     other orders show as clear a one.
     """
@@ -212,6 +183,11 @@ def _lasting(x: FloatArray, s: FloatArray, level: float) -> tuple[int, int] | No
     y, w = np.clip(left, -_CUT * size, _CUT * size), 1 / size**2
     first, last = _runs(n)
     seen = _apart(y[None], w[None], first, last)[0]
+    at = int(np.argmax(seen))
+    run = int(first[at]), int(last[at])
+    if 2 / math.comb(n, run[1] - run[0]) > level:
+        # other orders are too few to be so rare
+        return _sharp(y, w, *run) if _clear(x, s, run, len(first), least) < level else None
     most, rng, beyond = seen.max(), np.random.default_rng(n), 0
     orders = int(min(_ORDERS / level, max(_NUMBERS // len(first), 2 / level)))
     batch = max(min(orders, 1_000_000 // len(first)), 1)
@@ -220,8 +196,26 @@ def _lasting(x: FloatArray, s: FloatArray, level: float) -> tuple[int, int] | No
         beyond += int((_apart(y[order], w[order], first, last).max(axis=1) >= most).sum())
         if beyond + 1 > level * (orders + 1):
             return None
-    at = int(np.argmax(seen))
-    return _sharp(y, w, int(first[at]), int(last[at]))
+    return _sharp(y, w, *run)
+
+
+def _clear(x: FloatArray, s: FloatArray, run: tuple[int, int], runs: int, least: float) -> float:
+    """The chance that normal rows have a run as far off as this one, among so many, by Student's t
+    of what scatters within the run and outside of it.
+    """
+    inside = np.zeros(len(x), bool)
+    inside[run[0] : run[1]] = True
+    left = x - np.where(inside, np.median(x[inside]), np.median(x[~inside]))
+    size = np.sqrt(s**2 + max(float(cautious_variance(left, s)), least))
+    if min(inside.sum(), (~inside).sum()) < _FEWEST // 2 or not (size > 0).all():
+        return 1.0
+    w, freedom = 1 / size**2, len(x) - 2
+    parts = [(np.average(x[own], weights=w[own]), w[own].sum()) for own in (inside, ~inside)]
+    (one, W), (other, rest) = parts
+    left = x - np.where(inside, one, other)
+    scale = max(float((w * left**2).sum()) / freedom, 1.0)
+    t = abs(one - other) / np.sqrt(scale * (1 / W + 1 / rest))
+    return float(min(2 * runs * scipy.stats.t.sf(t, freedom), 1.0))
 
 
 def _runs(n: int) -> tuple[IntArray, IntArray]:

@@ -157,3 +157,43 @@ def test_the_picture_of_machines():
     assert [t.get_text() for t in ax.texts] == ["m0", "m1", "m2"]
     labels = [t.get_text() for t in ax.get_legend().get_texts()]
     assert labels == ["changed (8 of 60; level 0.01 for all)"]
+
+
+def machines(seed, count, rows, scatter=1.0, step=0.0):
+    """Rows of many machines whose bars are 1, the first of which steps after half of its rows."""
+    x = 100 + scatter * np.random.default_rng(seed).standard_normal((count, rows))
+    x[0, rows // 2 :] += step
+    m = np.repeat(np.arange(count), rows)
+    return pd.DataFrame({"m": m, "k": x.ravel(), "k_std": 1.0})
+
+
+@pytest.mark.parametrize(("count", "rows", "step"), [(50, 16, 20), (10, 12, 20), (100, 10, 50)])
+def test_a_step_of_one_of_many_machines(count, rows, step):
+    """So few orders are no rarer than the level of one of them: none of these had been seen."""
+    seen = marked(machines(3, count, rows, step=step), machine="m")
+    assert set(range(rows // 2, rows)) <= set(seen)
+    assert set(seen) <= set(range(rows))
+
+
+def test_machines_without_alarms_share_no_level():
+    alone = machines(5, 1, 16, step=20)
+    beside = machines(6, 50, 1).assign(m=lambda t: t["m"] + 1)
+    assert marked(pd.concat([alone, beside], ignore_index=True), machine="m") == list(range(8, 16))
+
+
+@pytest.mark.study
+def test_few_rows_of_many_machines_keep_the_level():
+    """Where bars are 3 times too small: 9 of 10 fleets had been marked."""
+    assert not any(marked(machines(s, 60, 5, scatter=3.0), machine="m") for s in range(10))
+
+
+def test_the_order_of_a_column():
+    months = ["Oct", "Nov", "Dec", "Jan"]
+    rows = machines(7, 1, 36, step=8).sample(frac=1, random_state=1)
+    at = pd.Categorical.from_codes(rows.index // 9, months, ordered=True)
+    assert sorted(marked(rows.assign(by=at), by="by")) == np.flatnonzero(rows.index >= 18).tolist()
+    days = pd.date_range("2026-09-20", periods=36)
+    iso = days[rows.index].strftime("%Y-%m-%d")
+    assert len(marked(rows.assign(by=iso), by="by")) == 18
+    with pytest.raises(ValueError, match="whose order need not be that of time"):
+        fq.fleet_alarms(rows.assign(by=days[rows.index].strftime("%d.%m.%Y")), "k", by="by")

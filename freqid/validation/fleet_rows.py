@@ -1,0 +1,81 @@
+"""Rows of a fleet's table: those that were fitted, and the columns that order them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.checks import Array, BoolArray, FloatArray, InputError, IntArray, unknown
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# fitted rows that a table has to have to be asked
+FEWEST = 3
+
+
+def there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> Array:
+    """Values of a column in some rows; ValueError where one is missing."""
+    seen = table[column].iloc[rows]
+    if seen.isna().any():
+        raise InputError(f"{argument}={column!r}: row {rows[int(seen.isna().argmax())]} has none")
+    if argument == "by" and getattr(seen.dtype, "ordered", False):
+        return seen.cat.codes.to_numpy()
+    if argument == "by" and all(isinstance(v, str) for v in seen):
+        return _in_time(seen, column)
+    return seen.to_numpy()
+
+
+def _in_time(seen: pd.Series, column: str) -> Array:
+    """Dates that are written as year, month and day; ValueError for other texts, whose order as
+    texts need not be that of time.
+    """
+    import pandas as pd
+
+    try:
+        return pd.to_datetime(seen.astype(str), format="ISO8601", utc=True).to_numpy()
+    except (ValueError, TypeError):
+        raise InputError(
+            f"by={column!r} holds texts such as {str(seen.iloc[0])!r}, whose order need not be "
+            "that of time; give dates, as of pandas.to_datetime, or numbers"
+        ) from None
+
+
+def check_columns(table: pd.DataFrame, **named: str | None) -> None:
+    """ValueError for a column, by the argument that names it, that the table has not."""
+    columns = [str(c) for c in table.columns]
+    for argument, column in named.items():
+        if column is not None and (not isinstance(column, str) or column not in columns):
+            raise InputError(unknown(argument, column, columns))
+
+
+def fitted_rows(table: pd.DataFrame, parameter: str) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Values and standard errors of a parameter, and which rows have both; ValueError for none."""
+    if not hasattr(table, "columns"):
+        raise InputError(f"table is a {type(table).__name__}; expected what fit_many returns")
+    if not hasattr(table, "iloc"):
+        kind = type(table).__module__.partition(".")[0]
+        raise InputError(f"table is a table of {kind}; give table.to_pandas()")
+    columns = [str(c) for c in table.columns]
+    known = [c for c in columns if f"{c}_std" in columns]
+    if not isinstance(parameter, str) or parameter not in columns:
+        raise InputError(unknown("parameter", parameter, known))
+    if parameter not in known:
+        raise InputError(f"parameter={parameter!r}: the table has no column {parameter}_std")
+    try:
+        values = table[parameter].to_numpy(dtype=float)
+        std = table[f"{parameter}_std"].to_numpy(dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"parameter={parameter!r}: its column holds no numbers ({error})"
+        ) from None
+    kept = np.isfinite(values) & np.isfinite(std)
+    if (std[kept] < 0).any():
+        row = int(np.argmax(kept & (std < 0)))
+        raise InputError(f"table: {parameter}_std={std[row]:g} in row {row} is no standard error")
+    if not kept.any():
+        raise InputError(
+            f"parameter={parameter!r}: no row was fitted; the column error says why, where it is"
+        )
+    return values, std, kept
