@@ -56,8 +56,11 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None, held: bool) -> 
             raise InputError(f"{first.origin}: {unknown('channel', name, first.names)}")
     for other in each[1:]:
         _check_channels(other, names, first, held)
-    for before, after in pairwise(each):
-        _check_follows(before, after)
+    # a file without a row has no time that could follow on, and hides no gap
+    filled = [found for found in each if found.n_samples != 0]
+    step = next((f.clock.step for f in filled if f.clock and f.clock.step), None)
+    for before, after in pairwise(filled):
+        _check_follows(before, after, step)
     lengths = [found.n_samples or 0 for found in each]
     starts = [sum(lengths[:i]) for i in range(len(each))]
 
@@ -70,8 +73,9 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None, held: bool) -> 
 
     origin = f"{len(each)} files from {first.origin} to {each[-1].origin}"
     units = {name: unit for found in reversed(each) for name, unit in found.units.items() if unit}
+    dt = next((found.dt for found in each if found.dt), None)
     return Found(
-        blocks, names, sum(lengths), first.dt, origin, first.hold, first.conditions, units,
+        blocks, names, sum(lengths), dt, origin, first.hold, first.conditions, units,
         lost=next((found.lost for found in each if found.lost), ""),
         aliased=max(found.aliased for found in each),
         slow=frozenset().union(*(found.slow for found in each)),
@@ -103,16 +107,15 @@ def _known(units: Mapping[str, str], names: Sequence[str]) -> dict[str, str]:
     return {name: units[name] for name in names if units.get(name)}
 
 
-def _check_follows(before: Found, after: Found) -> None:
-    """ValueError for sample times that differ, or a gap."""
+def _check_follows(before: Found, after: Found, step: float | None) -> None:
+    """ValueError for sample times that differ, or a gap of another ``step`` (s)."""
     if before.dt is not None and after.dt is not None and abs(after.dt / before.dt - 1) > 1e-6:
         raise InputError(
             f"{after.origin} has a sample time of {after.dt:g} s and {before.origin} of "
             f"{before.dt:g} s; open each by itself"
         )
-    if before.clock is None or after.clock is None:
+    if before.clock is None or after.clock is None or step is None:
         return
-    step = before.clock.step
     off = seconds_between(before.clock, after.clock) - step
     if abs(off) > _SHIFT * step:
         what = f"{off:g} s are missing" if off > 0 else f"{-off:g} s are there twice"

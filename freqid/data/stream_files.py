@@ -126,11 +126,11 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     with refusing(path, "Parquet"):
         if kept and count:
             told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
-        if time is not None and count > 1:
+        if time is not None and count > 0:
             unit = told_units.get(time, "")
             if given is None:
                 clock = even(str(path), time, *_stamps(file, time), unit)
-            else:
+            elif count > 1:
                 agreed(str(path), time, lambda: (*_stamps(file, time), unit), given)
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:

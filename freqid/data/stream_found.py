@@ -39,11 +39,11 @@ class Asked:
 
 @dataclass(frozen=True)
 class Clock:
-    """What a time tells: the sample time in s, its ``first`` and ``last`` stamps as they came, its
-    name and its unit.
+    """What a time tells: the sample time in s, None of a single row, its ``first`` and ``last``
+    stamps as they came, its name and its unit.
     """
 
-    step: float
+    step: float | None
     first: object
     last: object
     name: str
@@ -132,6 +132,8 @@ def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "
         t, _ = in_seconds(plain, pd.Series(stamps), told or unit)
     except InputError as error:
         raise InputError(f"{origin}: {error}") from None
+    if len(t) == 1:
+        return Clock(None, stamps[0], stamps[0], plain, told or unit)
     step, steps = float(t[-1] - t[0]) / at[-1], (float(t[1] - t[0]), float(t[-1] - t[-2]))
     if not np.isfinite(step) or step <= 0 or not all(abs(s - step) <= _EVEN * step for s in steps):
         raise InputError(

@@ -132,3 +132,22 @@ def test_no_files_are_told():
     """The message was about a sample time of blocks."""
     with pytest.raises(ValueError, match="source is empty; give at least one file"):
         fq.open([])
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+def test_a_short_file_hides_no_gap(tmp_path, record, rows):
+    """With a file of no row, or of one, between them, 5 of 60 s had been missing without a word."""
+    for i, (first, count) in enumerate([(0, 500), (500, rows), (900, 500)]):
+        part = slice(first, first + count)
+        time = DT * np.arange(N)[part]
+        frame = pd.DataFrame({"time": time, "u": record.u[part], "y": record.y[part]})
+        frame.to_parquet(tmp_path / f"log_{i}.parquet")
+    missing = f"{DT * (400 - rows):g} s are missing"
+    with pytest.raises(InputError, match=missing):
+        fq.open(str(tmp_path / "log_*.parquet"))
+    # the first one of no row, and all that follows on
+    (tmp_path / "log_2.parquet").unlink()
+    (tmp_path / "log_0.parquet").rename(tmp_path / "log_2.parquet")
+    if not rows:
+        stream = fq.open(str(tmp_path / "log_*.parquet"))
+        assert (stream.n_samples, stream.dt) == (500, DT)

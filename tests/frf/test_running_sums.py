@@ -1,5 +1,7 @@
 """Averages and periods of streams: kept while they grow, and beside scipy and the record."""
 
+import functools
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -173,6 +175,21 @@ def test_progress_is_shown(capsys):
     assert "samples: " in capsys.readouterr().err
     with pytest.raises(ValueError, match="progress"):
         fq.h1(stream, 500, progress="yes")
+
+
+def test_a_state_tells_functions_apart(tmp_path):
+    """Two lambdas have one name: the sums of the one had been given for the other."""
+    kept, stream = tmp_path / "sums.npz", fq.open(ROWS, dt=DT)
+
+    def less(part):
+        return lambda x: x - part * x.mean(axis=-1, keepdims=True)
+
+    first = fq.h1(stream, 500, detrend=less(1.0), state=kept)
+    again = fq.h1(stream, 500, detrend=less(1.0), state=kept)
+    assert np.array_equal(first.response, again.response)
+    for other in (less(0.5), lambda x: x - x[..., :1], functools.partial(np.multiply, 2.0)):
+        with pytest.raises(ValueError, match="is of another stream"):
+            fq.h1(stream, 500, detrend=other, state=kept)
 
 
 def test_a_trend_may_be_a_function():
