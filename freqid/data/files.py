@@ -19,6 +19,7 @@ from freqid.data.analyser_columns import looks_like_response
 from freqid.data.argument_order import read_in_either_order
 from freqid.data.clocks import begins_anew
 from freqid.data.column_names import known
+from freqid.data.experiments_apart import of_experiment
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
 from freqid.data.readers.table import named_with
@@ -108,7 +109,7 @@ def read(
         except InputError as error:
             text = str(error)
             raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-    frame = frame_of(path, sep, decimal, columns, group)
+    frame = of_experiment(frame_of(path, sep, decimal, columns, group), inputs, outputs, reference)
     by_name = frame.attrs.get("by_name", False)
     found = frame.attrs.get("found", f"columns {', '.join(map(str, frame.columns))}")
     try:

@@ -221,11 +221,11 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
         raise InputError(
             f"dt={dt:g} s, but the column of times steps by {step:g} s; drop one of them"
         )
-    # a time column printed with few digits carries their rounding: prefer the round number
     kept = kept_step(frame)
     if kept is not None and abs(kept - step) > 1e-3 * step:
         kept = None
-    return (kept or as_printed(step)) if dt is None else float(dt)
+    told = kept or as_printed(step, float(np.abs(times).max()), len(times) - 1)
+    return told if dt is None else float(dt)
 
 
 def _times(frame: pd.DataFrame) -> FloatArray | None:

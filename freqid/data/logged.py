@@ -11,6 +11,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, path_of, unknown
 from freqid.data.clocks import begins_anew
+from freqid.data.experiments_apart import of_experiment
 from freqid.data.logs import record_from_logs
 from freqid.data.readers.kinds import LOGS, Channel, Log
 from freqid.data.record import Record
@@ -76,7 +77,7 @@ def log_of(path: str | Path, group: str | None = None) -> Mapping[str, Channel]:
             return LOGS[kind](path)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
-    frame = frame_of(path, group=group)
+    frame = of_experiment(frame_of(path, group=group))
     units = frame.attrs.get("units", {})
     try:
         frame, _ = with_time(frame, None, units, None, one_clock=False)

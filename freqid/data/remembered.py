@@ -28,6 +28,8 @@ _LOOP = "closed loop"
 # clocks whose offset is unknown
 _APART = "clocks apart"
 _ROUNDING = 1e-9
+# by how many of its last digits the difference of two times may be off
+_ROUNDED = 1.5
 
 
 def is_kept(column: object) -> bool:
@@ -98,8 +100,15 @@ def kept_in_files(record: Record) -> dict[str, float | bool]:
     return kept | {f"note {i + 1}: {' '.join(n.split())}": 1.0 for i, n in enumerate(record.notes)}
 
 
-def as_printed(step: float) -> float:
-    """A sample time as a column of times tells it: few digits carry their rounding."""
+def as_printed(step: float, largest: float = 0.0, steps: int = 1) -> float:
+    """A sample time as times up to the ``largest`` tell it after so many ``steps``: few digits
+    carry their rounding, and seconds since 1970 have few left for a step.
+    """
+    known_to = _ROUNDED * float(np.spacing(abs(largest))) / steps
+    for digits in range(1, 10):
+        plain = float(f"{step:.{digits}g}")
+        if abs(plain - step) <= known_to:
+            return plain
     return float(f"{step:.9g}")
 
 

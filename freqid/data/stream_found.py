@@ -10,6 +10,7 @@ import numpy as np
 
 from freqid.checks import Array, InputError, channel_names
 from freqid.data.readers.table import named
+from freqid.data.remembered import as_printed
 from freqid.data.times_in_seconds import in_seconds
 from freqid.lti import Hold
 
@@ -151,7 +152,8 @@ def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "
             "resample=True, or give dt in s where the samples are even"
         )
     # a time printed with few digits carries their rounding
-    return Clock(float(f"{step:.9g}"), stamps[0], stamps[-1], plain, told or unit)
+    found = as_printed(step, float(np.abs(t).max()), int(at[-1]))
+    return Clock(found, stamps[0], stamps[-1], plain, told or unit)
 
 
 def agreed(

@@ -60,6 +60,13 @@ def frame_of(
         frame.columns = [name for name, _ in told]
         frame.attrs["units"] = {name: unit for name, unit in told if unit}
         frame.attrs.pop("notes", None)
+    if not frame.columns.is_unique:
+        own = str(frame.columns[frame.columns.duplicated()][0])
+        every = ", ".join(map(str, frame.columns))
+        raise InputError(
+            f"{path}: column {own!r} is there twice; rename one of them, or name all of them by "
+            f"columns=: {every}"
+        )
     if "units" not in frame.attrs:
         told = [named(str(c)) for c in frame.columns]
         names = [name for name, _ in told]

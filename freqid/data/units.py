@@ -36,6 +36,10 @@ def _bracketed(unit: str) -> str:
     return f"({unit})" if re.search(r"[\s/·*]", unit) else unit
 
 
+# turns a minute in German, French, Dutch, Italian, Polish, Czech, Swedish and Russian
+_TURNS = ("UPM", "Umdr/min", "Umdr./min", "/min", "min⁻¹", "tr/min", "tr/mn", "trs/min",
+          "omw/min", "omw./min", "toeren/min", "giri/min", "obr/min", "ot/min", "varv/min",
+          "об/мин")  # fmt: skip
 # what a logger writes, by the coherent unit that it is a multiple of, and that
 _OTHERS = {
     "rad": {"°": np.pi / 180, "deg": np.pi / 180, "degree": np.pi / 180, "degrees": np.pi / 180,
@@ -46,7 +50,8 @@ _OTHERS = {
               "rev/min": np.pi / 30, "min^-1": np.pi / 30, "min-1": np.pi / 30,
               "rev/s": 2 * np.pi, "°/s": np.pi / 180, "deg/s": np.pi / 180,
               "deg/sec": np.pi / 180, "dps": np.pi / 180, "mrad/s": 1e-3, "Hz": 2 * np.pi,
-              "rps": 2 * np.pi, "r/s": 2 * np.pi, "rev/sec": 2 * np.pi},
+              "rps": 2 * np.pi, "r/s": 2 * np.pi, "rev/sec": 2 * np.pi, "tr/s": 2 * np.pi,
+              **dict.fromkeys(_TURNS, np.pi / 30)},
     "N m": {"mNm": 1e-3, "mN m": 1e-3, "Nmm": 1e-3, "N mm": 1e-3, "Ncm": 1e-2, "N cm": 1e-2,
             "kNm": 1e3, "kN m": 1e3, "lbf ft": 1.3558179, "ft lbf": 1.3558179, "lb ft": 1.3558179,
             "ft lb": 1.3558179, "lbf in": 0.11298483, "in lbf": 0.11298483, "kgf m": 9.80665,

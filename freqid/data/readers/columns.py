@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ _STEPS, _RATES = ("dt", "Ts", "ts", "Dt", "h"), ("Fs", "fs", "FS", "sampling_rat
 CLOCKS = (*_STEPS, *_RATES)
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
+# words of names that mean the time, and the part of a step by which two are not the same
+_TIMES, _OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
 # bytes of a text that may be a number
 _LONGEST = 400
 
@@ -69,7 +72,9 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     """Named arrays as columns: matrices become name1, name2, …, scalars are left out.
 
     The longest arrays are the samples; shorter ones whose length divides it are slow outputs, with
-    blanks between. A scalar ``dt`` and no time makes one. Raises ValueError where nothing fits.
+    blanks between, unless a time of their own says that they are another experiment, a frame for
+    itself in ``attrs["apart"]``. A scalar ``dt`` and no time makes one. Raises ValueError where
+    nothing fits.
     """
     import pandas as pd
 
@@ -102,6 +107,8 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
     if not columns:
         raise InputError("holds no arrays of samples")
     N = max(len(x) for x in columns.values())
+    others = _experiments(columns, N)
+    columns = {n: x for n, x in columns.items() if not any(n in other for other in others)}
     full: dict[str, Array] = {}
     for name, x in columns.items():
         if len(x) == N:
@@ -119,4 +126,40 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
         full["time"] = step * np.arange(N)
     frame = pd.DataFrame(full)
     frame.attrs["notes"] = left_out
+    if others:
+        frame.attrs["apart"] = [pd.DataFrame(other) for other in others]
     return frame
+
+
+def _experiments(columns: Mapping[str, Array], N: int) -> list[dict[str, Array]]:
+    """Arrays of one length each that are shorter than the samples and have a time whose steps are
+    not those of every so manieth of them.
+    """
+    longest = _time_of(columns, N)
+    found: list[dict[str, Array]] = []
+    if longest is None:
+        return found
+    whole = _mean(longest[1]) * N
+    for length in sorted({len(x) for x in columns.values()} - {N}, reverse=True):
+        own = _time_of(columns, length)
+        if own is None or abs(_mean(own[1]) * length / whole - 1) <= _OFF:
+            continue
+        rest = {n: x for n, x in columns.items() if len(x) == length}
+        # HDF5 lists names in the order of the alphabet, and the first one may be the time
+        found.append({own[0]: own[1], **rest})
+    return found
+
+
+def _time_of(columns: Mapping[str, Array], length: int) -> tuple[str, Array] | None:
+    """The array of a length that is a time by its name, and rises."""
+    for name, x in columns.items():
+        words = set(re.split(r"[\W_\d]+", name.casefold()))
+        named = len(x) == length > _FEW and bool(words & _TIMES) and x.dtype.kind != "c"
+        if named and (np.diff(x.astype(float)) > 0).all():
+            return name, x
+    return None
+
+
+def _mean(times: Array) -> float:
+    """The mean step of times."""
+    return float(times[-1] - times[0]) / (len(times) - 1)

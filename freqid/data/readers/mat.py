@@ -16,6 +16,7 @@ from freqid.data.readers.mat_forms import (
     Group,
     group_of,
     inner_groups,
+    one_by_one,
     structure_of,
     told_apart,
     with_one_time,
@@ -40,7 +41,7 @@ def read_mat(path: Path, group: str | None = None) -> pd.DataFrame:
     found: dict[str, Group] = {}
     inner: dict[str, Group] = {}
     objects = _objects(content)
-    for name, value in content.items():
+    for name, value in one_by_one(content).items():
         if name.startswith("__") or name in objects:
             continue
         if (fields := structure_of(value)) is not None:

@@ -21,6 +21,8 @@ Fields: TypeAlias = "dict[str, Any]"
 
 # what a series in time calls its samples, where they are all that it holds
 _SAMPLES = ("data", "values", "value")
+# structures of an array that are looked at
+_MOST = 1000
 
 
 @dataclass(eq=False)
@@ -56,6 +58,18 @@ def structure_of(value: object) -> Fields | None:
         return None
     record = np.asarray(value)
     return {name: record[name].item() for name in names}
+
+
+def one_by_one(content: Mapping[str, object]) -> dict[str, object]:
+    """Structures of an array as MATLAB calls them, ``runs(1)``, ``runs(2)``; others as they are."""
+    found: dict[str, object] = {}
+    for name, value in content.items():
+        array = np.asarray(value) if getattr(value, "dtype", None) is not None else None
+        if array is None or not array.dtype.names or array.ndim == 0 or array.size > _MOST:
+            found[name] = value
+        else:
+            found |= {f"{name}({i + 1})": each for i, each in enumerate(array.ravel(order="F"))}
+    return found
 
 
 def group_of(name: str, fields: Fields) -> Group:

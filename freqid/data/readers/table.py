@@ -125,7 +125,8 @@ def parted(line: str, separator: str) -> list[str]:
 def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[str, str], bool]:
     """Names and units from the rows above the samples, the last of as many cells as there are.
 
-    ``x [mm]``, ``x (mm)`` and a row of units below that of names are understood.
+    ``x [mm]``, ``x (mm)`` and a row of units below that of names are understood. A name may be
+    there twice.
     """
     full = [list(r) for r in rows if len(r) >= width and any(r)]
     full = [r[:width] for r in full if not any(r[width:])]
@@ -151,9 +152,6 @@ def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[
         # V(in) and V(out) are names, and no volts
         units.pop(name, None)
         names = [t.strip() if n == name else n for n, t in zip(names, given, strict=True)]
-    if len(set(names)) < len(names):
-        twice = next(n for n in names if names.count(n) > 1)
-        raise InputError(f"column {twice!r} is there twice; rename one of them: {', '.join(names)}")
     return names, units, True
 
 

@@ -177,7 +177,7 @@ def _with_names(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
     notes = [] if layout.headed else [f"no line of names: columns are {', '.join(layout.names)}"]
     if layout.thousands:
         notes.append(f"{layout.thousands!r} between thousands was taken off")
-    first = frame[layout.names[0]]
+    first = frame.iloc[:, 0]
     if layout.headed and layout.names[0] == "column1" and width > 2 and _counts(first):
         # what pandas and others print before the columns: the number of the row
         notes.append("the numbers of the rows were left out")
