@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 
 import freqid as fq
 from freqid.pages.report.figures import figures
@@ -93,3 +94,22 @@ def test_a_page_of_something_else_is_not_replaced(tmp_path):
     # a report takes the place of another
     est.report(page, title="Again")
     assert "Again" in page.read_text(encoding="utf-8")
+
+
+def test_tests_that_fail_and_leave_no_doubt_are_not_red(tmp_path):
+    """Coloured noise in a trusted estimate: "failed" stood in red below "Nothing speaks against"."""
+    lag, rng = fq.first_order(b=20.0, a=10.0), np.random.default_rng(1)
+    clean = fq.simulate(lag, fq.white_noise(2000, seed=2), 0.02)
+    e = 0.02 * scipy.signal.lfilter([1], [1, -0.9], rng.standard_normal(2000))
+    record = fq.Record(clean.u, clean.y + e, clean.dt, output_names=['q"1" <b>'])
+    est = fq.fit(lag, record, weights="noise")
+    assert est.verdict.trusted
+    page = tmp_path / "coloured.html"
+    est.report(page)
+    text = page.read_text(encoding="utf-8")
+    assert '<td class="failed">' not in text
+    assert '<td class="faint">failed</td>' in text
+    assert "What failed has been weighed" in text
+    # a label of a picture may hold marks, but no quotes as marks
+    assert "&amp;quot;" not in text
+    assert "q\\u0026quot;" not in text

@@ -71,7 +71,7 @@ def _figure(
     layout = {
         "height": height,
         "margin": {"l": 60, "r": 15, "t": 15, "b": 50},
-        "legend": {"orientation": "h", "y": legend},
+        "legend": {"orientation": "h", "y": legend - 0.08, "yanchor": "bottom"},
         **axes,
     }
     return Figure(title, note, [part | {"legendgroup": part["name"]} for part in data], layout)
@@ -180,7 +180,7 @@ def _residuals(
         ]
         axes: Part = {
             "xaxis": {"anchor": "y2", "title": {"text": "time / s"}},
-            "yaxis": {"domain": [0.36, 1], "title": {"text": escape(said)}},
+            "yaxis": {"domain": [0.36, 1], "title": {"text": escape(said, quote=False)}},
             "yaxis2": {"domain": [0, 0.28], "title": {"text": "difference"}},
         }
         drawn.append(_figure(f"{title}{name}", note, data, 460, 1.1, axes))
@@ -208,7 +208,7 @@ def _closely(
     ]
     axes: Part = {
         "xaxis": {"anchor": "y", "title": {"text": "time / s"}},
-        "yaxis": {"domain": [0.6, 1], "title": {"text": escape(said)}},
+        "yaxis": {"domain": [0.6, 1], "title": {"text": escape(said, quote=False)}},
         "xaxis2": {"anchor": "y2", "type": "log", "title": {"text": "frequency / Hz"}},
         "yaxis2": {"domain": [0, 0.42], "type": "log", "title": {"text": "amplitude"},
                    "exponentformat": "power", "dtick": 1},

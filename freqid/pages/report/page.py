@@ -49,6 +49,7 @@ def write_report(
     )
     drawn, away = figures(est, validation), bias(est)
     found = verdict(est, validation)
+    left = tests(est)
     page = environment.get_template("report.html.j2").render(
         title=title or f"Estimate of {_named(est)}",
         verdict=found,
@@ -65,7 +66,9 @@ def write_report(
         correlations=correlations(est) if isinstance(est.model, GreyBox) else None,
         plots=drawn,
         figures=[{"data": f.data, "layout": f.layout} for f in drawn],
-        tests=tests(est),
+        tests=left,
+        # of the estimate itself: validation data are asked for themselves
+        weighed=found.trusted and not all(t["passed"] for t in left),
         data=data(est),
         call=recipe(est),
         plotly=_plotly() if drawn else "",
