@@ -31,6 +31,8 @@ _LEVEL = 0.01
 _LONG, _WIDER = 40, 2.3
 # lines that windows of averages tie at the most; local models share more
 _WINDOWED = 4
+# past values that tell the colour of what is left
+_PAST = 4
 # lines of a window in which a coherence is taken, and the part of the strongest window's input
 # below which one is not driven
 _WINDOW, _DRIVEN = 12, 1e-6
@@ -154,8 +156,10 @@ def _coherence(
 
     In a window of L lines the coherence γ² of unrelated signals has P(γ² > c) = (1 − c)^(L − 1)
     (Carter, Proc. IEEE 75, 1987), so that −2 (L − 1) Σ ln(1 − γ²) is chi-square with two degrees
-    of freedom a window.
+    of freedom a window. Noise that drifts leaks from its own low lines into all others, with phases
+    that go on from line to line as those of a smooth input do: both are whitened before.
     """
+    e, u = _whitened(e, u)
     f = np.fft.rfftfreq(len(e), dt)
     keep = f > 0 if band is None else band.inside(f) & (f > 0)
     E, U = np.fft.rfft(e)[keep], np.fft.rfft(u)[keep]
@@ -171,6 +175,21 @@ def _coherence(
     q = float(-2 * (_WINDOW - 1) * np.log1p(-np.minimum(share, 1 - 1e-12)).sum())
     null = scipy.stats.chi2(2 * len(E))
     return q, float(null.isf(_LEVEL)), float(null.sf(q))
+
+
+def _whitened(e: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Both through the filter that makes the first one white, as far as so few past values tell
+    (Yule and Walker), which changes no coherence.
+    """
+    if len(e) < _LONG * _PAST or not e.any():
+        return e, u
+    centred = e - e.mean()
+    r = np.array([centred[: len(e) - k] @ centred[k:] for k in range(_PAST + 1)]) / len(e)
+    if r[0] <= 0:
+        return e, u
+    taps = np.concatenate([[1.0], -scipy.linalg.solve_toeplitz(r[:-1] / r[0], r[1:] / r[0])])
+    found = [np.convolve(x, taps, "valid") for x in (e, u)]
+    return found[0], found[1]
 
 
 def _of_response(c: Comparison) -> pd.DataFrame:

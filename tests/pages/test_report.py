@@ -97,7 +97,7 @@ def test_a_page_of_something_else_is_not_replaced(tmp_path):
 
 
 def test_tests_that_fail_and_leave_no_doubt_are_not_red(tmp_path):
-    """Coloured noise in a trusted estimate: "failed" stood in red below "Nothing speaks against"."""
+    """Coloured noise, trusted: "failed" had stood in red below "Nothing speaks against"."""
     lag, rng = fq.first_order(b=20.0, a=10.0), np.random.default_rng(1)
     clean = fq.simulate(lag, fq.white_noise(2000, seed=2), 0.02)
     e = 0.02 * scipy.signal.lfilter([1], [1, -0.9], rng.standard_normal(2000))
