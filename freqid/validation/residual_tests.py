@@ -159,18 +159,19 @@ def _coherence(
     of freedom a window. Noise that drifts leaks from its own low lines into all others, with phases
     that go on from line to line as those of a smooth input do: both are whitened before.
     """
-    e, u = _whitened(e, u)
+    e, white = _whitened(e, u)
     f = np.fft.rfftfreq(len(e), dt)
     keep = f > 0 if band is None else band.inside(f) & (f > 0)
-    E, U = np.fft.rfft(e)[keep], np.fft.rfft(u)[keep]
+    # where the input drives is seen of itself, as it is
+    E, U, given = (np.fft.rfft(x)[keep] for x in (e, white, u[len(u) - len(e) :]))
     count = len(E) // _WINDOW
     if count < 1:
         return None
-    E, U = (X[: count * _WINDOW].reshape(count, _WINDOW) for X in (E, U))
-    power = (np.abs(U) ** 2).sum(axis=1)
+    E, U, given = (X[: count * _WINDOW].reshape(count, _WINDOW) for X in (E, U, given))
+    power = (np.abs(given) ** 2).sum(axis=1)
     driven = power > _DRIVEN * power.max()
-    E, U, power = E[driven], U[driven], power[driven]
-    own = (np.abs(E) ** 2).sum(axis=1) * power
+    E, U = E[driven], U[driven]
+    own = (np.abs(E) ** 2).sum(axis=1) * (np.abs(U) ** 2).sum(axis=1)
     share = np.abs((E * U.conj()).sum(axis=1)) ** 2 / np.where(own > 0, own, np.inf)
     q = float(-2 * (_WINDOW - 1) * np.log1p(-np.minimum(share, 1 - 1e-12)).sum())
     null = scipy.stats.chi2(2 * len(E))

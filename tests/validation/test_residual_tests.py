@@ -34,4 +34,4 @@ def test_coherence_in_noise_that_drifts(shape, pole):
 def test_coherence_with_another_plant_still_fails():
     other = PLANT.with_values(a=1.1 * PLANT["a"])
     for seed in range(5):
-        assert not left_by(other, INPUTS["chirp"], 0.9, seed, size=0.02)["passed"]
+        assert not left_by(other, INPUTS["chirp"], 0.9, seed, size=0.005)["passed"]
