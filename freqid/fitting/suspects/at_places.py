@@ -35,11 +35,14 @@ def at_places(inquiry: Asking) -> Iterator[tuple[Lone, Scene]]:
         return sum(experiments[i].energy for i in group)
 
     for group in sorted(structure.groups, key=energy, reverse=True)[:_MOST]:
-        near = GreyStructure(structure.at(inquiry.minimum.x, group[0]))
+        # begun where all were, for who asks anew
+        near = GreyStructure(structure.at(structure.start, group[0]))
+        found = structure.physical(inquiry.minimum.x, group[0])
+        x = np.array([found[n] for n in near.physical_names]) / near.scale
         readings = [inquiry.readings[i].with_(place=0) for i in group]
         try:
             objective = Objective(near, [r.experiment() for r in readings])
-            minimum = Minimum(objective, polish(objective, near.start))
+            minimum = Minimum(objective, polish(objective, x))
             lone = Lone(minimum, near.at(minimum.x), readings)
             yield lone, Scene.of(minimum, readings)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):

@@ -25,6 +25,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.sight import hold_that_changes, out_of_sight
 from freqid.fitting.suspects.asking import Asking
+from freqid.fitting.suspects.at_places import at_places
 from freqid.fitting.suspects.late_instead import late_instead
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.turns import Turn, all_turns
@@ -68,8 +69,13 @@ def turned_and_complete(
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
         return [], False
-    if isinstance(structure, PlacedStructure) or inquiry.minimum.solution.message == INTERRUPTED:
+    if inquiry.minimum.solution.message == INTERRUPTED:
         return [], False
+    if isinstance(structure, PlacedStructure):
+        # a sensor is turned everywhere: one place tells, and no other plant of them hides it
+        bad = quiet or shares(inquiry.minimum, scene).max() > _LEFT
+        lone = next(at_places(inquiry), None) if bad else None
+        return ([], False) if lone is None else turned_and_complete(*lone, quiet)
     start = dict(zip(structure.physical_names, structure.values, strict=False))
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
     asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
