@@ -80,8 +80,9 @@ def experiment_design(
     Returns a DataFrame, best first: excitation, low, high, factor, dt, hold, error, worst (the
     parameter that is worst), then bias, std and error of each parameter, relative to its value:
     error² = bias² + std². ``attrs["best"]`` is the first row as a dict. Raises ValueError for a
-    noise, amplitude or duration that is not positive, bands that are not, or a hold that the
-    plant's delay does not go with.
+    noise, amplitude or duration that is not positive, bands that are none or have no period in the
+    duration, a record of fewer samples than unknowns, a plant that runs away in it, or a hold that
+    the plant's delay does not go with.
 
     >>> import freqid as fq
     >>> table = experiment_design(fq.two_mass(), 0.5e-3, noise_std=0.01, factors=[10],

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from freqid.data.readers.table import named
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -18,7 +20,7 @@ def of_experiment(frame: pd.DataFrame, *ends: object) -> pd.DataFrame:
         return frame
     names = [n for end in ends for n in _texts(end)]
     every = [frame, *apart]
-    chosen = next((f for f in every if names and set(names) <= set(map(str, f.columns))), frame)
+    chosen = next((f for f in every if names and set(names) <= _channels(f)), frame)
     chosen.attrs = {**frame.attrs, "notes": list(frame.attrs.get("notes", []))}
     for other in every:
         if other is not chosen:
@@ -29,6 +31,11 @@ def of_experiment(frame: pd.DataFrame, *ends: object) -> pd.DataFrame:
                 "and left out; name its channels to read it"
             )
     return chosen
+
+
+def _channels(frame: pd.DataFrame) -> set[str]:
+    """Names of its columns, as they stand there and without their units."""
+    return {n for c in frame.columns for n in (str(c), named(str(c))[0])}
 
 
 def _texts(end: object) -> list[str]:

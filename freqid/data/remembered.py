@@ -106,9 +106,10 @@ def as_printed(step: float, largest: float = 0.0, steps: int = 1) -> float:
     """
     known_to = _ROUNDED * float(np.spacing(abs(largest))) / steps
     for digits in range(1, 10):
-        plain = float(f"{step:.{digits}g}")
-        if abs(plain - step) <= known_to:
-            return plain
+        # a rate may have fewer digits than its inverse
+        for plain in (float(f"{step:.{digits}g}"), 1 / float(f"{1 / step:.{digits}g}")):
+            if abs(plain - step) <= known_to:
+                return plain
     return float(f"{step:.9g}")
 
 

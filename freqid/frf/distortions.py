@@ -36,11 +36,11 @@ if TYPE_CHECKING:
 
 # part of its rms by which an input may differ between periods
 _APERIODIC = 0.65
-# of even lines alone
-_EVEN = (
-    "only even lines were left out, which show even distortion: what odd distortion adds at "
-    'excited lines is not in the variance; leave odd ones out (grid="odd-odd"), or give several '
-    "realisations"
+# where all lines of one kind are excited
+_UNTOLD = (
+    "only {other} lines were left out, which show {other} distortion: what {which} distortion adds "
+    "at excited lines is not in the variance; leave {which} ones out (grid='odd-odd'), or give "
+    "several realisations"
 )
 
 
@@ -53,9 +53,9 @@ class Distortion:
     for each line and output: frequency (Hz), line (excited, odd or even), output and noise, the rms
     of both, distortion, the rms that noise does not explain (NaN where nothing tells it), and the
     output's name. ``method`` is ``"robust"``, ``"fast"`` or ``"noise"``, of one realisation without
-    odd lines left out between the others. ``levels`` compares levels of the input, a row each,
-    where there are several; the rest is then that of the highest. ``warnings`` says where the
-    response depends on the amplitude, and where odd distortion has no lines to show on.
+    lines of their kind left out between the others. ``levels`` compares levels of the input, a row
+    each, where there are several; the rest is then that of the highest. ``warnings`` says where the
+    response depends on the amplitude, and where distortion has no lines to show on.
     """
 
     response: FrequencyResponse
@@ -229,19 +229,25 @@ def _fast(
     kind = np.where(excited, "excited", np.where(number % 2 == 1, "odd", "even"))
     shown = excited | quiet
     spread = np.where(excited, np.nan, beyond)
-    # distortion at excited lines is that of the odd lines around them
-    odd = quiet & (number % 2 == 1)
-    if odd.any():
-        for own, seen in zip(spread, beyond, strict=True):
-            own[excited] = np.interp(f[excited], f[odd], seen[odd])
+    # even distortion falls on even lines alone, odd on odd ones: those around that were left out
+    told = np.zeros(len(f), bool)
+    for parity in (0, 1):
+        own, around = excited & (number % 2 == parity), quiet & (number % 2 == parity)
+        if own.any() and around.any():
+            told |= own
+            for each, seen in zip(spread, beyond, strict=True):
+                each[own] = np.interp(f[own], f[around], seen[around])
     table = _table(
         first, f[shown], kind[shown], output[:, shown], noise_y[:, shown], spread[:, shown]
     )
     total = noise + np.nan_to_num(spread[:, excited] / level) ** 2
-    found = _found(
-        first, f[excited], G, total, level, noise, table, "fast" if odd.any() else "noise"
-    )
-    return dataclasses.replace(found, warnings=[_EVEN] if quiet.any() and not odd.any() else [])
+    method = "fast" if told.any() else "noise"
+    found = _found(first, f[excited], G, total, level, noise, table, method)
+    untold = excited & ~told
+    if not (quiet.any() and untold.any()):
+        return found
+    which, other = ("odd", "even") if (number[untold] % 2 == 1).all() else ("even", "odd")
+    return dataclasses.replace(found, warnings=[_UNTOLD.format(which=which, other=other)])
 
 
 def _found(

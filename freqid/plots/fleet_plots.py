@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.plots.style import drawing, ink
-from freqid.validation import FEWEST, LEVEL, check_columns, fitted_rows, fleet_alarms
+from freqid.validation import (
+    FEWEST,
+    LEVEL,
+    check_columns,
+    fitted_rows,
+    fleet_alarms,
+    places_of,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +50,7 @@ def plot_fleet(
     marked = np.zeros(len(table), bool)
     if kept.sum() >= FEWEST:
         marked = fleet_alarms(table, parameter, by=by, machine=machine, level=level)
-    x = np.arange(len(table)) if by is None else table[by].to_numpy()
+    x, labels = (np.arange(len(table)), None) if by is None else places_of(table, by)
     names = np.zeros(len(table), int) if machine is None else table[machine].to_numpy()
     with drawing(ax) as axis:
         if machine is None:
@@ -70,6 +77,10 @@ def plot_fleet(
                 )  # fmt: skip
         lost = int((~kept).sum())
         axis.set(xlabel=by or "row", ylabel=parameter)
+        if labels is not None:
+            # as many as can be read
+            shown = np.unique(np.linspace(0, len(labels) - 1, min(len(labels), 8)).astype(int))
+            axis.set_xticks(shown, [labels[i] for i in shown])
         axis.set_title(
             f"{parameter} of {int(kept.sum())} fits" + (f", {lost} failed" if lost else "")
         )

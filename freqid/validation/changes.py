@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 LEVEL = 0.01
 # rows of a machine from which on single ones, and its order, may tell of a change
 _LEAST, _FEWEST = 4, 6
-# machines that tell the scatter of rows together
-_MACHINES = 5
+# rows of machines that tell their scatter together
+_TOGETHER = 24
 # scatters beyond which a row counts as no more than that when the order is looked at
 _CUT = 4.0
 # orders that are tried for each unit of one over the level, and numbers in them at the most
@@ -62,7 +62,7 @@ def fleet_alarms(
             independent but for what their machine has in common, and normal.
 
     A machine has to have four rows for a single one to tell, and six for a lasting change. How rows
-    scatter beside their errors five machines and more tell together.
+    scatter beside their errors machines of 24 rows and more tell together.
 
     Raises ValueError for unknown columns, fewer than three fitted rows, or a level that is none.
 
@@ -102,20 +102,23 @@ def fleet_alarms(
     return found
 
 
-def _scatter_of_all(values: FloatArray, std: FloatArray, groups: Sequence[IntArray]) -> float:
+def _scatter_of_all(
+    values: FloatArray, std: FloatArray, groups: Sequence[IntArray]
+) -> float | None:
     """The variance between rows beside their errors that machines show together: few rows of one
-    may lie close by chance. None of it is known of few machines.
+    may lie close by chance. None of few rows, or of one machine.
     """
-    if len(groups) < _MACHINES:
-        return 0.0
+    if len(groups) < 2 or sum(map(len, groups)) < _TOGETHER:
+        return None
     left = [(values[g] - np.median(values[g])) * np.sqrt(len(g) / (len(g) - 1)) for g in groups]
     return float(variance_between(np.concatenate(left), std[np.concatenate(groups)]))
 
 
-def _changed(x: FloatArray, s: FloatArray, level: float, least: float) -> BoolArray:
+def _changed(x: FloatArray, s: FloatArray, level: float, known: float | None) -> BoolArray:
     """Rows of one machine, in the order of time, that have changed, where the variance between them
-    beside their errors is the ``least`` or more.
+    beside their errors is ``known`` to be so much at least.
     """
+    least = known or 0.0
     borders = _borders(x, s, level / 2, least)
     far = float(scipy.stats.norm.isf(level / 4 / max(len(borders) - 2, 1)))
     while True:
@@ -128,7 +131,7 @@ def _changed(x: FloatArray, s: FloatArray, level: float, least: float) -> BoolAr
             break
         borders = np.delete(borders, int(np.argmin(between)) + 1)
     between_rows = max(float(cautious_variance(parts.left, s)), least)
-    far_off = farthest_row(s, between_rows, level / 2, least)
+    far_off = farthest_row(s, between_rows, level / 2, known)
     found = np.abs(parts.left) > far_off * np.sqrt(s**2 + between_rows)
     away = np.abs(parts.mean - parts.mean[0]) > far * np.hypot(parts.std, parts.std[0])
     away[0] = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from calendar import day_name, month_name
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +15,27 @@ if TYPE_CHECKING:
 
 # fitted rows that a table has to have to be asked
 FEWEST = 3
+# dates that begin with their day
+_DAY_FIRST = re.compile(r"\s*\d{1,2}[./ -]\s*(\d{1,2}|[A-Za-z]{3,9})[./ -]\s*\d{2,4}\b")
+
+
+def places_of(table: pd.DataFrame, by: str) -> tuple[Array, list[str] | None]:
+    """Where rows stand along a column, and the names of the places 0, 1, … where these are no
+    numbers or dates; texts that no alarm takes are in the order of the rows.
+    """
+    column = table[by]
+    if getattr(column.dtype, "ordered", False):
+        return column.cat.codes.to_numpy(), [str(c) for c in column.cat.categories]
+    if not len(column) or not all(isinstance(v, str) for v in column):
+        return column.to_numpy(), None
+    try:
+        x = there(table, "by", by, np.arange(len(table)))
+    except InputError:
+        return column.to_numpy(), None
+    if x.dtype.kind == "M":
+        return x, None
+    first = {place: str(text) for place, text in zip(x.tolist(), column, strict=True)}
+    return x, [first[place] for place in range(len(first))]
 
 
 def there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> Array:
@@ -28,18 +51,25 @@ def there(table: pd.DataFrame, argument: str, column: str, rows: IntArray) -> Ar
 
 
 def _in_time(seen: pd.Series, column: str) -> Array:
-    """Dates that are written as year, month and day; ValueError for other texts, whose order as
-    texts need not be that of time.
+    """Places of texts in time: dates as ISO 8601 writes them, or others by the numbers in them, 2
+    before 10; ValueError for days before years, and for names of months and days.
     """
     import pandas as pd
 
-    try:
-        return pd.to_datetime(seen.astype(str), format="ISO8601", utc=True).to_numpy()
-    except (ValueError, TypeError):
+    texts = [str(v) for v in seen]
+    names = {n[:k].casefold() for n in (*month_name, *day_name) if n for k in (3, len(n))}
+    if all(_DAY_FIRST.match(t) for t in texts) or {t.casefold() for t in texts} <= names:
         raise InputError(
-            f"by={column!r} holds texts such as {str(seen.iloc[0])!r}, whose order need not be "
-            "that of time; give dates, as of pandas.to_datetime, or numbers"
-        ) from None
+            f"by={column!r} holds texts such as {texts[0]!r}, whose order is not that of time; "
+            "give dates, as of pandas.to_datetime, or ordered categories"
+        )
+    try:
+        return pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True).to_numpy()
+    except (ValueError, TypeError, OverflowError):
+        parted = [re.split(r"(\d+)", t) for t in texts]
+        keys = [[(int(p), "") if p.isdecimal() else (-1, p) for p in each] for each in parted]
+        order = {key: i for i, key in enumerate(sorted({tuple(k) for k in keys}))}
+        return np.array([order[tuple(key)] for key in keys])
 
 
 def check_columns(table: pd.DataFrame, **named: str | None) -> None:

@@ -16,35 +16,35 @@ _UNSURE = 0.02
 _NORMAL, _HALVINGS = 0.6744897501960817, 30
 
 
-def farthest_row(s: FloatArray, between: float, level: float, least: float = 0.0) -> float:
+def farthest_row(s: FloatArray, between: float, level: float, least: float | None = None) -> float:
     """How many scatters, as ``cautious_variance`` takes them, the farthest row lies from the middle
     in so many fleets without a change.
 
     Few rows tell their own scatter badly, and unequal ones worse: fleets with more and with less of
     it are drawn, and Student's t with the freedom that the worst of them shows tells the rest, or,
     where that reaches farther, the chance that so many rows lie close together: a power of how
-    close, until their standard errors and the ``least`` variance are left of the scatter.
+    close, until their standard errors are left of the scatter. Where others have told the ``least``
+    variance rows that lie close together are no news.
     """
     n = len(s)
     normal = float(scipy.stats.norm.isf(level / 2 / n))
     if n >= _MANY:
         return normal
-    rng, freedom, reach = np.random.default_rng(n), np.inf, 0.0
+    rng, freedom, reach, told = np.random.default_rng(n), np.inf, 0.0, least or 0.0
     close = min((n - 1) // 2, 2 + n / 4)
-    for variance in {least, max(between, least)}:
+    for variance in {told, max(between, told)}:
         scatter = np.sqrt(s**2 + variance)
         if not scatter.any():
             continue
         drawn = rng.standard_normal((_DRAWN, n)) * scatter
         left = drawn - weighted_median(drawn, scatter)[:, None]
-        size = np.sqrt(s**2 + np.maximum(cautious_variance(left, s), least)[..., None])
+        size = np.sqrt(s**2 + np.maximum(cautious_variance(left, s), told)[..., None])
         farthest = (np.abs(left) / np.where(size > 0, size, np.inf)).max(axis=1)
         shown = float(np.quantile(farthest, 1 - _BEYOND))
         freedom = min(freedom, _freedom(shown, _BEYOND / 2 / n))
-        smallest = np.sqrt(s**2 + least)
-        alone = float(np.max(scatter / np.where(smallest > 0, smallest, 1e-150)))
+        alone = float(np.max(scatter / np.where(s > 0, s, 1e-150)))
         power = shown * max(_BEYOND / level, 1.0) ** (1 / close)
-        reach = max(reach, min(power, normal * alone))
+        reach = reach if least is not None else max(reach, min(power, normal * alone))
     return max(float(scipy.stats.t.isf(level / 2 / n, freedom)), reach)
 
 

@@ -49,6 +49,29 @@ def test_slow_outputs_may_bring_their_times(tmp_path):
     assert (record.n_samples, record.dt, record.input_dt) == (500, 8 * DT, DT)
 
 
+@pytest.mark.parametrize("own", ["ms", "counts", "both ends", "temperature"])
+def test_what_runs_as_long_is_no_other_experiment(tmp_path, own):
+    fast = signals(N, 3)
+    times = {
+        "ms": 1e3 * fast["t"][::8],
+        "counts": np.arange(500),
+        "both ends": np.linspace(0, fast["t"][-1], 500),
+        "temperature": 20 + 0.01 * np.arange(500),
+    }[own]
+    name = "T" if own == "temperature" else "t_slow"
+    path = saved(tmp_path / "slow.npz", fast | {name: times, "w_slow": fast["w"][::8]})
+    assert fq.read(path, "u", "w_slow", resample=True).input_dt == DT
+
+
+def test_numbers_beside_the_samples_are_no_structures(tmp_path):
+    path = tmp_path / "log.mat"
+    told = np.array(
+        [[([1.0, 2.0, 3.0], "a"), ([2.0, 3.0, 4.0], "b")]], dtype=[("v", "O"), ("n", "O")]
+    )
+    scipy.io.savemat(path, signals(SHORT, 1) | {"params": told})
+    assert fq.read(path, "u", "w").n_samples == SHORT
+
+
 def test_structures_of_an_array(tmp_path):
     runs = np.zeros((1, 3), dtype=[("t", "O"), ("u", "O"), ("w", "O")])
     for i in range(3):
@@ -59,6 +82,13 @@ def test_structures_of_an_array(tmp_path):
         fq.read(path, "u", "w")
     record = fq.read(path, "u", "w", group="runs(2)")
     assert np.allclose(record.y, signals(SHORT, 1)["w"])
+
+
+@pytest.mark.parametrize("rate", [400, 3000, 44100])
+def test_rates_since_1970_are_as_near(rate):
+    times = 1.7e9 + np.arange(30_000) / rate
+    frame = pd.DataFrame({"time": times, "u": np.sin(times), "y": np.cos(times)})
+    assert fq.Record.from_frame(frame, "u", "y").dt == pytest.approx(1 / rate, rel=1e-12)
 
 
 @pytest.mark.parametrize("begin", [0.0, 1.7e9, 1.7e9 + 0.5])

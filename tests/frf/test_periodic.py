@@ -407,7 +407,7 @@ def test_even_lines_say_nothing_of_odd_distortion(power, odd):
         r = fq.simulate(fq.first_order(), bent, 1e-3)
         found = fq.distortion(fq.Record(u, r.y, 1e-3).with_noise(0.002, seed=seed), 1.0, skip=1)
         assert found.method == "noise"
-        assert "odd distortion" in found.warnings[0]
+        assert "what odd distortion adds" in found.warnings[0]
         excited = found.table[found.table["line"] == "excited"]
         assert excited["distortion"].isna().all()
         even = found.table[found.table["line"] == "even"]["distortion"].median()

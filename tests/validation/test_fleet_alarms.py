@@ -195,5 +195,20 @@ def test_the_order_of_a_column():
     days = pd.date_range("2026-09-20", periods=36)
     iso = days[rows.index].strftime("%Y-%m-%d")
     assert len(marked(rows.assign(by=iso), by="by")) == 18
-    with pytest.raises(ValueError, match="whose order need not be that of time"):
+    with pytest.raises(ValueError, match="whose order is not that of time"):
         fq.fleet_alarms(rows.assign(by=days[rows.index].strftime("%d.%m.%Y")), "k", by="by")
+
+
+def test_texts_in_the_order_of_their_numbers():
+    rows = machines(7, 1, 36, step=8)
+    runs = rows.assign(at=[f"run_{i}" for i in range(36)]).sample(frac=1, random_state=2)
+    assert sorted(runs["at"].iloc[marked(runs, by="at")]) == sorted(
+        f"run_{i}" for i in range(18, 36)
+    )
+    axis = fq.plot_fleet(runs, "k", by="at")
+    assert [t.get_text() for t in axis.get_xticklabels()][:2] == ["run_0", "run_5"]
+    months = pd.Categorical.from_codes(runs.index // 9, ["Oct", "Nov", "Dec", "Jan"], ordered=True)
+    axis = fq.plot_fleet(runs.assign(at=months), "k", by="at")
+    assert [t.get_text() for t in axis.get_xticklabels()] == ["Oct", "Nov", "Dec", "Jan"]
+    with pytest.raises(ValueError, match="order is not that of time"):
+        fq.fleet_alarms(runs.assign(at=months.astype(str)), "k", by="at")

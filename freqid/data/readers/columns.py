@@ -21,6 +21,10 @@ CLOCKS = (*_STEPS, *_RATES)
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
 _TIMES, _OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
+# units in one another that times come in: s, ms, µs, ns, minutes and hours
+_UNITS = tuple(
+    {a / b for a in (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0) for b in (1.0, 1e-3, 1e-6, 1e-9, 60.0)}
+)
 # bytes of a text that may be a number
 _LONGEST = 400
 
@@ -139,10 +143,9 @@ def _experiments(columns: Mapping[str, Array], N: int) -> list[dict[str, Array]]
     found: list[dict[str, Array]] = []
     if longest is None:
         return found
-    whole = _mean(longest[1]) * N
     for length in sorted({len(x) for x in columns.values()} - {N}, reverse=True):
         own = _time_of(columns, length)
-        if own is None or abs(_mean(own[1]) * length / whole - 1) <= _OFF:
+        if own is None or _alike(own[1], longest[1]):
             continue
         rest = {n: x for n, x in columns.items() if len(x) == length}
         # HDF5 lists names in the order of the alphabet, and the first one may be the time
@@ -150,13 +153,22 @@ def _experiments(columns: Mapping[str, Array], N: int) -> list[dict[str, Array]]
     return found
 
 
+def _alike(short: Array, long: Array) -> bool:
+    """Whether two times run as long, from one end to the other or a step farther, in any unit, or
+    one merely counts.
+    """
+    spans = _mean(short) * len(short) / (_mean(long) * len(long)), np.ptp(short) / np.ptp(long)
+    counts = _mean(short) == 1 and bool((np.diff(short) == 1).all())
+    return counts or any(abs(s * u - 1) <= _OFF for s in spans for u in _UNITS)
+
+
 def _time_of(columns: Mapping[str, Array], length: int) -> tuple[str, Array] | None:
-    """The array of a length that is a time by its name, and rises."""
+    """The array of a length that is a time by its name, and rises; T is a temperature."""
     for name, x in columns.items():
-        words = set(re.split(r"[\W_\d]+", name.casefold()))
+        words = {w if len(w) == 1 else w.casefold() for w in re.split(r"[\W_\d]+", name)}
         named = len(x) == length > _FEW and bool(words & _TIMES) and x.dtype.kind != "c"
         if named and (np.diff(x.astype(float)) > 0).all():
-            return name, x
+            return name, x.astype(float)
     return None
 
 

@@ -23,6 +23,8 @@ Fields: TypeAlias = "dict[str, Any]"
 _SAMPLES = ("data", "values", "value")
 # structures of an array that are looked at
 _MOST = 1000
+# numbers that may be samples
+_FEWEST = 16
 
 
 @dataclass(eq=False)
@@ -67,8 +69,12 @@ def one_by_one(content: Mapping[str, object]) -> dict[str, object]:
         array = np.asarray(value) if getattr(value, "dtype", None) is not None else None
         if array is None or not array.dtype.names or array.ndim == 0 or array.size > _MOST:
             found[name] = value
-        else:
-            found |= {f"{name}({i + 1})": each for i, each in enumerate(array.ravel(order="F"))}
+            continue
+        each = {f"{name}({i + 1})": one for i, one in enumerate(array.ravel(order="F"))}
+        # numbers and words beside the samples are no experiments
+        fields = [x for one in each.values() for x in (structure_of(one) or {}).values()]
+        sampled = any(np.size(x) > _FEWEST for x in fields)
+        found |= each if sampled else {name: value}
     return found
 
 
