@@ -13,6 +13,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Stream, check_arrays, whole_file
+from freqid.frf.function_identity import identity_of
 from freqid.frf.segments import Averaging, products, taper
 
 # seconds between two writings of a state; part of the largest sample that is down to rounding
@@ -167,28 +168,11 @@ class RunningSums:
 def _identity(stream: Stream, averaging: Averaging, length: int, step: int) -> str:
     """A fingerprint of the options and of what is known of a stream."""
     seen = hashlib.sha256()
-    how = _written(averaging.detrend)
+    how = identity_of(averaging.detrend)
     told = (stream.input_names, stream.output_names, stream.dt, length, step, how)
     seen.update(repr(told).encode())
     seen.update(np.ascontiguousarray(taper(averaging.window, length), dtype=float).tobytes())
     return seen.hexdigest()
-
-
-def _written(option: object) -> object:
-    """What a function says and what it holds, the same in every process; anything else as it is.
-
-    Two lambdas have one name.
-    """
-    code = getattr(option, "__code__", None)
-    if code is None:
-        inner = getattr(option, "func", None)
-        held = getattr(option, "args", ()), getattr(option, "keywords", {})
-        named = getattr(option, "__qualname__", None) or repr(option)
-        return named if inner is None else (_written(inner), *held)
-    consts = [each for each in code.co_consts if not hasattr(each, "co_code")]
-    cells = [_written(cell.cell_contents) for cell in getattr(option, "__closure__", None) or ()]
-    name, given = getattr(option, "__qualname__", ""), getattr(option, "__defaults__", None)
-    return (name, code.co_code.hex(), code.co_names, consts, given, cells)
 
 
 def _first(stream: Stream, length: int, step: int) -> FloatArray:

@@ -8,6 +8,7 @@ import scipy.signal
 
 import freqid as fq
 from freqid.frf import running_sums
+from freqid.frf.function_identity import identity_of
 
 N, DT = 30_000, 1e-3
 RECORD = fq.simulate(fq.two_mass(), fq.white_noise(N, seed=1), DT).with_noise(0.1)
@@ -190,6 +191,36 @@ def test_a_state_tells_functions_apart(tmp_path):
     for other in (less(0.5), lambda x: x - x[..., :1], functools.partial(np.multiply, 2.0)):
         with pytest.raises(ValueError, match="is of another stream"):
             fq.h1(stream, 500, detrend=other, state=kept)
+
+
+def test_what_tells_functions_apart():
+    def nested(part):
+        return lambda x: (lambda y: part * y)(x)
+
+    def itself(x, again=True):
+        return itself(x, False) if again else x
+
+    class Level:
+        def __init__(self, size):
+            self.size = size
+
+        def off(self, x):
+            return x - self.size
+
+    long = [np.arange(2000.0), np.r_[np.arange(1999.0), 0]]
+    pairs = [
+        (nested(1), nested(2)),
+        (nested(long[0]), nested(long[1])),
+        (lambda x, *, k=1: k * x, lambda x, *, k=2: k * x),
+        (functools.partial(np.multiply, 2), functools.partial(np.multiply, 3)),
+    ]
+    for one, other in pairs:
+        assert identity_of(one) == identity_of(one)
+        assert identity_of(one) != identity_of(other)
+    assert identity_of(nested(1)) == identity_of(nested(1))
+    assert identity_of(itself) == identity_of(itself)
+    assert repr(identity_of(Level(1.0).off))
+    assert identity_of("linear") == "'linear'"
 
 
 def test_a_trend_may_be_a_function():
