@@ -11,7 +11,6 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, path_of, unknown
 from freqid.data.clocks import begins_anew
-from freqid.data.experiments_apart import of_experiment
 from freqid.data.logs import record_from_logs
 from freqid.data.readers.kinds import LOGS, Channel, Log
 from freqid.data.record import Record
@@ -77,21 +76,21 @@ def log_of(path: str | Path, group: str | None = None) -> Mapping[str, Channel]:
             return LOGS[kind](path)
         except InputError as error:
             raise InputError(f"{path}: {error}") from None
-    frame = of_experiment(frame_of(path, group=group))
-    units = frame.attrs.get("units", {})
-    try:
-        frame, _ = with_time(frame, None, units, None, one_clock=False)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    times = frame["time"].to_numpy() if "time" in frame else np.full(len(frame), np.nan)
-    found = {}
-    for name in frame.columns:
-        x = frame[name].to_numpy()
-        if name == "time" or is_kept(name) or x.dtype.kind not in "fiub":
-            continue
-        there = np.isfinite(x.astype(float))
-        unit = units.get(str(name), "")
-        found[str(name)] = Channel(times[there], x[there].astype(float), unit)
+    frame = frame_of(path, group=group)
+    units, found = frame.attrs.get("units", {}), {}
+    for each in [frame, *frame.attrs.pop("apart", [])]:
+        try:
+            timed, _ = with_time(each, None, units, None, one_clock=False)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        times = timed["time"].to_numpy() if "time" in timed else np.full(len(timed), np.nan)
+        for name in timed.columns:
+            x = timed[name].to_numpy()
+            if name == "time" or is_kept(name) or x.dtype.kind not in "fiub":
+                continue
+            there = np.isfinite(x.astype(float))
+            unit = units.get(str(name), "")
+            found[str(name)] = Channel(times[there], x[there].astype(float), unit)
     return found
 
 

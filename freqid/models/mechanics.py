@@ -97,7 +97,9 @@ class _Named:
             own = inspect.Parameter
             self.takes_all = any(p.kind is own.VAR_KEYWORD for p in taken)
             asked = own.KEYWORD_ONLY, own.POSITIONAL_OR_KEYWORD
-            self.names = tuple(p.name for p in taken if p.kind in asked)
+            # what a partial has bound stays so
+            bound = getattr(given, "keywords", {})
+            self.names = tuple(p.name for p in taken if p.kind in asked and p.name not in bound)
             self.optional = frozenset(p.name for p in taken if p.default is not p.empty)
 
     def near(self, values: Mapping[str, object], changed: set[str], before: Array) -> Array:

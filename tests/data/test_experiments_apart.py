@@ -38,7 +38,9 @@ def test_a_shorter_experiment_with_a_time_of_its_own(tmp_path, kind):
         assert (record.n_samples, record.dt) == (len(own["u"]), DT)
         assert np.allclose(record.y, own["w"])
         assert any("another experiment" in note for note in record.notes)
-    assert fq.channels(path)["rate"].tolist() == pytest.approx([1 / DT] * 2)
+    table = fq.channels(path)
+    assert table["rate"].tolist() == pytest.approx([1 / DT] * 4)
+    assert table["samples"].to_dict() == {"u": N, "w": N, "u_val": SHORT, "w_val": SHORT}
 
 
 def test_slow_outputs_may_bring_their_times(tmp_path):

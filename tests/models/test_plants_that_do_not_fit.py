@@ -1,5 +1,7 @@
 """Plants, holds, inputs and spectra that do not go together, each said by name."""
 
+import functools
+
 import control
 import numpy as np
 import pytest
@@ -135,5 +137,9 @@ def test_what_a_matrix_names_with_a_default_is_passed():
     assert np.abs(body.poles[0]) ** 2 == pytest.approx(50 / 2)
     assert np.abs(body.with_conditions(load=3.0).poles[0]) ** 2 == pytest.approx(50 / 5)
     assert np.abs(body.with_values(k=80.0).poles[0]) ** 2 == pytest.approx(80 / 2)
+    # what is bound is no default
+    stiff = functools.partial(lambda k: [[k]], k=900.0)
+    held = fq.mechanical(mass, stiff, lambda d: [[d]], parameters=values, conditions=load)
+    assert np.abs(held.poles[0]) ** 2 == pytest.approx(900 / 2)
     with pytest.raises(ValueError, match="wide"):
         fq.mechanical(lambda m, wide: [[m]], [[1.0]], parameters=values)

@@ -16,7 +16,7 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.minimum import Minimum
 
 # places that are asked, each with a search of its own: those that say most
-_MOST = 3
+_MOST = 2
 
 
 def at_places(inquiry: Asking) -> Iterator[tuple[Lone, Scene]]:
