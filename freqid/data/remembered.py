@@ -104,8 +104,8 @@ def as_printed(step: float, largest: float = 0.0, steps: int = 1) -> float:
     """A sample time as times up to the ``largest`` tell it after so many ``steps``: few digits
     carry their rounding, and seconds since 1970 have few left for a step.
     """
-    known_to = _ROUNDED * float(np.spacing(abs(largest))) / steps
-    for digits in range(1, 10):
+    known_to = _ROUNDED * float(np.spacing(abs(largest))) / steps if largest else 0.0
+    for digits in range(1, 10) if known_to else ():
         # a rate may have fewer digits than its inverse
         for plain in (float(f"{step:.{digits}g}"), 1 / float(f"{1 / step:.{digits}g}")):
             if abs(plain - step) <= known_to:

@@ -17,6 +17,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import DataSet, Record
+from freqid.fitting.at_limits import at_limits
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.heard_back import related
 from freqid.fitting.loop_box import LoopBox
@@ -35,6 +36,8 @@ _WHOLE = 0.995
 # and one of which it explains so little has another reference; to a peak of a lightly damped loop a
 # stranger explains more, up to so much
 _NOTHING, _CHANCE = 0.02, 0.3
+# part of an input at a limit, or a relay's, that makes the loop another one
+_LIMITED = 0.01
 # black boxes of loops by their first record while it lives, by the others and the plant's order
 _FOUND: WeakKeyDictionary[Record, dict[tuple[object, ...], LoopBox]] = WeakKeyDictionary()
 
@@ -94,6 +97,13 @@ def through_references(
         groups.setdefault((*alike, i if apart else None), []).append(i)
     for members in groups.values():
         records = [d for d in (sets[i] for i in members) if isinstance(d, Record)]
+        if reference is not True and (limited := max(map(at_limits, records))) > _LIMITED:
+            notes.append(
+                f"{100 * limited:.2g} % of the input's samples stand at a limit: the loop is not "
+                "linear, nothing that is explains the input by the reference, and the input was "
+                "fitted as it is; reference=True goes through the reference all the same"
+            )
+            continue
         explained, share, loop, order = _explained(records, _plant_order(model))
         alone = share < _CHANCE and any(_strangers(r) for r in records)
         if (share < _NOTHING or alone) and reference is not True:
