@@ -12,7 +12,7 @@ TRUTH = {"R": 1.0, "L": 2e-3, "e": 30.0, "w": 40.0}
 
 
 def winding(R, L, e, w):
-    """A motor's current, and what its speed induces as the second state: voltage in, current out."""
+    """A motor's current, and what its speed induces as the second state."""
     return [[-R / L, -1 / L], [e, -w]], [[1 / L], [0]], [[1, 0]], None
 
 
