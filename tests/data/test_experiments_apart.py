@@ -43,6 +43,13 @@ def test_a_shorter_experiment_with_a_time_of_its_own(tmp_path, kind):
     assert table["samples"].to_dict() == {"u": N, "w": N, "u_val": SHORT, "w_val": SHORT}
 
 
+def test_a_thousandth_as_long_is_another_experiment(tmp_path):
+    """Of a second as of milliseconds: one step in both tells it."""
+    one, two = signals(20_000, 1), signals(20, 2)
+    path = saved(tmp_path / "two.npz", one | {f"{n}_val": x for n, x in two.items()})
+    assert fq.read(path, "u_val", "w_val").n_samples == 20
+
+
 def test_slow_outputs_may_bring_their_times(tmp_path):
     fast = signals(N, 3)
     slow = {"t_slow": fast["t"][::8], "temperature": fast["w"][::8]}

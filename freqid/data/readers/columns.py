@@ -21,10 +21,8 @@ CLOCKS = (*_STEPS, *_RATES)
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
 _TIMES, _OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
-# units in one another that times come in: s, ms, µs, ns, minutes and hours
-_UNITS = tuple(
-    {a / b for a in (1.0, 1e-3, 1e-6, 1e-9, 60.0, 3600.0) for b in (1.0, 1e-3, 1e-6, 1e-9, 60.0)}
-)
+# s, ms, µs and ns in one another
+_UNITS = tuple(10.0**k for k in range(-9, 10, 3))
 # bytes of a text that may be a number
 _LONGEST = 400
 
@@ -155,10 +153,13 @@ def _experiments(columns: Mapping[str, Array], N: int) -> list[dict[str, Array]]
 
 def _alike(short: Array, long: Array) -> bool:
     """Whether two times run as long, from one end to the other or a step farther, in any unit, or
-    one merely counts.
+    one merely counts; those of one step are of two experiments.
     """
-    spans = _mean(short) * len(short) / (_mean(long) * len(long)), np.ptp(short) / np.ptp(long)
-    counts = _mean(short) == 1 and bool((np.diff(short) == 1).all())
+    own, step = _mean(short), _mean(long)
+    if abs(own / step - 1) <= _OFF:
+        return False
+    spans = own * len(short) / (step * len(long)), np.ptp(short) / np.ptp(long)
+    counts = own == 1 and bool((np.diff(short) == 1).all())
     return counts or any(abs(s * u - 1) <= _OFF for s in spans for u in _UNITS)
 
 
