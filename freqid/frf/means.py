@@ -50,7 +50,8 @@ def periodic(
 
     Args:
         records: experiments of whole periods, each with an excitation of its own; as many as inputs
-            or more. Streams (see ``open``) are taken in one pass, some periods at a time.
+            or more. Streams (see ``open``) are taken some periods at a time, after their beginning
+            was looked at: blocks have to come of a function that starts them anew.
         period: in s, a whole number of samples; None finds it in the reference, or in the input.
         reference: the excitation, where a loop or noise hides it, as in ``h1``: it tells the
             period and the excited lines. None takes the records' own where all have one.
