@@ -86,9 +86,9 @@ def experiment_design(
 
     >>> import freqid as fq
     >>> table = experiment_design(fq.two_mass(), 0.5e-3, noise_std=0.01, factors=[10],
-    ...                           bands=[(2, 10), (10, 80)])
-    >>> float(table.attrs["best"]["high"])
-    80.0
+    ...                           bands=[(2, 40), (10, 80)])
+    >>> table.attrs["best"]["excitation"]
+    'chirp 2-40 Hz'
     """
     import pandas as pd
 
@@ -226,13 +226,15 @@ def _bias_and_scatter(
     expected = Conditions(spectrum, sampling).expected(held_response(plant, sampling.hold), seen)
     count = duration / sampling.dt
     x = values / structure.scale
-    told = None if sweep is None else sweep.covariance(x, structure, sampling.factor, hold)
+    told = (
+        None if sweep is None else sweep.covariance(x, structure, sampling.factor, hold, noise_std)
+    )
     if told is None:
         covariance = error_covariance(x, structure, expected, assumed, noise_std, count)
     else:
         # what only the ends tell has no folds
         folded = error_covariance(x, structure, expected, assumed, 0.0, count)
-        covariance = noise_std**2 * told + np.where(np.isfinite(folded), folded, 0)
+        covariance = told + np.where(np.isfinite(folded), folded, 0)
     return (values - true) / size, np.sqrt(np.diag(covariance)) * structure.scale / size
 
 

@@ -48,10 +48,18 @@ class Sweep:
         return cls(records, plant.integrates)
 
     def covariance(
-        self, x: FloatArray, structure: GreyStructure, factor: int, hold: Hold | str | None
+        self,
+        x: FloatArray,
+        structure: GreyStructure,
+        factor: int,
+        hold: Hold | str | None,
+        noise_std: float,
     ) -> FloatArray | None:
-        """That of the unknowns at ``x`` (P,), (P, P), for noise of variance 1 on every
-        ``factor``-th sample, infinite for what is left open; None where there is none.
+        """That of the unknowns at ``x`` (P,), (P, P), for noise on every ``factor``-th sample,
+        infinite for what is left open; None where there is none.
+
+        What the ends fold moves the estimate as well, by a step to where this sweep's cost is least
+        (Gauss and Newton's), which counts as so much error.
         """
         kept = [r.decimate(factor) for r in self.records]
         readings = [Reading.of(r, hold, skip_zero=self.skip_zero) for r in kept]
@@ -62,4 +70,5 @@ class Sweep:
             return None
         size = float(np.sqrt(objective.energy))
         told = determined(point.jacobian, x, structure.names, size, structure.scale)
-        return told.scatter(told.inverse)
+        step = told.inverse @ (point.jacobian.T @ point.residual)
+        return told.scatter(noise_std**2 * told.inverse + np.outer(step, step))

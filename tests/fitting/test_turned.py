@@ -217,3 +217,20 @@ def test_slow_noise_turns_nothing(model, times):
         record = fq.Record(u, y + times * y.std() / e.std() * e, 0.01)
         kinds = {w.kind for w in fq.fit(model, record, start=begun(model)).warnings}
         assert not {"wrong sign", "swapped channels"} & kinds
+
+
+def test_dependent_inputs_are_not_taken_for_exchanged():
+    """Of six fits with one chirp in both inputs four had begun with "exchange them"."""
+    c, dt = fq.chirp(1, 20, 2.0, 2e-3), 2e-3
+    plant = fq.GreyBox(
+        lambda a, b, c, d: ([[-20, 0], [0, -50.0]], [[a, b], [c, d]], np.eye(2), None),
+        [fq.Parameter(n, v) for n, v in zip("abcd", (20.0, 5.0, 10.0, 50.0), strict=True)],
+        inputs=["u1", "u2"],
+        outputs=["y1", "y2"],
+    )
+    for part in (1.0, -0.5):
+        record = fq.simulate(plant, np.column_stack([c, part * c]), dt).with_noise(0.01, seed=1)
+        est = fq.fit(plant, record)
+        kinds = [w.kind for w in est.warnings]
+        assert kinds[0] == "not identifiable"
+        assert not {"swapped channels", "wrong sign"} & set(kinds)

@@ -21,6 +21,8 @@ CLOCKS = (*_STEPS, *_RATES)
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
 _TIMES, _OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
+# no time is so long
+_HUGE = 1e150
 # s, ms, µs and ns in one another
 _UNITS = tuple(10.0**k for k in range(-9, 10, 3))
 # bytes of a text that may be a number
@@ -168,8 +170,11 @@ def _time_of(columns: Mapping[str, Array], length: int) -> tuple[str, Array] | N
     for name, x in columns.items():
         words = {w if len(w) == 1 else w.casefold() for w in re.split(r"[\W_\d]+", name)}
         named = len(x) == length > _FEW and bool(words & _TIMES) and x.dtype.kind != "c"
-        if named and (np.diff(x.astype(float)) > 0).all():
-            return name, x.astype(float)
+        # what is no number is no time
+        if named and np.isfinite(x).all() and np.abs(x).max() < _HUGE:
+            times = x.astype(float)
+            if (np.diff(times) > 0).all():
+                return name, times
     return None
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import FloatArray, InputError
+from freqid.data import Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -47,6 +48,8 @@ _STARTS, _LINES = 3, 600
 _DRIVEN, _MOVED = 0.5, 0.01
 # turns that are followed from all starts
 _FOLLOWED = 2
+# part of the largest of their directions below which inputs have one less
+_DEPENDENT = 1e-8
 # standard errors by which a value is not physical for certain
 _CERTAIN = 2.0
 # part of an output left that may mean trouble, and that from which no black box has to say so
@@ -69,7 +72,7 @@ def turned_and_complete(
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
         return [], False
-    if inquiry.minimum.solution.message == INTERRUPTED:
+    if inquiry.minimum.solution.message == INTERRUPTED or _one_input(inquiry.readings):
         return [], False
     if isinstance(structure, PlacedStructure):
         # a sensor is turned everywhere: one place tells, and no other plant of them hides it
@@ -120,6 +123,19 @@ def turned_and_complete(
         f"physical values; {'exchange them' if swapped else 'turn the channel'}"
     )
     return [Finding(turn.kind, text, number=float(left))], complete
+
+
+def _one_input(readings: Sequence[Reading]) -> bool:
+    """Whether inputs are multiples of one another, or sums: no data tell them apart, and values of
+    any sign may be on either.
+    """
+    records = [r.data for r in readings if isinstance(r.data, Record)]
+    if len(records) < len(readings) or records[0].n_inputs == 1:
+        return False
+    u = np.concatenate([r.inputs - r.inputs.mean(axis=0) for r in records])
+    size = np.linalg.norm(u, axis=0)
+    sizes = np.linalg.svd(u / np.where(size > 0, size, 1), compute_uv=False)
+    return bool(sizes[-1] < _DEPENDENT * sizes[0])
 
 
 def shares(minimum: Minimum, scene: Scene | None) -> FloatArray:
