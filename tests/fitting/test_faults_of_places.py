@@ -52,6 +52,7 @@ def records(seed, **fault):
         yield r.with_noise(0.02 * r.y.std(), seed=seed).with_conditions(load=load)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("fault", [{"weight": 50.0}, {"tool": 0.3}], ids=["gravity", "tool"])
 def test_a_motion_that_is_lacking_at_every_load_is_named(fault):
     """Trusted, 7 to 31 % off, where the same records without their loads said it."""

@@ -167,6 +167,7 @@ def machines(seed, count, rows, scatter=1.0, step=0.0):
     return pd.DataFrame({"m": m, "k": x.ravel(), "k_std": 1.0})
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("count", "rows", "step"), [(50, 16, 20), (10, 12, 20), (100, 10, 50)])
 def test_a_step_of_one_of_many_machines(count, rows, step):
     """So few orders are no rarer than the level of one of them: none of these had been seen."""
