@@ -8,8 +8,8 @@ that counted as white.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -37,6 +37,8 @@ _BEYOND = (0, 1, 2, 4)
 _RATES, _FOLLOWED = 8, 2
 # part of both ends that parts may leave without other starts beside them
 _CLEAR = 0.02
+# how much more a larger black box may leave that has not quite come to its minimum
+_NESTED = 1.05
 # lines on which the orders are compared, evaluations of each, and the gain that ends one
 _LINES, _LIMIT, _TOLERANCE = 3000, 25, 1e-6
 
@@ -117,11 +119,12 @@ def _shortest(boxes: Sequence[LoopBox]) -> LoopBox:
 
 
 def _clear(boxes: Sequence[LoopBox]) -> bool:
-    """Whether loops of all orders could be closed, and the best leaves next to nothing of both
-    ends, which are of size one each.
+    """Whether loops of all orders could be closed, the best leaves next to nothing of both ends,
+    which are of size one each, and none leaves more than one of fewer states, which it contains.
     """
-    every = len(boxes) == len(_BEYOND)
-    return every and min(box.found.cost / box.rows for box in boxes) < _CLEAR
+    costs = [box.found.cost / box.rows for box in sorted(boxes, key=lambda box: box.order)]
+    nested = all(after <= _NESTED * before for before, after in pairwise(costs))
+    return len(boxes) == len(_BEYOND) and min(costs) < _CLEAR and nested
 
 
 def _closed(readings: Sequence[Reading], inputs: int, order: int) -> list[LoopBox]:
@@ -142,12 +145,23 @@ def _least(readings: Sequence[Reading], orders: Sequence[int]) -> list[LoopBox]:
     found: dict[int, LoopBox] = {}
     for n in orders:
         tried = [_begun(readings, n)]
-        if n - 1 in found:
-            with suppress(InputError, np.linalg.LinAlgError):
-                tried += _grown(found[n - 1], readings)
+        if found:
+            tried.append(_grown_to(n, found[max(found)], readings))
         if boxes := [box for box in tried if box is not None]:
             found[n] = min(boxes, key=lambda box: box.found.cost)
     return list(found.values())
+
+
+def _grown_to(order: int, box: LoopBox, readings: Sequence[Reading]) -> LoopBox | None:
+    """The best of an order that is reached a state at a time; None where a state finds no place."""
+    best: LoopBox | None = box
+    while best is not None and best.order < order:
+        try:
+            larger = [each for each in _grown(best, readings) if each is not None]
+        except (InputError, np.linalg.LinAlgError):
+            return None
+        best = min(larger, key=lambda each: each.found.cost, default=None)
+    return best
 
 
 def _grown(box: LoopBox, readings: Sequence[Reading]) -> list[LoopBox | None]:
