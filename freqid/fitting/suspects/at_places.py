@@ -19,15 +19,19 @@ from freqid.fitting.uncertainty.minimum import Minimum
 _MOST = 2
 
 
-def at_places(inquiry: Asking) -> Iterator[tuple[Lone, Scene]]:
+def at_places(
+    inquiry: Asking, more: int = 0, most: int = MOST_UNKNOWNS
+) -> Iterator[tuple[Lone, Scene]]:
     """The fit to the experiments of each place alone, begun from that to all, and its scene.
 
-    None where something else than the data holds them together.
+    None where something else than the data holds them together, or a black box of so many states
+    ``more`` had more than the ``most`` unknowns that are worth their time.
     """
     structure = inquiry.minimum.structure
     assert isinstance(structure, PlacedStructure)
     known = inquiry.minimum.prior is not None or inquiry.share is not None
-    if known or structure.black_boxes > MOST_UNKNOWNS * len(structure.groups):
+    channels = structure.model.n_inputs + structure.model.n_outputs
+    if known or (structure.order + more) * channels > most:
         return
     experiments = inquiry.minimum.experiments
 

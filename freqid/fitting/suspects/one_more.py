@@ -39,6 +39,8 @@ from freqid.models import DiscreteModel, GreyBox, observed_order
 _LINES = 3000
 # level of a gain that is worth a way to its end, and the part of it that a short way has to show
 _RARE, _PART = 1e-3, 0.6
+# unknowns of one place that are worth their time
+_UNKNOWNS = 60
 # part of a larger box's gain that one of the plant's own order has to make to be as good, and of a
 # line's noise that is left at least
 _AS_MUCH, _KEPT = 0.9, 0.1
@@ -72,8 +74,7 @@ def one_more_mode(inquiry: Asking, scene: Scene) -> list[Asked]:
 
 def _at_places(inquiry: Asking) -> list[Asked]:
     """The same at each place alone: what all of them lack is of one kind."""
-    found = [a for lone in at_places(inquiry) for a in one_more_mode(*lone)]
-    if not found:
+    if not (found := [a for p in at_places(inquiry, 2, _UNKNOWNS) for a in one_more_mode(*p)]):
         return []
     first = min(found, key=lambda a: a.p_value)
     gain = sum(a.test.gain for a in found if a.p_value < _RARE or a is first)
