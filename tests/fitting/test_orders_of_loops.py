@@ -79,6 +79,7 @@ def cascade(seed, count=3000):
     return fq.Record(u, y, DT, reference=r)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", range(3))
 def test_orders_that_are_two_apart_are_nested(seed):
     """A start of its own had left up to 19 times as much as the order below."""

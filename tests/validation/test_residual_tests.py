@@ -22,8 +22,9 @@ def left_by(model, u, pole, seed, size=0.1):
     return table[table["test"] == "coherence"].iloc[0]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("shape", INPUTS)
-@pytest.mark.parametrize("pole", [0.98, 0.995])
+@pytest.mark.parametrize("pole", [0.995, 0.98])
 def test_coherence_in_noise_that_drifts(shape, pole):
     """Of a hundred right models 19 to 59 had failed at one per cent: a drift leaks."""
     u = INPUTS[shape][:N]
