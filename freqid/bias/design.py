@@ -74,8 +74,9 @@ def experiment_design(
         criterion: ``"worst"`` or ``"rms"`` of the parameters' relative errors makes the ranking.
         n_jobs: as in ``bias_map``.
 
-    A chirp starts from rest, and the fit's initial state is free; of a multisine one period in
-    steady state is logged. What the plant's priors tell is left out.
+    A chirp starts from rest, and the fit's initial state is free: its std counts what its ends fold
+    onto its lines, too. Of a multisine one period in steady state is logged. What the plant's
+    priors tell is left out.
 
     Returns a DataFrame, best first: excitation, low, high, factor, dt, hold, error, worst (the
     parameter that is worst), then bias, std and error of each parameter, relative to its value:

@@ -24,7 +24,6 @@ def _part(u: np.ndarray) -> float:
     low, high = float(u.min()), float(u.max())
     near = _SAME * (high - low)
     counts = [int((u <= low + near).sum()), int((u >= high - near).sum())]
-    values = len(np.unique(u))
-    if low == high or max(counts) < _LEAST or _RELAY < values <= _STEPS:
+    if low == high or max(counts) < _LEAST or _RELAY < len(np.unique(u)) <= _STEPS:
         return 0.0
     return sum(c for c in counts if c >= _LEAST) / len(u)

@@ -101,7 +101,8 @@ def fit(
         domain: ``"frequency"`` or ``"time"``, the paper's output error.
         reference: ``"auto"`` fits a record that has a reference through it, as one of a closed loop
             must be, weighted by the noise unless ``weights`` says otherwise, but where the
-            reference explains nearly all of the input and no feedback is seen in what is left;
+            reference explains nearly all of the input and no feedback is seen in what is left, or
+            where the input stands at a limit, which nothing linear explains;
             ``True`` always; ``False`` never.
         offset: ``"estimate"`` makes a constant of each output of each record an unknown.
         loss: ``"huber"`` lets samples that are far off count less, as spikes should.

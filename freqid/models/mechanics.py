@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
@@ -98,7 +99,7 @@ class _Named:
             self.takes_all = any(p.kind is own.VAR_KEYWORD for p in taken)
             asked = own.KEYWORD_ONLY, own.POSITIONAL_OR_KEYWORD
             # what a partial has bound stays so
-            bound = getattr(given, "keywords", {})
+            bound = given.keywords if isinstance(given, functools.partial) else {}
             self.names = tuple(p.name for p in taken if p.kind in asked and p.name not in bound)
             self.optional = frozenset(p.name for p in taken if p.default is not p.empty)
 

@@ -143,6 +143,21 @@ def test_a_sweep_promises_the_errors_that_fits_to_it_have(case):
     assert (scatter < 1.75).all()
 
 
+def test_what_the_ends_of_a_sweep_fold_is_promised(plant):
+    """In noise of 0.01 the two dampings scattered by twice what was promised."""
+    table = fq.experiment_design(plant, T1, noise_std=0.01, factors=[10], bands=[(10, 80)])
+    names = [p.name for p in plant.free_parameters]
+    promised = table.loc[0, [f"std {n}" for n in names]].to_numpy(float)
+    slow = fq.simulate(plant, fq.chirp(10, 80, 10, T1), T1).decimate(10)
+    errors = [
+        fq.fit(plant, slow.with_noise(0.01, seed=s), n_starts=1).values / [plant[n] for n in names]
+        for s in range(12)
+    ]
+    scatter = np.sqrt(np.mean(np.square(np.array(errors) - 1), axis=0)) / promised
+    assert (scatter > 0.6).all()
+    assert (scatter < 1.6).all()
+
+
 def test_designs_that_cannot_be_run_are_refused():
     lag = fq.first_order()
     for given, what in [

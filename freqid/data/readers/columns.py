@@ -21,6 +21,8 @@ CLOCKS = (*_STEPS, *_RATES)
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
 _TIMES, _OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
+# part of a step by which steps of a time may jitter, and part of them that have to keep to that
+_JITTER, _MOSTLY = 0.5, 0.9
 # no time is so long
 _HUGE = 1e150
 # s, ms, µs and ns in one another
@@ -173,7 +175,11 @@ def _time_of(columns: Mapping[str, Array], length: int) -> tuple[str, Array] | N
         # what is no number is no time
         if named and np.isfinite(x).all() and np.abs(x).max() < _HUGE:
             times = x.astype(float)
-            if (np.diff(times) > 0).all():
+            steps = np.diff(times)
+            if steps.min() <= 0:
+                continue
+            # what merely rises, as the temperature of oil, has steps of all sizes
+            if (np.abs(steps / np.median(steps) - 1) < _JITTER).mean() > _MOSTLY:
                 return name, times
     return None
 

@@ -55,15 +55,16 @@ class Naming(Asking, Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Lone:
-    """A part of what is asked about, fitted for itself."""
+    """A fit that is asked about, of a part of the data alone."""
 
     minimum: Minimum
     model: Model
     readings: Sequence[Reading]
+    # what the inputs' own errors add, where a reference explained them
     share: Share | None = None
 
     def apart(self, parting: Parting) -> list[Estimate | None]:
-        """Its parts are those of the whole."""
+        """None: what parts tell is asked of the whole."""
         return []
 
 

@@ -39,12 +39,12 @@ def at_places(
         return sum(experiments[i].energy for i in group)
 
     for group in sorted(structure.groups, key=energy, reverse=True)[:_MOST]:
-        # begun where all were, for who asks anew
-        near = GreyStructure(structure.at(structure.start, group[0]))
-        found = structure.physical(inquiry.minimum.x, group[0])
-        x = np.array([found[n] for n in near.physical_names]) / near.scale
-        readings = [inquiry.readings[i].with_(place=0) for i in group]
         try:
+            # begun where all were, for who asks anew
+            near = GreyStructure(structure.at(structure.start, group[0]))
+            found = structure.physical(inquiry.minimum.x, group[0])
+            x = np.array([found[n] for n in near.physical_names]) / near.scale
+            readings = [inquiry.readings[i].with_(place=0) for i in group]
             objective = Objective(near, [r.experiment() for r in readings])
             minimum = Minimum(objective, polish(objective, x))
             lone = Lone(minimum, near.at(minimum.x), readings)

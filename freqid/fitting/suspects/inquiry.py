@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,9 +11,9 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.fitting.findings import Finding, between_parts, suspects_table
-from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.absorbed import asked_again
 from freqid.fitting.suspects.all_suspects import SUSPECTS
+from freqid.fitting.suspects.asking import Lone
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
 from freqid.fitting.suspects.coarse import coarse
@@ -47,10 +46,8 @@ from freqid.fitting.suspects.silence import constant, constant_instead, silent, 
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.ticks import late_stamps
 from freqid.fitting.suspects.turned import turned, turned_and_complete
-from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.fitting.witness import Share
 from freqid.lti import tuned
-from freqid.models import GreyBox, Model
+from freqid.models import GreyBox
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,14 +64,8 @@ LEVEL = 0.0065
 
 
 @dataclass(frozen=True, eq=False)
-class Inquiry:
+class Inquiry(Lone):
     """What a fit could lack, asked when it is wanted."""
-
-    minimum: Minimum
-    model: Model
-    readings: Sequence[Reading]
-    # what the inputs' own errors add, where a reference explained them
-    share: Share | None = None
 
     @cached_property
     def _apart(self) -> dict[str, list[Estimate | None]]:

@@ -72,7 +72,7 @@ def turned_and_complete(
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or not isinstance(structure, GreyStructure):
         return [], False
-    if inquiry.minimum.solution.message == INTERRUPTED or _one_input(inquiry.readings):
+    if inquiry.minimum.solution.message == INTERRUPTED:
         return [], False
     if isinstance(structure, PlacedStructure):
         # a sensor is turned everywhere: one place tells, and no other plant of them hides it
@@ -85,7 +85,8 @@ def turned_and_complete(
     # the mirror image of a mode explains as much with another sign
     hidden = _hidden(model, inquiry) and not _hidden(begun, inquiry)
     unphysical = _unphysical(inquiry.minimum, model) or (hidden and asked.share < _BETTER)
-    if not (unphysical or quiet or asked.shares.max() > _LEFT):
+    asking = unphysical or quiet or asked.shares.max() > _LEFT
+    if not asking or _one_input(inquiry.readings):
         return [], False
     best: tuple[float, Turn] | None = None
     complete = False
