@@ -99,8 +99,7 @@ class Testimony:
             return Witness("absent", "an initial state at rest is none of a black box's lines")
         try:
             if structure.model.delay_sources:
-                nearer, readings = plant_in_step(structure.at(self.minimum.x), self.readings)
-                structure = GreyStructure(nearer)
+                structure, readings = plant_in_step(structure, self.minimum.x, self.readings)
             else:
                 readings = [r.beside() for r in self.readings]
             return self._heard(structure, readings)

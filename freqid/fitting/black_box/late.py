@@ -7,13 +7,15 @@ with feedthrough, exactly; so a black box can stand beside a plant with a delay.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import Record
 from freqid.fitting.cost.experiments import SpectralExperiment
+from freqid.fitting.cost.placed_structure import PlacedStructure
+from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.reading import Reading
 from freqid.lti import PeriodicHold
 from freqid.models import GreyBox, late_samples
@@ -72,11 +74,40 @@ def outputs_in_step(reading: Reading, shifts: Sequence[int]) -> Reading:
     return reading.of_part(moved)
 
 
-def plant_in_step(model: GreyBox, readings: Sequence[Reading]) -> tuple[GreyBox, list[Reading]]:
-    """The plant with less than a sample of delay, on the data with the rest taken off."""
+def plant_in_step(
+    structure: GreyStructure, x: FloatArray, readings: Sequence[Reading]
+) -> tuple[GreyStructure, list[Reading]]:
+    """The plant at x with less than a sample of delay, on the data with the rest taken off.
+
+    Raises InputError where a delay is no samples of a record, or outlasts half of it.
+    """
+    placed = isinstance(structure, PlacedStructure)
+    model = structure.at(x)
     shifts = whole_samples(model, readings[0])
-    moved = [in_step(r.at_lines(), shifts).with_(delayed=True) for r in readings]
-    return with_less_delay(model, moved[0].sample_time, shifts), moved
+    own = [whole_samples(structure.at(x, r.place), r) if placed else shifts for r in readings]
+    moved = [
+        in_step(r.at_lines(), q).with_(delayed=True) for r, q in zip(readings, own, strict=True)
+    ]
+    period = moved[0].sample_time
+    nearer = with_less_delay(model, period, shifts)
+    if not isinstance(structure, PlacedStructure):
+        return GreyStructure(nearer), moved
+    if any(abs(r.sample_time / period - 1) > 1e-9 for r in moved):
+        raise InputError("a delay that experiments of several sample times share is no samples")
+    places = [
+        dataclasses.replace(place, known=_less(place.known, model, period, q))
+        for place, q in zip(structure.places, own, strict=True)
+    ]
+    start = {n: v for n, v in structure.physical(x).items() if n not in model.delay_sources}
+    return PlacedStructure(nearer, start, places, structure.separate), moved
+
+
+def _less(
+    known: Mapping[str, float], model: GreyBox, period: float, shifts: Sequence[int]
+) -> dict[str, float]:
+    """What is known at a place, its delays shorter by so many samples."""
+    taken = {s: q * period for s, q in zip(model.delay_sources, shifts, strict=True)}
+    return {name: value - taken.get(name, 0.0) for name, value in known.items()}
 
 
 def description_length(

@@ -26,8 +26,7 @@ def without_delay(inquiry: Asking) -> tuple[InStep, Scene] | None:
         return None
     if structure.unknown or inquiry.minimum.prior is not None:
         return None
-    nearer, readings = plant_in_step(structure.at(inquiry.minimum.x), inquiry.readings)
-    near = GreyStructure(nearer)
+    near, readings = plant_in_step(structure, inquiry.minimum.x, inquiry.readings)
     objective = Objective(near, [r.lines() for r in readings])
     minimum = Minimum(objective, polish(objective, near.start))
     step = InStep(minimum, near.at(minimum.x), readings)
