@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 import scipy
@@ -90,11 +90,12 @@ def turned_and_complete(
         return [], False
     best: tuple[float, Turn] | None = None
     complete = False
-    for turn in _likeliest(all_turns(model, inquiry.readings[0].data), begun, inquiry.readings):
+    turns = all_turns(model, inquiry.readings[0].data)
+    if not unphysical:
+        turns = [turn for turn in turns if asked.worth(model, turn)]
+    for turn in _likeliest(turns, begun, inquiry.readings):
         try:
             readings = [turn.back(r) for r in inquiry.readings]
-            if not unphysical and not asked.worth(model, readings, turn.kind):
-                continue
             est = fitter_of(model)(begun, readings, options)
             told = asked.explained(est, readings, turn.kind)
             driven = asked.driven(est, readings, turn.kind)
@@ -175,6 +176,13 @@ def _hidden(model: GreyBox, inquiry: Asking) -> bool:
     )
 
 
+class _Box(NamedTuple):
+    """The part of the energy that a black box leaves, and its unknowns."""
+
+    left: float
+    unknowns: int
+
+
 @dataclass(frozen=True)
 class _Asked:
     """What a fit leaves of its data, and what would be less."""
@@ -204,10 +212,10 @@ class _Asked:
         freedom = est.minimum.freedom if after is None else _room(after)
         if not self._no_chance(left, len(est.values), freedom):
             return False
-        if box is not None and self.share - left < _MOST * (self.share - box):
+        if box is not None and self.share - left < _MOST * (self.share - box.left):
             return False
         # some other plant's inverse may look like this one from far
-        if box is not None and kind == "swapped channels" and left > _NEAR * box:
+        if box is not None and kind == "swapped channels" and left > _NEAR * box.left:
             return False
         if self.quiet or 1 - left > _MORE * max(1 - self.share, 0.0):
             return True
@@ -231,30 +239,32 @@ class _Asked:
         return rest - left >= _DRIVEN * (self.share - left)
 
     @cached_property
-    def _boxes(self) -> dict[str, float | None]:
-        """What black boxes leave of the energy of data turned back; None where there is none."""
+    def _boxes(self) -> dict[str, _Box | None]:
+        """The black boxes of data turned back; None where there is none."""
         return {}
 
-    def worth(self, model: GreyBox, readings: Sequence[Reading], kind: str) -> bool:
+    def worth(self, model: GreyBox, turn: Turn) -> bool:
         """Whether a black box of the plant's order explains data turned back so much better.
 
         Other signs are one black box's. Where there is none the plant itself is tried, if much is
         left.
         """
+        kind = turn.kind
         if kind not in self._boxes:
             try:
+                readings = [turn.back(r) for r in self.inquiry.readings]
                 box = Reference.of(model, readings, _LINES)
-                self._boxes[kind] = box.cost / max(box.objective.energy, 1e-300)
+                left = box.cost / max(box.objective.energy, 1e-300)
+                self._boxes[kind] = _Box(left, max(box.unknowns, len(model.free_parameters)))
             except (InputError, np.linalg.LinAlgError):
                 self._boxes[kind] = None
-        left = self._boxes[kind]
-        if left is None:
+        found = self._boxes[kind]
+        if found is None:
             return self.quiet or bool(self.shares.max() > _MOST_LEFT)
-        freedom = self.inquiry.minimum.freedom
-        if not self._no_chance(left, len(model.free_parameters), freedom):
+        if not self._no_chance(*found, self.inquiry.minimum.freedom):
             return False
-        enough = len(self.shares) > 1 or self.quiet or left < _BETTER * self.share
-        return enough or 1 - left > _MORE * max(1 - self.share, 0.0)
+        enough = len(self.shares) > 1 or self.quiet or found.left < _BETTER * self.share
+        return enough or 1 - found.left > _MORE * max(1 - self.share, 0.0)
 
 
 def _scene(minimum: Minimum, readings: Sequence[Reading]) -> Scene | None:
