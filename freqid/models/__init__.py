@@ -28,6 +28,7 @@ from freqid.models.transfer_function import (
     polynomials,
     rational_model,
 )
+from freqid.models.wrapped import wrapped
 from freqid.models.written import (
     hold_of_dict,
     hold_to_dict,

@@ -134,3 +134,27 @@ def test_a_scale_that_explains_more_than_exchanged_channels():
         assert len(found) == more
         assert not more or factor_of(found[0], "T3") == pytest.approx(0.5, rel=0.02)
     assert not instead_of_swapped(inquiry, [Finding("wrong sign", "", number=0.06)])
+
+
+@pytest.mark.parametrize("takes", [False, True])
+def test_a_scale_behind_a_delay_that_the_matrices_need_not_take(takes):
+    """The verdict was an error: the delay was passed to the plant's matrices."""
+
+    def tanks(a, b):
+        return [[-a, 0], [a, -b]], [[a], [0]], [[1, 0], [0, 1]], None
+
+    matrices = (lambda a, b, Td: tanks(a, b)) if takes else tanks
+    true = fq.GreyBox(tanks, [fq.Parameter("a", 0.08), fq.Parameter("b", 0.2)], input_delay=3.3)
+    model = fq.GreyBox(
+        matrices,
+        [fq.Parameter("a", 0.05), fq.Parameter("b", 0.1), fq.Parameter("Td", 1.0)],
+        input_delay="Td",
+    )
+    u = np.repeat(np.random.default_rng(1).uniform(0, 10, 30), 20)
+    y = fq.simulate(true, u, 1.0).outputs * [1, 1.3]
+    y = y + 0.05 * np.random.default_rng(2).standard_normal(y.shape)
+    est = fq.fit(model, fq.Record(u, y, 1.0))
+    assert not est.verdict.trusted
+    assert est.warnings[0].kind == "scale"
+    # b and the scale go together: the error bar of the scale is 0.0095
+    assert est.warnings[0].number == pytest.approx(1.3, abs=0.03)

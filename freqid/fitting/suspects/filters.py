@@ -7,7 +7,6 @@ comes. Each is one unknown more.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -18,7 +17,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.scene import Scene
-from freqid.models import GreyBox, Parameter
+from freqid.models import GreyBox, Parameter, wrapped
 
 # the filter's own unknown, a time in s; times of a lag, in those of the delay that it looks like,
 # and of a high-pass, in the period of the slowest line
@@ -104,10 +103,7 @@ def filter_instead(
         for time in times:
             try:
                 own = Parameter(_NAME, time, "s", lower=time / _WIDE, upper=time * _WIDE)
-                model = dataclasses.replace(
-                    begun, matrices=one.around(begun.matrices),
-                    parameters=[*begun.parameters, own], vectorized=False, jacobian=None,
-                )  # fmt: skip
+                model = wrapped(begun, one.around, own)
                 est = fitter_of(model)(model, inquiry.readings, SearchOptions(n_starts=1))
             except (InputError, np.linalg.LinAlgError, ArithmeticError):
                 continue

@@ -4,7 +4,6 @@ unit, gear ratio or calibration.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -26,7 +25,7 @@ from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
-from freqid.models import GreyBox, Parameter
+from freqid.models import GreyBox, Parameter, wrapped
 
 # the channel's own unknown, and how far from one it is looked for
 _NAME, _WIDE = "scale of a channel", 1e4
@@ -204,10 +203,7 @@ def _channels(inquiry: Asking, model: GreyBox) -> list[_Channel]:
 def _fitted(begun: GreyBox, channel: _Channel, readings: Sequence[Reading]) -> Estimate | None:
     """The estimate with the channel's scale free; None where there is none, or it is as it was."""
     own = Parameter(_NAME, 1.0, lower=1 / _WIDE, upper=_WIDE)
-    model = dataclasses.replace(
-        begun, matrices=channel.around(begun.matrices), parameters=[*begun.parameters, own],
-        vectorized=False, jacobian=None,
-    )  # fmt: skip
+    model = wrapped(begun, channel.around, own)
     try:
         est = fitter_of(model)(model, readings, SearchOptions(n_starts=_STARTS))
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
