@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,19 +18,18 @@ from freqid.fitting.beside import (
     bound_of,
     guide_of,
 )
-from freqid.fitting.black_box.late import description_length, whole_samples
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.fitters import SearchOptions
+from freqid.fitting.left_open import without_hiding
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.interrupted import best_so_far
 from freqid.fitting.search.noise_floor import noise_floor
 from freqid.fitting.search.rounds import LIMIT
-from freqid.fitting.search.scatter import around
 from freqid.fitting.search.stages import Search
 from freqid.fitting.search.stopping import Found, StopRule
 from freqid.fitting.sight import hold_that_changes, out_of_sight
@@ -44,8 +42,6 @@ _MORE = 8
 _WON = 0.02
 # evaluations down to data's own rounding; those of a refit that others follow, for each unknown
 _DIRECT, _ROUGH = 40, 5
-# outputs that a long delay leaves open, starts that are tried beside it, and evaluations of each
-_OPEN, _BESIDE, _LOOKS = 20, 6, 40
 # starts of experiments at many places beside which there are no black boxes
 _ALONE = 3
 # a start that costs so many times more on a part of the lines costs more on all
@@ -185,6 +181,9 @@ def _searched(
         start = beside.begun(structure, start)
     elif beside is None and structure.model.delay_sources:
         start = begun_slowly(structure, readings, start)
+    if start is not structure.start and scout.point(start) is None:
+        # such a delay leaves too much open
+        start = structure.start
     if known is None and (start != structure.start).any():
         # what the black box's delays lead to has to stand beside the user's own
         known = structure.start
@@ -207,40 +206,8 @@ def _searched(
         search.most = _ALONE
     found = search.run(start, options.n_starts, options.seed, known)
     if isinstance(beside, Beside) and structure.model.delay_sources:
-        found = _without_hiding(found, scout, readings, start)
+        found = without_hiding(found, scout, readings, start)
     return found, beside
-
-
-def _without_hiding(
-    found: Found, scout: Objective, readings: Sequence[Reading], start: FloatArray
-) -> Found:
-    """The minimum, or that next to a start in step where the first has hidden more than it says.
-
-    Outputs that a long delay leaves open cost nothing, whatever moves there.
-    """
-    structure = cast(GreyStructure, scout.structure)
-    few = cast("Sequence[SpectralExperiment]", scout.experiments)
-
-    def shifts(x: FloatArray) -> tuple[int, ...]:
-        return whole_samples(structure.at(x), readings[0])
-
-    def left(solution: Solution) -> float:
-        return description_length(solution.cost, few, readings, shifts(solution.x))
-
-    if shifts(found.solution.x) == shifts(start):
-        return found
-    begun = [start]
-    if found.solution.point.n_initial > len(structure.at(start).poles) + _OPEN:
-        # the start may lead there as well
-        begun += [*around(structure, start, _BESIDE, 0)]
-    ends: list[Solution] = []
-    for x in begun:
-        with contextlib.suppress(InputError):
-            ends.append(polish(scout, x, limit=_LOOKS if ends else None))
-    best = min(ends, key=left, default=found.solution)
-    if left(best) < left(found.solution):
-        return dataclasses.replace(found, solution=best, n_agreed=1)
-    return found
 
 
 def _without_noise(
