@@ -16,10 +16,11 @@ import scipy.interpolate
 import scipy.linalg
 
 import freqid as fq
+from freqid.fitting.black_box.held_inputs import inputs_of
 from freqid.fitting.black_box.output_error import _descend
 from freqid.fitting.black_box.refinement import first_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.black_box.subspace import identify, inputs_of
+from freqid.fitting.black_box.subspace import identify
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.reading import Reading

@@ -16,9 +16,9 @@ import scipy
 
 from freqid.checks import InputError
 from freqid.data import Record
+from freqid.fitting.black_box.held_inputs import inputs_and_cost
 from freqid.fitting.black_box.refinement import nested_model
 from freqid.fitting.black_box.sampled_lines import lines_in_plane
-from freqid.fitting.black_box.subspace import inputs_and_cost
 from freqid.fitting.cost.charts import Chart, to_plane
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.fitting.cost.objective import Objective

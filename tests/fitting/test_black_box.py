@@ -210,7 +210,7 @@ def test_a_delay_that_is_none_is_no_reason_for_doubt_without_noise():
 
 def test_a_pole_on_a_line_is_no_start_and_says_nothing_by_itself(capfd):
     """An integrator at the line of zero divided by nothing, and LAPACK wrote to the terminal."""
-    from freqid.fitting.black_box.subspace import inputs_of
+    from freqid.fitting.black_box.held_inputs import inputs_of
     from freqid.fitting.reading import Reading
     from freqid.lti import Plane
 

@@ -25,7 +25,7 @@ TRIAL_STEPS = 12
 # poles that are closer than this part of their distance from the circle are one
 _NEAR = 0.5
 # real poles that are tried
-_REAL = (-0.9, -0.5, 0.2, 0.5, 0.8, 0.95, 0.99)
+REAL = (-0.9, -0.5, 0.2, 0.5, 0.8, 0.95, 0.99)
 
 
 def exchanged(lines: RationalLines, best: Fitted) -> Fitted:
@@ -69,7 +69,7 @@ def _asked_for(lines: RationalLines, best: Fitted) -> list[ComplexArray]:
     """The pairs, and the real pole, that explain most of what is left, one for each place; none
     where each explains little beside the mode whose place it would take.
     """
-    real = np.array(_REAL, complex)
+    real = np.array(REAL, complex)
     costs = [lines.cost(np.append(best.poles, r)) for r in real]
     pairs, most = pairs_asked_for(lines, best, _TRIED)
     if max(most, best.cost - min(costs)) < _WORTH * _least_worth(lines, best):
@@ -84,7 +84,7 @@ def pairs_asked_for(
     """So many pairs of poles that explain most of what is left, one for each place, and how much
     of the cost the first of them does.
     """
-    pairs = _candidates(lines.w)
+    pairs = candidates(lines.w)
     gains = _gains(lines, lines.residual(best), pairs)
     picked: list[ComplexArray] = []
     for i in np.argsort(-gains):
@@ -97,7 +97,7 @@ def pairs_asked_for(
     return picked, float(gains.max(initial=0.0))
 
 
-def _candidates(w: ComplexArray) -> ComplexArray:
+def candidates(w: ComplexArray) -> ComplexArray:
     """Poles next to lines, as wide as a few of them, and wide ones all over the circle."""
     angle = np.unique(np.abs(np.angle(w)))
     angle = angle[(angle > 0) & (angle < np.pi)]

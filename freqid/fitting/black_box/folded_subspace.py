@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.held_inputs import inputs_and_cost
 from freqid.fitting.black_box.rational_lines import with_poles
 from freqid.fitting.black_box.subspace import (
     identify as identify_at_points,
-    inputs_and_cost,
     observed,
     plane_for,
     spanned,

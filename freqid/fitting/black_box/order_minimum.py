@@ -11,14 +11,15 @@ import scipy
 
 from freqid.checks import InputError
 from freqid.fitting.black_box.channel_units import Descent, begun_alike
+from freqid.fitting.black_box.exchange_in_channels import with_another_mode
+from freqid.fitting.black_box.held_inputs import inputs_of
 from freqid.fitting.black_box.pole_on_line import moved_onto_lines
 from freqid.fitting.black_box.refinement import identified_models, nested_model, scattered_model
 from freqid.fitting.black_box.stability_edge import at_the_edge, pressed
-from freqid.fitting.black_box.subspace import inputs_of
 from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
 from freqid.fitting.cost.objective import Objective
-from freqid.fitting.search.descent import minimise, polish
+from freqid.fitting.search.descent import Solution, minimise, polish
 from freqid.lti import Plane, StateSpace
 from freqid.models import OutputError
 
@@ -32,12 +33,16 @@ _PLACES = (0.9, 0.3, -0.5)
 _STEPS = 80
 # unknowns of a chart, which are of order one, that have moved so far want a chart of their own
 _FAR = 0.3
+# part of the cost that no step gains at a minimum
+_BENT = 1e-3
 # a chart is left for one around its own optimum this often at most
 _CHARTS = 5
 # how far inside of the unit circle a pole of a stable start lies at the least
 _EDGE = 1e-9
 # starts where a pole lies at the end of the circle, how near to its axis, and how near to it
 _AWRY, _TURNING, _FAST = 6, 0.9, 0.9
+# how often modes are exchanged at the most
+_EXCHANGES = 4
 # a first descent that ends at so many times the cost of another is not followed
 _AWAY = 1.2
 # part of the data that a descent may leave that ends next to a line
@@ -66,12 +71,11 @@ class Orders:
         above that of the order below with one pole more, nor that without a direct term.
         """
         found = self._least(spec)
-        if not spec.feedthrough or _chained(self.lines):
-            return found
-        chart, without, _ = self._least(dataclasses.replace(spec, feedthrough=False))
-        if found[1].cost <= without.cost:
-            return found
-        return self._better(spec, self.lines, found, [chart.matrices(without.x)])
+        if spec.feedthrough and not _chained(self.lines):
+            chart, without, _ = self._least(dataclasses.replace(spec, feedthrough=False))
+            if found[1].cost > without.cost:
+                found = self._better(spec, self.lines, found, [chart.matrices(without.x)])
+        return self._exchanged(spec, found)
 
     def _least(self, spec: OutputError) -> Descent:
         """The same, begun from the data alone."""
@@ -123,9 +127,23 @@ class Orders:
             return own
         less = dataclasses.replace(spec, order=spec.order - 1)
         below = self._begun_well(less, lines, None)
-        if own[1].cost <= below[1].cost:
+        if own[1].cost > below[1].cost:
+            starts = _with_a_pole(below, lines, spec.feedthrough)
+            own = self._better(spec, lines, own, starts)
+        return own
+
+    def _exchanged(self, spec: OutputError, own: Descent) -> Descent:
+        """The least minimum to which exchanges of one mode lead."""
+        if _chained(self.lines):
+            # begun with these
             return own
-        return self._better(spec, lines, own, _with_a_pole(below, lines, spec.feedthrough))
+        for _ in range(_EXCHANGES):
+            starts = with_another_mode(own, self.lines, spec.feedthrough)
+            other = self._better(spec, self.lines, own, starts)
+            if other[1].cost >= own[1].cost * (1 - _TOLERANCE):
+                break
+            own = other
+        return own
 
     def _begun_well(self, spec: OutputError, lines: Lines, more: int | None) -> Descent:
         """The best of the starts from the data."""
@@ -210,7 +228,8 @@ def descended(chart: Chart, experiments: Sequence[Experiment], worth: float = np
     objective = Objective(chart, experiments)
     start = np.zeros(chart.size)
     near = polish(objective, start, limit=_STEPS, tolerance=_TOLERANCE, worth=worth)
-    if (near.converged and np.abs(near.x).max() < _FAR) or near.cost > _AWAY * worth:
+    there = near.converged and not _bent(near, objective) and np.abs(near.x).max() < _FAR
+    if there or near.cost > _AWAY * worth:
         return chart, near, objective
     chart = chart.moved(near.x)
     while True:
@@ -219,6 +238,15 @@ def descended(chart: Chart, experiments: Sequence[Experiment], worth: float = np
         first = objective.point(start)
         gained = np.inf if first is None else first.cost - solution.cost
         # noise-free data leave a cost of rounding, which has no minimum to follow
-        if chart.moves >= _CHARTS or gained <= 1e-8 * solution.cost + objective.rounding:
+        ended = gained <= 1e-8 * solution.cost + objective.rounding
+        if chart.moves >= _CHARTS or (ended and not _bent(solution, objective)):
             return chart, solution, objective
         chart = chart.moved(solution.x)
+
+
+def _bent(solution: Solution, objective: Objective) -> bool:
+    """Whether a step would still gain much: coordinates of a chart may bend so much that a descent
+    ends where those around its own end lead on.
+    """
+    wanted = solution.point.triangle[:-1, -1]
+    return float(wanted @ wanted) > _BENT * solution.cost + objective.rounding

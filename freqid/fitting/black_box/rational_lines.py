@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.fitting.black_box.subspace import inputs_of
+from freqid.fitting.black_box.held_inputs import inputs_of
 from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.lti import PolynomialBasis, StateSpace, solved, triangle_of
 

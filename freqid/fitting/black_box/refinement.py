@@ -16,6 +16,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.fitting.black_box.exchange import TRIAL_STEPS, exchanged, pairs_asked_for
 from freqid.fitting.black_box.folded_subspace import identified, identify
+from freqid.fitting.black_box.held_inputs import inputs_of
 from freqid.fitting.black_box.pole_groups import fewer_poles
 from freqid.fitting.black_box.rational_lines import (
     FEW,
@@ -25,7 +26,7 @@ from freqid.fitting.black_box.rational_lines import (
     mirrored,
     with_poles,
 )
-from freqid.fitting.black_box.subspace import inputs_of, observed
+from freqid.fitting.black_box.subspace import observed
 from freqid.fitting.cost.experiments import SpectralExperiment, thinned_to
 from freqid.lti import StateSpace
 

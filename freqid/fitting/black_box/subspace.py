@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
+from freqid.fitting.black_box.held_inputs import inputs_of
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.lti import BandLimited, Basis, Plane, StateSpace, basis_of, sum_runs, triangle
+from freqid.lti import Plane, StateSpace, triangle
 
 
 def plane_for(z: ComplexArray) -> Plane:
@@ -38,7 +39,7 @@ def observed(
     experiments: Sequence[SpectralExperiment], order: int
 ) -> tuple[FloatArray, FloatArray]:
     """Φ̃ and C, which the outputs' span alone tells; ValueError where the lines are too few."""
-    columns = [_columns(e, i, experiments) for i, e in enumerate(experiments)]
+    columns = [columns_of(e, i, experiments) for i, e in enumerate(experiments)]
     w = np.concatenate([c[0] for c in columns])
     Y = np.concatenate([c[1] for c in columns], axis=1)
     V = np.concatenate([c[2] for c in columns], axis=1)
@@ -71,7 +72,7 @@ def spanned(
     return A, U[:p]
 
 
-def _columns(
+def columns_of(
     e: SpectralExperiment, index: int, experiments: Sequence[SpectralExperiment]
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Lines, outputs and inputs (a transient each) of one experiment, one column a channel."""
@@ -89,72 +90,3 @@ def _columns(
         free[index] = common
     used = [i for i, other in enumerate(experiments) if other.transient is not None]
     return w, Y, np.concatenate([V, free[used]])
-
-
-def inputs_of(
-    experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
-) -> StateSpace:
-    """Γ and D (and the transients, which are dropped) by linear least squares."""
-    return inputs_and_cost(experiments, A, C, feedthrough)[0]
-
-
-def inputs_and_cost(
-    experiments: Sequence[SpectralExperiment], A: FloatArray, C: FloatArray, feedthrough: bool
-) -> tuple[StateSpace, float]:
-    """The same, and the sum of squares that they leave.
-
-    Raises LinAlgError where a pole lies on a line.
-    """
-    n, m, p = len(A), experiments[0].n_channels[1], len(C)
-    rows, right = [], []
-    basis = _basis(A, C)
-    for index, e in enumerate(experiments):
-        CR, lines, transient = _output_rows(basis, e.points.z), e.lines, e.transient
-        blocks = []
-        for j in range(m):
-            for i in range(n):
-                y = CR[:, i, None, :] * e.points.U[j]
-                blocks.append(lines.rows(sum_runs(y, lines.aliases)))
-        if feedthrough:
-            for j in range(m):
-                for o in range(p):
-                    y = np.zeros((p, *lines.U.shape[1:]), complex)
-                    y[o] = lines.U[j]
-                    blocks.append(lines.rows(sum_runs(y, lines.aliases)))
-        ends = np.zeros(0) if transient is None else _output_rows(basis, transient.z)
-        for other in range(len(experiments)):
-            if experiments[other].transient is None:
-                continue
-            for i in range(n):
-                if other != index or transient is None:
-                    blocks.append(np.zeros(2 * lines.Y.size))
-                    continue
-                y = ends[:, i, None] * transient.factor
-                blocks.append(lines.rows(sum_runs(y, transient.aliases)))
-        rows.append(np.array(blocks).T)
-        right.append(lines.rows(lines.Y))
-    R = triangle(np.column_stack([np.concatenate(rows), np.concatenate(right)]))
-    if not np.isfinite(R).all():
-        # LAPACK would write to the terminal by itself
-        raise np.linalg.LinAlgError("a pole lies on a line")
-    solution = np.linalg.lstsq(R[:, :-1], R[:, -1])[0]
-    B = solution[: n * m].reshape(m, n).T
-    D = np.zeros((p, m))
-    if feedthrough:
-        D = solution[n * m : n * m + p * m].reshape(m, p).T
-    left = R[:, -1] - R[:, :-1] @ solution
-    return StateSpace(A, B, C, D), float(left @ left)
-
-
-@np.errstate(all="ignore")
-def _basis(A: FloatArray, C: FloatArray) -> Basis:
-    """Coordinates of the states, each of which is an input."""
-    n, p = len(A), len(C)
-    return basis_of(StateSpace(A, np.eye(n), C, np.zeros((p, n))))
-
-
-@np.errstate(all="ignore")
-def _output_rows(basis: Basis, w: ComplexArray) -> ComplexArray:
-    """C (wI − A)⁻¹ of the states before they were changed, (outputs, states, lines)."""
-    rows = basis.through(BandLimited()).output_rows(w)
-    return np.moveaxis(np.tensordot(basis.to_basis.T, rows, (1, 1)), 0, 1)
