@@ -43,6 +43,7 @@ from freqid.fitting.suspects.scales import instead, instead_of_swapped
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, Score, score
 from freqid.fitting.suspects.silence import constant, constant_instead, silent, unheard
+from freqid.fitting.suspects.smooth_ends import with_smooth_ends
 from freqid.fitting.suspects.spread import compared
 from freqid.fitting.suspects.ticks import late_stamps
 from freqid.fitting.suspects.turned import turned, turned_and_complete
@@ -83,7 +84,8 @@ class Inquiry(Lone):
         if self.minimum.exact or not self.minimum.solution.converged:
             return None
         try:
-            return Scene.of(self.minimum, self.readings, self.share)
+            scene = Scene.of(self.minimum, self.readings, self.share)
+            return with_smooth_ends(scene, self.readings)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return None
 
