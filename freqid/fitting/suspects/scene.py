@@ -155,6 +155,11 @@ class Scene:
         rows = sum(s.experiment.n_rows - len(s.free) for s in self.seen) + len(self.known)
         return rows - len(self.absorbed)
 
+    @property
+    def n_free(self) -> int:
+        """Columns that are free beside the parameters."""
+        return 0 if self.more is None else len(self.more)
+
     @cached_property
     def noise_freedom(self) -> float:
         """Real values that tell the noise."""

@@ -28,6 +28,8 @@ _SAME = 1e-9
 _ROUNDED = 1e-9
 # part of a line's noise that is left at least
 _LEAST = 0.1
+# rows for each column, those that are free beside it counted, that tell the noise at each
+_FEW = 5
 # p above which nobody asks further, and rows from which one look is worth it
 _GLANCE, _MANY = 0.05, 4000
 
@@ -128,7 +130,8 @@ def score(
     rest = scene.left - along @ Vt
     if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
-    elif drawn.alike:
+    elif drawn.alike or freedom < _FEW * (q + scene.n_free):
+        # what is left of few rows tells no noise of its own at each
         spread = (Vt * scene.variance_of(rest)) @ Vt.T
         chi = float(along @ np.linalg.solve(spread, along))
     else:
