@@ -5,17 +5,18 @@ answers at once explains that by parameters that are none, or by one mode more.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import Record
 from freqid.fitting.black_box.late import outputs_in_step
+from freqid.fitting.cost.objective import Objective
+from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.findings import Finding
-from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.search.descent import polish
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
@@ -29,6 +30,8 @@ _AS_MUCH = 0.8
 # samples by which an output is late at the most, and those that are tried both ways, for the cost
 # may rise between none and the right ones
 _FARTHEST, _TRIED = 64, (1, 2, 3, 4, 6, 8)
+# evaluations of each descent
+_LIMIT = 60
 
 
 def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
@@ -40,11 +43,11 @@ def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[F
         return []
     if model.n_outputs < 2 or not all(_in_step(r) for r in readings):
         return []
-    start = dict(zip(structure.physical_names, structure.values, strict=False))
-    shifted = _Shifted(model.with_values(**start), readings)
+    assert isinstance(structure, GreyStructure)
     # as the fit itself has left them: one start again may end elsewhere
     now = _spread(model, readings)
-    tried = [t for o in range(model.n_outputs) if (t := shifted.best(o, now)) is not None]
+    each = [_Shifted(model, structure, inquiry.minimum.x, o) for o in range(model.n_outputs)]
+    tried = [found for one in each if (found := one.best(readings, now)) is not None]
     if not tried:
         return []
     left, lag, output = min(tried)
@@ -75,25 +78,30 @@ def _in_step(reading: Reading) -> bool:
     return plain and not reading.in_time
 
 
-@dataclass(frozen=True)
 class _Shifted:
-    """The plant fitted to the data with one output some samples sooner."""
+    """The plant fitted to the data with one output some samples sooner, each time from where the
+    nearest other ended and from its start.
+    """
 
-    begun: GreyBox
-    readings: Sequence[Reading]
+    def __init__(self, model: GreyBox, found: GreyStructure, x: FloatArray, output: int) -> None:
+        self.output = output
+        start = dict(zip(found.physical_names, found.values, strict=False))
+        self.structure = GreyStructure(model.with_values(**start))
+        # where each number of samples has led, and what it left
+        self.ends = {0: x * found.scale / self.structure.scale}
+        self.known: dict[int, float] = {}
 
-    def best(self, output: int, now: float) -> tuple[float, int, int] | None:
+    def best(self, readings: Sequence[Reading], now: float) -> tuple[float, int, int] | None:
         """The least spread, the samples that have it, and the output; None where it is ``now``,
         with none.
         """
-        known: dict[int, float] = {0: now}
+        self.known = {0: now}
 
         def best_of(lags: Iterable[int]) -> int:
             for lag in lags:
-                if lag not in known and abs(lag) <= _FARTHEST:
-                    left = self.spread(output, lag)
-                    known[lag] = np.inf if left is None else left
-            return min(known, key=lambda lag: known[lag])
+                if lag not in self.known and abs(lag) <= _FARTHEST:
+                    self.known[lag] = self.spread(readings, lag)
+            return min(self.known, key=lambda lag: self.known[lag])
 
         lag = best_of(sign * q for q in _TRIED for sign in (1, -1))
         if not lag:
@@ -105,17 +113,21 @@ class _Shifted:
         while width:
             lag = best_of((lag - width, lag + width))
             width //= 2
-        return known[lag], lag, output
+        return self.known[lag], lag, self.output
 
-    def spread(self, output: int, lag: int) -> float | None:
-        """What is left with that output so much sooner; None where nothing can be fitted."""
-        shifts = [lag * (o == output) for o in range(self.begun.n_outputs)]
+    def spread(self, readings: Sequence[Reading], lag: int) -> float:
+        """What is left with that output so much sooner; infinite where nothing can be fitted."""
+        structure = self.structure
+        shifts = [lag * (o == self.output) for o in range(structure.model.n_outputs)]
+        near = min(self.ends, key=lambda other: abs(other - lag))
         try:
-            moved = [outputs_in_step(r, shifts) for r in self.readings]
-            est = fitter_of(self.begun)(self.begun, moved, SearchOptions(n_starts=1))
-            return _spread(est.model, moved)
+            moved = [outputs_in_step(r, shifts) for r in readings]
+            objective = Objective(structure, [r.experiment() for r in moved])
+            tried = [polish(objective, x, limit=_LIMIT) for x in (structure.start, self.ends[near])]
+            self.ends[lag] = min(tried, key=lambda solution: solution.cost).x
+            return _spread(structure.at(self.ends[lag]), moved)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
-            return None
+            return np.inf
 
 
 def _spread(model: Model, readings: Sequence[Reading]) -> float:
