@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray, numbers
+from freqid.checks import FloatArray, State, numbers, positive
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# columns of a table: the memory from its first sample to its last, and how many it has
-MEMORY, SEGMENT = "memory", "segment samples"
+# columns of a table: the memory from its first sample to its last, how many it has, and degrees of
+# freedom
+MEMORY, SEGMENT, FREEDOM = "memory", "segment samples", "degrees of freedom"
 
 
 class AveragedResponse(FrequencyResponse):
@@ -26,24 +28,43 @@ class AveragedResponse(FrequencyResponse):
             whole periods. What is measured of a plant with the impulse response g is the transform
             of ``memory`` times g: a lightly damped mode looks broader (Bendat and Piersol, Random
             Data, 2010, section 8.5.1).
+        freedom: complex values that have told the variance at each line, its degrees of freedom;
+            None where nothing says how many.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it says by how much that moves
     the parameters. Made by ``h1``, ``h2`` and ``hv``.
     """
 
     memory: FloatArray | None
+    freedom: float | None
 
-    def __init__(self, *given: object, memory: FloatArray | None = None, **fields: object) -> None:
+    def __init__(
+        self,
+        *given: object,
+        memory: FloatArray | None = None,
+        freedom: float | None = None,
+        **fields: object,
+    ) -> None:
         super().__init__(*given, **fields)  # type: ignore[arg-type]
         if memory is not None:
             memory = numbers("memory", memory)
             memory.flags.writeable = False
-        self.__dict__["memory"] = memory
+        freedom = None if freedom is None else positive("freedom", freedom)
+        self.__dict__.update(memory=memory, freedom=freedom)
+
+    def __setstate__(self, state: State) -> None:
+        """Restore; what was written before lacks what was not known then."""
+        super().__setstate__({"freedom": None} | state)
+
+    @property
+    def of_averages(self) -> Mapping[str, FloatArray | float | None]:
+        """What it has beyond other responses, by name."""
+        return {"memory": self.memory, "freedom": self.freedom}
 
     @that_follows
     def select(self, limits: tuple[float, float]) -> AveragedResponse:
         """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        return AveragedResponse(**{**super().select(limits).__dict__, "memory": self.memory})
+        return AveragedResponse(**{**super().select(limits).__dict__, **self.of_averages})
 
     def to_frame(self) -> pd.DataFrame:
         """As of any response, with columns of the memory from its first sample to its last."""
@@ -53,6 +74,8 @@ class AveragedResponse(FrequencyResponse):
             at = np.linspace(0, count - 1, len(self.frequency))
             frame[MEMORY] = np.tile(np.interp(at, np.arange(count), self.memory), times)
             frame[SEGMENT] = count
+        if self.freedom is not None:
+            frame[FREEDOM] = self.freedom
         return frame
 
 

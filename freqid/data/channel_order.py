@@ -87,7 +87,7 @@ def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> Frequ
     at = np.ix_(y, u)
     kept: dict[str, Any] = {}
     if isinstance(frf, AveragedResponse):
-        kept = {"memory": frf.memory}
+        kept = {**frf.of_averages}
     elif isinstance(frf, EmpiricalResponse):
         kept = {"input_phase": frf.input_phase}
     elif isinstance(frf, LocalResponse) and frf.line_noise is not None:

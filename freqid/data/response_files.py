@@ -26,7 +26,13 @@ from freqid.data.analyser_columns import (
     power_of_spread,
 )
 from freqid.data.analyser_files import FREQUENCY, in_hertz, of_matlab, of_touchstone, of_universal
-from freqid.data.averaged_response import MEMORY, SEGMENT, AveragedResponse, remembered_memory
+from freqid.data.averaged_response import (
+    FREEDOM,
+    MEMORY,
+    SEGMENT,
+    AveragedResponse,
+    remembered_memory,
+)
 from freqid.data.column_names import without_units
 from freqid.data.empirical_response import PHASE, EmpiricalResponse
 from freqid.data.foreign_frames import as_pandas
@@ -219,11 +225,13 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
         return LocalResponse(**found.__dict__, line_noise=noise)
     if PHASE in frame.columns:
         return EmpiricalResponse(**found.__dict__, input_phase=numbers_of(first, PHASE))
-    if len(f) < 2 or not {MEMORY, SEGMENT} <= set(frame.columns):
-        return found
-    count = round(float(numbers_of(first, SEGMENT)[0]))
-    memory = remembered_memory(numbers_of(first, MEMORY), count)
-    return AveragedResponse(**found.__dict__, memory=memory)
+    averaged: dict[str, Any] = {}
+    if FREEDOM in frame.columns:
+        averaged["freedom"] = float(numbers_of(first, FREEDOM)[0])
+    if len(f) > 1 and {MEMORY, SEGMENT} <= set(frame.columns):
+        count = round(float(numbers_of(first, SEGMENT)[0]))
+        averaged["memory"] = remembered_memory(numbers_of(first, MEMORY), count)
+    return AveragedResponse(**found.__dict__, **averaged) if averaged else found
 
 
 def picked(
@@ -249,7 +257,7 @@ def picked(
     own = frf.line_noise if isinstance(frf, LocalResponse) else None
     kept: dict[str, Any] = {} if own is None else {"line_noise": own.of(p[o], m[i])}
     if isinstance(frf, AveragedResponse):
-        kept = {"memory": frf.memory}
+        kept = {**frf.of_averages}
     if isinstance(frf, EmpiricalResponse):
         kept = {"input_phase": frf.input_phase}
     left = (*frf.output_names[o], *frf.input_names[i])

@@ -203,4 +203,6 @@ def _packed(
     shown = np.broadcast_to(coherence[:, :, None], G.shape)
     power = powers(s.uu).T
     frf = measured(s.first, s.frequency, G, variance, shown, power, s.reach, s.aliased)
-    return AveragedResponse(**frf.__dict__, memory=s.memory)
+    freedom = s.averages - G.shape[-1]
+    told = freedom if variance is not None and freedom > 0 else None
+    return AveragedResponse(**frf.__dict__, memory=s.memory, freedom=told)

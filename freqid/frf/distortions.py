@@ -19,6 +19,7 @@ import numpy as np
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, steps, whole
 from freqid.data import (
+    AveragedResponse,
     FrequencyResponse,
     Record,
     Reference,
@@ -205,7 +206,7 @@ def _robust(
     output = np.abs(y).mean(axis=0) / np.sqrt(2)
     kind = np.full(len(level), "excited")
     table = _table(first, f[excited], kind, output, np.sqrt(noise * R) * level, stochastic)
-    return _found(first, f[excited], G, total, level, noise, table, "robust")
+    return _found(first, f[excited], G, total, level, noise, table, "robust", R - 1)
 
 
 def _fast(
@@ -259,8 +260,10 @@ def _found(
     noise: FloatArray,
     table: pd.DataFrame,
     method: str,
+    freedom: int | None = None,
 ) -> Distortion:
     response = measured(first, f, G.T[:, :, None], total.T[:, :, None], None, level[None] ** 2)
+    response = AveragedResponse(**response.__dict__, freedom=freedom)
     return Distortion(response, noise[0] if len(noise) == 1 else noise, table, method)
 
 

@@ -90,4 +90,5 @@ def etfe(
     # a mean over experiments lacks what each cuts off, as one over segments does
     N = first.n_samples
     told = memory("boxcar", N, N, [r.inputs[:: r.factor][:N].T for r in sets])
-    return AveragedResponse(**frf.__dict__, memory=told)
+    freedom = count - first.n_inputs
+    return AveragedResponse(**frf.__dict__, memory=told, freedom=freedom)

@@ -109,6 +109,11 @@ def plot_residuals(
     """
     table_with(table, "test", "residual_test")
     curves = table.attrs["correlations"]
+    if not curves:
+        raise InputError(
+            "table has no correlations, being of a response: its lines have no order in time; "
+            "plot_comparison(compare(model, response)) shows what is left of each"
+        )
     with stacked(ax, len(curves), (7.2, 1.2 + 1.7 * len(curves)), sharex=False) as ax:
         for axis, curve in zip(ax, curves, strict=True):
             values = np.asarray(curve["values"])

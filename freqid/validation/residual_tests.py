@@ -9,9 +9,11 @@ import scipy
 
 from freqid.checks import FloatArray, InputError, whole
 from freqid.data import (
+    AveragedResponse,
     Band,
     DataSet,
     FrequencyResponse,
+    PeriodicResponse,
     Record,
     StampedRecord,
     as_band,
@@ -203,12 +205,14 @@ def _of_response(c: Comparison) -> pd.DataFrame:
         raise InputError("record is a response without variance: there is no noise to test against")
     rows = []
     left = c.residuals / np.sqrt(frf.variance)
+    freedom = None
+    if isinstance(frf, AveragedResponse | PeriodicResponse):
+        freedom = frf.freedom
     for o, output in enumerate(frf.output_names):
         for i, name in enumerate(frf.input_names):
             each = left[o, i]
             K = len(each)
-            # a complex error of variance one has a square of one, exponentially distributed
-            q, null = 2 * float(np.sum(np.abs(each) ** 2)), scipy.stats.chi2(2 * K)
+            q, null = _size(np.abs(each) ** 2, freedom), scipy.stats.chi2(2 * K)
             if frf.reach > _WINDOWED:
                 q, null = q / (2 * K), _few_lines(K / (frf.reach + 1))
             elif frf.reach:
@@ -227,6 +231,17 @@ def _of_response(c: Comparison) -> pd.DataFrame:
     table = ResidualTable(rows)
     table.attrs["correlations"] = []
     return table
+
+
+def _size(squares: FloatArray, freedom: float | None) -> float:
+    """A statistic of K ``squares`` over their variances that is chi-square on 2K degrees.
+
+    Exponentially distributed where the variances are known. Of variances with ``freedom`` ν they
+    are F(2, 2ν), P(F > x) = (1 + x/ν)^−ν, and −2 ln P are summed (Fisher, 1925, section 21.1).
+    """
+    if not freedom:
+        return 2 * float(squares.sum())
+    return float(2 * freedom * np.log1p(squares / freedom).sum())
 
 
 def _few_lines(count: float) -> Any:

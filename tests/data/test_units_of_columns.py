@@ -56,7 +56,8 @@ def test_the_unit_in_the_name_of_the_time(tmp_path, header, seconds):
     [
         ("RPM", "rad/s", np.pi / 30), ("Deg", "rad", np.pi / 180), ("min^-1", "rad/s", np.pi / 30),
         ("rev", "rad", 2 * np.pi), ("lbf-ft", "N m", 1.3558179), ("N·mm", "N m", 1e-3),
-        ("mN", "N", 1e-3),
+        ("mN", "N", 1e-3), ("g", "m/s^2", 9.80665), ("in/s²", "m/s^2", 0.0254),
+        ("thou", "m", 2.54e-5),
     ],
 )  # fmt: skip
 def test_units_in_other_spellings(unit, base, factor):
