@@ -109,11 +109,12 @@ def test_of_one_output_nothing_is_named():
 
 
 GAINS = [
-    ("input", 1, 1.2, None), ("output", 1, 1.2, "noise"), ("input", 0, 1.1, None),
+    ("output", 1, 1.2, "noise"), ("input", 1, 1.2, None), ("input", 0, 1.1, None),
     ("output", 1, 0.9, "noise"), ("output", 0, 1.5, None),
 ]  # fmt: skip
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("channel", "number", "factor", "weights"), GAINS)
 def test_a_wrong_gain_lacks_no_mode(channel, number, factor, weights):
     """It was "another mode" or "structure". One of two scales is only known beside the other."""
