@@ -32,7 +32,8 @@ class AveragedResponse(FrequencyResponse):
             None where nothing says how many.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it says by how much that moves
-    the parameters. Made by ``h1``, ``h2`` and ``hv``.
+    the parameters. Made by ``h1``, ``h2`` and ``hv``, by ``etfe`` of repeated experiments and by
+    ``distortion``.
     """
 
     memory: FloatArray | None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import cast
@@ -36,6 +36,8 @@ _DELAYS = 20
 _MANY = 8
 # whole samples of delay of each input
 Shifts = tuple[int, ...]
+# by how much less a description is of what is no chance, twice a logarithm of the likelihood
+_NO_CHANCE = 20.0
 # lines that each of several black boxes takes at least
 _LEAST_LINES = 100
 
@@ -134,12 +136,16 @@ class BesidePlaces:
 
 
 def beside_of(
-    structure: GreyStructure, readings: Sequence[Reading], lines: int
+    structure: GreyStructure,
+    readings: Sequence[Reading],
+    lines: int,
+    possible: Callable[[FloatArray], bool],
 ) -> Beside | BesidePlaces | None:
     """A black box of the plant's order on the lines of the search; None where there is none.
 
     Of an output slower than its input a sampled one finds no minimum to rely on. Where a delay is
-    unknown, it is the best of those with whole samples of delay.
+    unknown, it is the best of those with whole samples of delay, and with a start that is
+    ``possible`` unless another is better by no chance: a delay may leave too much open.
     """
     if any(rate_factor(r.data) > 1 for r in readings):
         return None
@@ -159,8 +165,15 @@ def beside_of(
         tried.append((left, box, shifts, readings[0].sample_time))
     if not tried:
         return None
-    _, box, shifts, period = min(tried, key=lambda t: t[0])
-    return Beside(box, shifts, period)
+    ranked = [(left, Beside(box, shifts, period)) for left, box, shifts, period in tried]
+    ranked.sort(key=lambda each: each[0])
+    least, best = ranked[0]
+    for left, beside in ranked if len(ranked) > 1 else ():
+        if left > least + _NO_CHANCE:
+            break
+        if possible(beside.begun(structure, structure.start)):
+            return beside
+    return best
 
 
 def _likeliest(

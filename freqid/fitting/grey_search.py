@@ -176,14 +176,11 @@ def _searched(
 ) -> tuple[Found, Beside | BesidePlaces | None]:
     """The minimum on these lines, no worse than what is known, and the black boxes it aimed at."""
     structure, readings, start = data.structure, data.readings, data.structure.start
-    beside = beside_of(structure, readings, data.lines)
+    beside = beside_of(structure, readings, data.lines, lambda x: scout.point(x) is not None)
     if isinstance(beside, Beside) and structure.model.delay_sources:
         start = beside.begun(structure, start)
     elif beside is None and structure.model.delay_sources:
         start = begun_slowly(structure, readings, start)
-    if start is not structure.start and scout.point(start) is None:
-        # such a delay leaves too much open
-        start = structure.start
     if known is None and (start != structure.start).any():
         # what the black box's delays lead to has to stand beside the user's own
         known = structure.start

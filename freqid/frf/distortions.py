@@ -96,7 +96,7 @@ def distortion(
     >>> runs = [fq.simulate(fq.first_order(), fq.multisine((1, 50), 1, 1e-3, 4, "random", seed=s),
     ...                     1e-3, hold="bl").with_noise(0.01, seed=s) for s in range(3)]
     >>> distortion(runs, period=1.0)
-    <Distortion, robust: <FrequencyResponse 1x1: 50 lines, 1-50 Hz, dt=0.001 s>>
+    <Distortion, robust: <AveragedResponse 1x1: 50 lines, 1-50 Hz, dt=0.001 s>>
     """
     sets = as_records(records)
     first = sets[0]
