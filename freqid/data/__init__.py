@@ -40,6 +40,7 @@ from freqid.data.stamped_record import StampedRecord
 from freqid.data.stream_chain import files_of
 from freqid.data.stream_sources import open
 from freqid.data.streams import Stream
+from freqid.data.told_hold import folded_part
 from freqid.data.units import (
     is_count,
     is_of_time,

@@ -10,6 +10,8 @@ from freqid.checks import BoolArray, FloatArray, IntArray, positive, whole
 
 # part of the new Nyquist frequency below which the anti-alias filter changes nothing
 _PASSED = 0.9
+# part of the lines that are next to the Nyquist limit, and samples that show a spectrum there
+_TENTH, _FEWEST = 10, 64
 
 
 def unfold(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:
@@ -89,6 +91,22 @@ def powers_above(x: FloatArray, factor: int) -> tuple[FloatArray, FloatArray]:
     window = scipy.signal.get_window("hann", len(x))[:, None]
     power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
     return power[len(power) // factor + 1 :].sum(axis=0), power.sum(axis=0)
+
+
+def power_beyond(x: FloatArray, factor: float) -> float:
+    """About the part of the power of signals (N, channels) that sampling has folded, where each was
+    held ``factor`` times in a sample: next to the Nyquist limit it is as large as beyond.
+
+    Of the signal of which it is the largest. A spectrum that has fallen to nothing there, as that
+    of a sweep below it, has folded nothing.
+    """
+    if factor <= 1 + 1e-9 or len(x) < _FEWEST:
+        return 0.0
+    window = scipy.signal.get_window("hann", len(x))[:, None]
+    power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
+    mean = power.mean(axis=0)
+    last = power[-max(len(power) // _TENTH, 1) :].mean(axis=0)
+    return float(np.max(last / np.where(mean > 0, mean, np.inf)) * (1 - 1 / factor))
 
 
 def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data import FrequencyResponse, Record, Stream
+from freqid.data import FrequencyResponse, Record, Stream, folded_part
 
 
 def measured(
@@ -38,13 +38,16 @@ def measured(
         reach=reach,
         conditions=record.conditions,
         units=units_of(record),
-        aliased=record.aliased if aliased is None else aliased,
+        aliased=aliased_of([record]) if aliased is None else aliased,
     )
 
 
 def aliased_of(sets: Sequence[Record | Stream]) -> float:
-    """What decimation had folded of the input's power, in the record of which it is the most."""
-    return max(record.aliased for record in sets)
+    """What decimation had folded of the input's power, in the record of which it is the most; where
+    none remembers it, what their spectra tell of it.
+    """
+    remembered = max(record.aliased for record in sets)
+    return remembered or max(map(folded_part, sets))
 
 
 def units_of(record: Record | Stream) -> dict[str, str]:
