@@ -10,7 +10,8 @@ import scipy
 from freqid.checks import Array, BoolArray, ComplexArray, FloatArray
 from freqid.fitting.cost.many_costs import ManyCosts, ManyPoints
 from freqid.fitting.uncertainty.evenness import levels_of_evenness
-from freqid.fitting.uncertainty.gradient_noise import MOST_LEVERAGE
+from freqid.fitting.uncertainty.gradient_noise import FEW, larger
+from freqid.fitting.uncertainty.noise_of_series import MOST_LEVERAGE
 from freqid.fitting.uncertainty.noise_spectrum import smoothed_power
 from freqid.lti import PeriodicHold
 
@@ -50,6 +51,10 @@ class Left:
         power = smoothed_power(self._lines() / np.sqrt(1 - taken).reshape(S, -1, self.e.n_lines))
         each = np.repeat(power.reshape(S, -1) / 2, 2, axis=-1)
         score = (J * each[:, None]) @ J.swapaxes(-1, -2) * (self.rows / self.freedom)
+        if self.rows < FEW:
+            H, white = J @ J.swapaxes(-1, -2), self.at.cost / self.freedom
+            every = zip(score, white, H, strict=True)
+            score = np.array([larger(own, level * h, h) for own, level, h in every])
         return np.asarray(np.sqrt(np.einsum("spp->sp", self.inverse @ score @ self.inverse)))
 
     @cached_property

@@ -14,11 +14,14 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
-from freqid.fitting.uncertainty.noise_spectrum import local_mean, of_outputs, smoothed_power
+from freqid.fitting.uncertainty.noise_of_series import MOST_LEVERAGE, of_series
+from freqid.fitting.uncertainty.noise_spectrum import local_mean, of_outputs
 from freqid.lti import Realisation, tuned
 
 # means for each unknown from which they tell their own noise
 _MEANS = 5
+# values that hardly tell a colour: their noise is no less than white
+FEW = 100
 # complex values of a line and its neighbours that tell by how much its noise is off
 _VALUES = 10
 # part of the largest direction of a Jacobian below which one is rounding
@@ -27,8 +30,6 @@ _TOLD = 1e-14
 _CERTAIN = 4.0
 # leverage from which a line may be all but a parameter's own
 _ALONE = 0.5
-# leverage that is believed at the most
-MOST_LEVERAGE = 0.9
 
 
 @tuned
@@ -59,6 +60,7 @@ def score_covariance(
     except Exception:  # the user's function may raise anything
         return None
     total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
+    H, cost = np.zeros((len(x), len(x))), 0.0
     for e in lines:
         # all of its lines: those few that an input has, or that tell a parameter, are not to be
         # missed
@@ -75,6 +77,7 @@ def score_covariance(
             total += of_outputs(J, left, e)
         rows += e.n_rows
         unknown += 0 if delta is None else len(delta)
+        H, cost = H + J @ J.T, cost + float(r @ r)
     for log in stamped:
         part, n_free = _of_stamps(log, realisation, noise_at)
         total += part
@@ -85,7 +88,11 @@ def score_covariance(
     # lines of a response have had their share of the freedom taken off one by one
     if lines and not stamped and all(e.response for e in lines):
         return total
-    return total * rows / max(rows - unknown - len(x), 1)
+    freedom = max(rows - unknown - len(x), 1)
+    total = total * rows / freedom
+    # those of a prior are no noise, and a response has noise of its own at each line
+    bare = alone is None and not stamped and not any(e.response for e in lines)
+    return larger(total, cost / freedom * H, H) if rows < FEW and bare else total
 
 
 def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -> FloatArray | None:
@@ -96,6 +103,7 @@ def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -
     except Exception:  # the user's function may raise anything
         return None
     total, rows, unknown = np.zeros((len(x), len(x))), 0, 0
+    H, cost = np.zeros((len(x), len(x))), 0.0
     for e in objective.experiments:
         assert isinstance(e, TimeExperiment)
         if e.lines is not None:
@@ -106,12 +114,16 @@ def _of_samples(objective: Objective, x: FloatArray, alone: FloatArray | None) -
         J = J - (J @ Q.T) @ Q
         if noise_at is not realisation:
             left = projected(e.at(noise_at))[0]
-        total += _of_series(J.reshape(len(x), len(e.y), -1), left.reshape(len(e.y), -1))
+        absorbed = Q.reshape(len(Q), *left.reshape(len(e.y), -1).shape)
+        total += of_series(J.reshape(len(x), len(e.y), -1), left.reshape(len(e.y), -1), absorbed)
         rows += e.n_rows
         unknown += 0 if delta is None else len(delta)
+        H, cost = H + J @ J.T, cost + float(left @ left)
     if not np.isfinite(total).all():
         return None
-    return total * rows / max(rows - unknown - len(x), 1)
+    freedom = max(rows - unknown - len(x), 1)
+    total = total * rows / freedom
+    return larger(total, cost / freedom * H, H) if rows < FEW else total
 
 
 def _of_periods(objective: Objective, x: FloatArray) -> FloatArray | None:
@@ -196,22 +208,8 @@ def _of_stamps(
     J = J - (J @ Q.T) @ Q
     if noise_at is not at:
         left = projected(e.at(noise_at))[0]
-    J, left = np.moveaxis(J.reshape(len(J), *e.y.shape), 2, 1), left.reshape(e.y.shape).T
-    return _of_series(J, left), 0 if delta is None else len(delta)
-
-
-def _of_series(J: FloatArray, left: FloatArray) -> FloatArray:
-    """JᵀΣJ of derivatives (P, outputs, N), Σ being the covariance that residuals (outputs, N) tell:
-    the sum over all samples is that over the lines, each but the ends standing for two.
-    """
-    R, JF = (scipy.fft.rfft(a, norm="ortho") for a in (left, J))
-    twice = np.full(R.shape[-1], 2.0)
-    twice[0] = 1.0
-    if left.shape[-1] % 2 == 0:
-        twice[-1] = 1.0
-    seen = (JF * (smoothed_power(R) * twice)).reshape(len(J), -1)
-    total: FloatArray = (seen @ JF.reshape(len(J), -1).conj().T).real
-    return total
+    J, Q = (np.moveaxis(M.reshape(len(M), *e.y.shape), 2, 1) for M in (J, Q))
+    return of_series(J, left.reshape(e.y.shape).T, Q), 0 if delta is None else len(delta)
 
 
 def _of_response(
