@@ -51,8 +51,10 @@ class Left:
         power = smoothed_power(self._lines() / np.sqrt(1 - taken).reshape(S, -1, self.e.n_lines))
         each = np.repeat(power.reshape(S, -1) / 2, 2, axis=-1)
         score = (J * each[:, None]) @ J.swapaxes(-1, -2) * (self.rows / self.freedom)
-        if self.rows < FEW:
-            H, white = J @ J.swapaxes(-1, -2), self.at.cost / self.freedom
+        if self.e.n_rows < FEW:
+            # lines at zero and at the Nyquist limit are real
+            told = max(self.freedom - self.rows + self.e.n_rows, 1)
+            H, white = J @ J.swapaxes(-1, -2), self.at.cost / told
             every = zip(score, white, H, strict=True)
             score = np.array([larger(own, level * h, h) for own, level, h in every])
         return np.asarray(np.sqrt(np.einsum("spp->sp", self.inverse @ score @ self.inverse)))
