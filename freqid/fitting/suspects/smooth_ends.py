@@ -22,6 +22,8 @@ from freqid.lti import BandLimited
 
 # samples at each end in which what is left has fallen to a thousandth, and their part of a record
 _SAMPLES, _PART = 20, 16
+# samples beside which those are next to nothing, and their rows take much memory
+_LONG = 500_000
 
 
 def with_smooth_ends(scene: Scene, readings: Sequence[Reading]) -> Scene:
@@ -41,7 +43,7 @@ def with_smooth_ends(scene: Scene, readings: Sequence[Reading]) -> Scene:
 def _ends(seen: Seen) -> FloatArray | None:
     """A row for each output at each of these samples."""
     record, lines, transient = seen.reading.data, seen.experiment.lines, seen.experiment.transient
-    if transient is None or not isinstance(record, Record):
+    if transient is None or not isinstance(record, Record) or record.n_samples > _LONG:
         return None
     count = min(_SAMPLES, record.n_samples // _PART)
     return open_ends(lines, transient, (count, -count), transient.dt, 2 * lines.Y.size)[0]
