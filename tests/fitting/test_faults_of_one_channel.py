@@ -109,7 +109,7 @@ def test_of_one_output_nothing_is_named():
 
 
 GAINS = [
-    ("output", 1, 1.2, "noise"), ("input", 1, 1.2, None), ("input", 0, 1.1, None),
+    ("input", 1, 1.2, None), ("output", 1, 1.2, "noise"), ("input", 0, 1.1, None),
     ("output", 1, 0.9, "noise"), ("output", 0, 1.5, None),
 ]  # fmt: skip
 

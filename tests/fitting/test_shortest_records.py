@@ -34,7 +34,7 @@ def test_error_bars_hold_their_level(n, state, colour):
     """Of 95 % intervals 85 to 88 % had held the truth where leastsq's hold it in 90 to 97 %."""
     tau = n / 6
     held = []
-    for seed in range(100):
+    for seed in range(60):
         est = fq.fit(lag(tau), step_answer(n, tau, seed, colour), initial_state=state)
         error = np.abs(est.values - [2, tau]) / est.parameters["std"]
         held.append(error < 1.96)

@@ -42,6 +42,7 @@ def test_ends_are_no_feedback(noise, seed):
     assert abs(est["a"] - 20) < 4 * est.parameters["std"]["a"]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_loop_is_still_doubted(seed):
     """u = r − 8 (y + e) through a filter of 20 Hz."""
