@@ -72,7 +72,8 @@ def local_mean(power: FloatArray) -> FloatArray:
     K = power.shape[-1]
     width = min(2 * int(np.sqrt(K)) + 1, K)
     smooth: FloatArray = scipy.ndimage.uniform_filter1d(power, width, axis=-1, mode="reflect")
-    return smooth
+    # of running sums rounding may leave less than nothing
+    return np.maximum(smooth, 0.0)
 
 
 def _autoregressive(power: FloatArray) -> FloatArray:
