@@ -217,10 +217,15 @@ def again(est: Estimate, options: SearchOptions) -> SearchOptions:
 
 def in_logarithms(reading: Reading, model: object) -> Reading:
     """A response read in logarithms, by its variance where it tells one."""
-    if not isinstance(reading.data, FrequencyResponse) or not isinstance(model, GreyBox):
+    if not isinstance(model, GreyBox):
         raise InputError(
-            "error='log' needs a GreyBox and responses: estimate those of records first, with "
-            "h1, local_rational or periodic"
+            f"error='log' needs a GreyBox; model={type(model).__name__} is fitted with "
+            "weights='noise' or with weights=1/abs(response)**2, which count errors as parts"
+        )
+    if not isinstance(reading.data, FrequencyResponse):
+        raise InputError(
+            "error='log' needs responses: estimate those of records first, with h1, "
+            "local_rational or periodic"
         )
     known = reading.noise.plain and tells_variance(reading.data)
     noise = as_noise_model("noise", reading.data) if known else reading.noise

@@ -120,7 +120,8 @@ def distortion(
         if away > _APERIODIC:
             raise InputError(
                 f"period={period:g} s: the input differs from one period to the next by "
-                f"{100 * away:.0f} % of its rms; check the period, or skip the beginning"
+                f"{100 * away:.0f} % of its rms; check the period, skip the beginning, or, in a "
+                "loop or where the input was measured, give what was commanded as reference"
             )
 
     def lines(signals: Sequence[FloatArray]) -> ComplexArray:
