@@ -87,9 +87,7 @@ def power_above(x: FloatArray, factor: int) -> float:
 
 def powers_above(x: FloatArray, factor: int) -> tuple[FloatArray, FloatArray]:
     """Power of each signal, (N, channels), above that limit, and all of it beside its mean."""
-    # a window, so that a record's ends do not look like high frequencies
-    window = scipy.signal.get_window("hann", len(x))[:, None]
-    power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
+    power = _power(x)
     return power[len(power) // factor + 1 :].sum(axis=0), power.sum(axis=0)
 
 
@@ -102,11 +100,18 @@ def power_beyond(x: FloatArray, factor: float) -> float:
     """
     if factor <= 1 + 1e-9 or len(x) < _FEWEST:
         return 0.0
-    window = scipy.signal.get_window("hann", len(x))[:, None]
-    power = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
+    power = _power(x)
     mean = power.mean(axis=0)
     last = power[-max(len(power) // _TENTH, 1) :].mean(axis=0)
     return float(np.max(last / np.where(mean > 0, mean, np.inf)) * (1 - 1 / factor))
+
+
+def _power(x: FloatArray) -> FloatArray:
+    """Power of signals (N, channels) beside their mean at each line."""
+    # a window, so that a record's ends do not look like high frequencies
+    window = scipy.signal.get_window("hann", len(x))[:, None]
+    power: FloatArray = np.abs(np.fft.rfft((x - x.mean(axis=0)) * window, axis=0)) ** 2
+    return power
 
 
 def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:

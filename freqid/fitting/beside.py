@@ -162,18 +162,16 @@ def beside_of(
         few = cast("Sequence[SpectralExperiment]", box.objective.experiments)
         one = len(several) == 1
         left = 0.0 if one else description_length(box.cost, few, readings, shifts)
-        tried.append((left, box, shifts, readings[0].sample_time))
+        tried.append((left, Beside(box, shifts, readings[0].sample_time)))
     if not tried:
         return None
-    ranked = [(left, Beside(box, shifts, period)) for left, box, shifts, period in tried]
-    ranked.sort(key=lambda each: each[0])
-    least, best = ranked[0]
-    for left, beside in ranked if len(ranked) > 1 else ():
-        if left > least + _NO_CHANCE:
-            break
-        if possible(beside.begun(structure, structure.start)):
-            return beside
-    return best
+    tried.sort(key=lambda each: each[0])
+    least, best = tried[0]
+    near = [beside for left, beside in tried if left <= least + _NO_CHANCE]
+    if len(near) == 1:
+        return best
+    begun = (b for b in near if possible(b.begun(structure, structure.start)))
+    return next(begun, best)
 
 
 def _likeliest(

@@ -42,6 +42,16 @@ def test_ends_are_no_feedback(noise, seed):
     assert abs(est["a"] - 20) < 4 * est.parameters["std"]["a"]
 
 
+def test_ends_of_several_records_are_none_either():
+    """All of five such sets were "feedback", "do not use"."""
+    records = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        u = smooth(rng, 12)
+        records.append(logged(u, lag(u), 1e-3, rng))
+    assert fq.fit(LAG, records).verdict.trusted
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_loop_is_still_doubted(seed):

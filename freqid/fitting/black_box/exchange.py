@@ -86,15 +86,21 @@ def pairs_asked_for(
     """
     pairs = candidates(lines.w)
     gains = _gains(lines, lines.residual(best), pairs)
-    picked: list[ComplexArray] = []
+    picked = [np.array([p, p.conj()]) for p in pairs[most_of(pairs, gains, count)]]
+    return picked, float(gains.max(initial=0.0))
+
+
+def most_of(poles: ComplexArray, gains: FloatArray, count: int) -> list[int]:
+    """Numbers of so many poles that gain most, one for each place."""
+    picked: list[int] = []
     for i in np.argsort(-gains):
-        p = pairs[i]
-        near = [abs(p - q[0]) < 2 * max(1 - abs(p), 1 - abs(q[0])) for q in picked]
+        p = poles[i]
+        near = [abs(p - q) < 2 * max(1 - abs(p), 1 - abs(q)) for q in poles[picked]]
         if not any(near):
-            picked.append(np.array([p, p.conj()]))
+            picked.append(int(i))
         if len(picked) == count:
             break
-    return picked, float(gains.max(initial=0.0))
+    return picked
 
 
 def candidates(w: ComplexArray) -> ComplexArray:

@@ -7,8 +7,9 @@ residue (Kailath, Linear Systems, 1980, section 1.2), takes the place of each of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.black_box.channel_units import Descent
-from freqid.fitting.black_box.exchange import REAL, candidates
+from freqid.fitting.black_box.exchange import REAL, candidates, most_of
 from freqid.fitting.black_box.held_inputs import inputs_and_cost, left_by
 from freqid.fitting.black_box.subspace import columns_of
 from freqid.fitting.cost.evaluation import projected
@@ -59,11 +60,11 @@ def with_another_mode(
         # what stands next to one alone is not all that it explains
         worth = min(costs) - weighed.fitted(modes)[1] if costs else 0.0
         realisation = chart.realise(solution.x)
-        left = _Left.of(few, [projected(e.at(realisation))[0] for e in few])
-        if not left.pairs(1)[1] > _WORTH * worth:
+        left = [projected(e.at(realisation))[0] for e in few]
+        if not weighed.pairs.gains(left).max(initial=0.0) > _WORTH * worth:
             return []
-        pairs = weighed.begun(_without_two(modes), lambda left: left.pairs(_TRIED)[0])
-        real = weighed.begun(_without_real(modes), lambda left: left.real(_TRIED))
+        pairs = weighed.begun(_without_two(modes), weighed.pairs)
+        real = weighed.begun(_without_real(modes), weighed.real)
     except np.linalg.LinAlgError:
         return []
     return [*pairs[:_STARTS], *real[:1]]
@@ -81,21 +82,40 @@ class _Weighed:
         """The model of these modes, and what it leaves."""
         return inputs_and_cost(self.lines, *self._joined(modes), self.feedthrough)
 
-    def begun(
-        self, rests: Sequence[Sequence[_Mode]], added: Callable[[_Left], list[_Mode]]
-    ) -> list[StateSpace]:
-        """Models of each of the rests with what is ``added`` for what it leaves, the best first."""
+    def begun(self, rests: Sequence[Sequence[_Mode]], added: _Poles) -> list[StateSpace]:
+        """Models of each of the rests with a mode that what it leaves asks for, the best first."""
         tried = []
         for rest in rests:
             left = left_by(self.lines, *self._joined(rest), self.feedthrough)
-            more = added(_Left.of(self.lines, left))
-            tried += [self.fitted([*rest, mode]) for mode in more]
+            tried += [self.fitted([*rest, mode]) for mode in added.asked_for(left)]
         return [start for start, _ in sorted(tried, key=lambda each: each[1])]
 
     def _joined(self, modes: Sequence[_Mode]) -> tuple[FloatArray, FloatArray]:
         """A (n, n) and C (outputs, n) of several modes."""
         A: FloatArray = scipy.linalg.block_diag(*(mode.A for mode in modes), np.zeros((0, 0)))
         return A, np.hstack([*(mode.C for mode in modes), np.zeros((self.outputs, 0))])
+
+    @cached_property
+    def _driven(self) -> tuple[ComplexArray, ComplexArray]:
+        """Points z (K,) and inputs (m, K) there."""
+        each = [columns_of(e, i, self.lines) for i, e in enumerate(self.lines)]
+        own = [V[: len(e.lines.U)] for (_, _, V), e in zip(each, self.lines, strict=True)]
+        return np.concatenate([z for z, _, _ in each]), np.concatenate(own, axis=1)
+
+    @cached_property
+    def pairs(self) -> _Poles:
+        """Pairs, of numerators (β w + α) for each input and output: two real unknowns each."""
+        z, V = self._driven
+        poles = candidates(np.unique(z))
+        s = 1 / ((z - poles[:, None]) * (z - poles[:, None].conj()))
+        return _Poles(poles, s[:, None, :] * np.concatenate([V, z * V]), self.outputs)
+
+    @cached_property
+    def real(self) -> _Poles:
+        """Real poles."""
+        z, V = self._driven
+        poles = np.array(REAL, complex)
+        return _Poles(poles, (1 / (z - poles[:, None]))[:, None, :] * V, self.outputs)
 
 
 def _modes(at: StateSpace) -> list[_Mode]:
@@ -133,60 +153,44 @@ def _without_real(modes: Sequence[_Mode]) -> list[list[_Mode]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Left:
-    """What is left at the lines, E (p, K) at z (K,), and the inputs V (m, K) there."""
+class _Poles:
+    """Poles that may be asked for, and what their modes do at the lines, columns (poles, c, K)."""
 
-    z: ComplexArray
-    V: ComplexArray
-    E: ComplexArray
+    poles: ComplexArray
+    columns: ComplexArray
+    outputs: int
 
-    @classmethod
-    def of(cls, lines: Sequence[SpectralExperiment], left: Sequence[FloatArray]) -> _Left:
-        """Of the rows of each experiment."""
-        z, driven, rest = [], [], []
-        for index, (e, rows) in enumerate(zip(lines, left, strict=True)):
-            w, _, V = columns_of(e, index, lines)
-            parts = rows.reshape(len(e.lines.Y), -1, 2)
-            z.append(w)
-            driven.append(V[: len(e.lines.U)])
-            rest.append(parts[..., 0] + 1j * parts[..., 1])
-        return cls(np.concatenate(z), np.concatenate(driven, 1), np.concatenate(rest, 1))
+    @cached_property
+    def _gram(self) -> FloatArray:
+        gram: FloatArray = (self.columns @ self.columns.conj().swapaxes(1, 2)).real
+        return gram
 
-    def pairs(self, count: int) -> tuple[list[_Mode], float]:
-        """So many pairs of poles that explain most of it, one for each place, and how much of its
-        squares the first of them does.
+    def asked_for(self, left: Sequence[FloatArray]) -> list[_Mode]:
+        """The modes that explain most of what is ``left``, the rows of each experiment: one for
+        each place, each with the shape of its residue.
         """
-        z, poles = self.z, candidates(np.unique(self.z))
-        s = 1 / ((z - poles[:, None]) * (z - poles[:, None].conj()))
-        # (β w + α) V/((w − p)(w − p̄)) for each input and output: two real unknowns each
-        gains, terms = self._explained(s[:, None, :] * np.concatenate([self.V, z * self.V]))
-        picked: list[int] = []
-        for i in np.argsort(-gains):
-            p = poles[i]
-            near = [abs(p - poles[k]) < 2 * max(1 - abs(p), 1 - abs(poles[k])) for k in picked]
-            if not any(near):
-                picked.append(int(i))
-            if len(picked) == count:
-                break
-        modes = [_pair(poles[i], _shape(poles[i], *np.split(terms[i], 2))) for i in picked]
-        return modes, float(gains.max(initial=0.0))
+        terms, gains = self._explained(left)
+        number = most_of(self.poles, gains, _TRIED)
+        return [_residual_mode(self.poles[i], terms[i]) for i in number]
 
-    def real(self, count: int) -> list[_Mode]:
-        """So many real poles that explain most of it."""
-        poles = np.array(REAL)
-        gains, terms = self._explained((1 / (self.z - poles[:, None]))[:, None, :] * self.V)
-        return [
-            _Mode(np.array([[poles[i]]]), np.linalg.svd(terms[i].T)[0][:, :1])
-            for i in np.argsort(-gains)[:count]
-        ]
+    def gains(self, left: Sequence[FloatArray]) -> FloatArray:
+        """How much of its squares each explains, (poles,)."""
+        return self._explained(left)[1]
 
-    def _explained(self, columns: ComplexArray) -> tuple[FloatArray, FloatArray]:
-        """How much real multiples of columns (poles, c, K) explain, and these, (poles, c, p)."""
-        gram = (columns @ columns.conj().swapaxes(1, 2)).real
-        right = (columns @ self.E.conj().T).real
-        terms = np.linalg.solve(gram, right)
+    def _explained(self, left: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Real multiples of the columns, (poles, c, outputs), and how much they explain."""
+        E = np.concatenate([r.view(complex).reshape(self.outputs, -1) for r in left], axis=1)
+        right = (self.columns @ E.conj().T).real
+        terms = np.linalg.solve(self._gram, right)
         gains = np.einsum("kio,kio->k", terms, right)
-        return np.where(np.isfinite(gains), gains, 0), terms
+        return terms, np.where(np.isfinite(gains), gains, 0)
+
+
+def _residual_mode(pole: complex, terms: FloatArray) -> _Mode:
+    """A mode with the shape of its residue, of which the ``terms`` (c, outputs) tell."""
+    if pole.imag == 0:
+        return _Mode(np.array([[pole.real]]), np.linalg.svd(terms.T)[0][:, :1])
+    return _pair(pole, _shape(pole, *np.split(terms, 2)))
 
 
 def _shape(pole: complex, alpha: FloatArray, beta: FloatArray) -> ComplexArray:

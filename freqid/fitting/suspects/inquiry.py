@@ -84,8 +84,7 @@ class Inquiry(Lone):
         if self.minimum.exact or not self.minimum.solution.converged:
             return None
         try:
-            scene = Scene.of(self.minimum, self.readings, self.share)
-            return with_smooth_ends(scene, self.readings)
+            return with_smooth_ends(Scene.of(self.minimum, self.readings, self.share))
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return None
 

@@ -46,8 +46,8 @@ def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[F
     assert isinstance(structure, GreyStructure)
     # as the fit itself has left them: one start again may end elsewhere
     now = _spread(model, readings)
-    each = [_Shifted(model, structure, inquiry.minimum.x, o) for o in range(model.n_outputs)]
-    tried = [found for one in each if (found := one.best(readings, now)) is not None]
+    each = [_Shifted(inquiry, structure, o, now) for o in range(model.n_outputs)]
+    tried = [found for one in each if (found := one.best()) is not None]
     if not tried:
         return []
     left, lag, output = min(tried)
@@ -83,24 +83,21 @@ class _Shifted:
     nearest other ended and from its start.
     """
 
-    def __init__(self, model: GreyBox, found: GreyStructure, x: FloatArray, output: int) -> None:
-        self.output = output
+    def __init__(self, inquiry: Asking, found: GreyStructure, output: int, now: float) -> None:
+        self.readings, self.output = inquiry.readings, output
         start = dict(zip(found.physical_names, found.values, strict=False))
-        self.structure = GreyStructure(model.with_values(**start))
+        self.structure = GreyStructure(found.model.with_values(**start))
         # where each number of samples has led, and what it left
-        self.ends = {0: x * found.scale / self.structure.scale}
-        self.known: dict[int, float] = {}
-
-    def best(self, readings: Sequence[Reading], now: float) -> tuple[float, int, int] | None:
-        """The least spread, the samples that have it, and the output; None where it is ``now``,
-        with none.
-        """
+        self.ends = {0: inquiry.minimum.x * found.scale / self.structure.scale}
         self.known = {0: now}
+
+    def best(self) -> tuple[float, int, int] | None:
+        """The least spread, the samples that have it, and the output; None where none is best."""
 
         def best_of(lags: Iterable[int]) -> int:
             for lag in lags:
                 if lag not in self.known and abs(lag) <= _FARTHEST:
-                    self.known[lag] = self.spread(readings, lag)
+                    self.known[lag] = self.spread(lag)
             return min(self.known, key=lambda lag: self.known[lag])
 
         lag = best_of(sign * q for q in _TRIED for sign in (1, -1))
@@ -115,13 +112,13 @@ class _Shifted:
             width //= 2
         return self.known[lag], lag, self.output
 
-    def spread(self, readings: Sequence[Reading], lag: int) -> float:
+    def spread(self, lag: int) -> float:
         """What is left with that output so much sooner; infinite where nothing can be fitted."""
         structure = self.structure
         shifts = [lag * (o == self.output) for o in range(structure.model.n_outputs)]
         near = min(self.ends, key=lambda other: abs(other - lag))
         try:
-            moved = [outputs_in_step(r, shifts) for r in readings]
+            moved = [outputs_in_step(r, shifts) for r in self.readings]
             objective = Objective(structure, [r.experiment() for r in moved])
             tried = [polish(objective, x, limit=_LIMIT) for x in (structure.start, self.ends[near])]
             self.ends[lag] = min(tried, key=lambda solution: solution.cost).x

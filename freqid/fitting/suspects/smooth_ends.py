@@ -7,28 +7,32 @@ both ends goes with inputs still to come, as in a loop, though none is fed back.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy.linalg
 
 from freqid.checks import FloatArray
 from freqid.data import Record
 from freqid.fitting.cost.delays import open_ends
-from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.lti import BandLimited
 
 # samples at each end in which what is left has fallen to a thousandth, and their part of a record
 _SAMPLES, _PART = 20, 16
-# samples beside which those are next to nothing, and their rows take much memory
-_LONG = 500_000
+# products that clearing other rows of these may take
+_PRODUCTS = 2e8
 
 
-def with_smooth_ends(scene: Scene, readings: Sequence[Reading]) -> Scene:
+def with_smooth_ends(scene: Scene) -> Scene:
     """The scene where outputs next to both ends of such records are free; others as they are."""
-    rows = [_ends(s) if isinstance(s.reading.hold, BandLimited) else None for s in scene.seen]
+    smooth = [s for s in scene.seen if isinstance(s.reading.hold, BandLimited)]
+    if not smooth:
+        return scene
+    # beside the ends of many or long records, which take time and memory, fewer samples are free
+    length = sum(len(s.left) for s in scene.seen)
+    each = np.sqrt(_PRODUCTS / length) / sum(2 * s.n_outputs for s in smooth)
+    count = min(_SAMPLES, int(each))
+    rows = [_ends(s, count) if s in smooth else None for s in scene.seen]
     if all(r is None for r in rows):
         return scene
     own = [
@@ -40,10 +44,10 @@ def with_smooth_ends(scene: Scene, readings: Sequence[Reading]) -> Scene:
     return scene.with_free(np.split(columns, ends, axis=1))
 
 
-def _ends(seen: Seen) -> FloatArray | None:
-    """A row for each output at each of these samples."""
+def _ends(seen: Seen, count: int) -> FloatArray | None:
+    """A row for each output at each of so many samples."""
     record, lines, transient = seen.reading.data, seen.experiment.lines, seen.experiment.transient
-    if transient is None or not isinstance(record, Record) or record.n_samples > _LONG:
+    if transient is None or not isinstance(record, Record):
         return None
-    count = min(_SAMPLES, record.n_samples // _PART)
+    count = min(count, record.n_samples // _PART)
     return open_ends(lines, transient, (count, -count), transient.dt, 2 * lines.Y.size)[0]
