@@ -213,7 +213,7 @@ def _of_response(c: Comparison) -> pd.DataFrame:
             each = left[o, i]
             K = len(each)
             q, null = _size(np.abs(each) ** 2, freedom), scipy.stats.chi2(2 * K)
-            if frf.reach > _WINDOWED:
+            if frf.reach > _WINDOWED and freedom is None:
                 q, null = q / (2 * K), _few_lines(K / (frf.reach + 1))
             elif frf.reach:
                 # lines of a window go together: as many as are apart
