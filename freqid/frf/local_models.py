@@ -27,7 +27,7 @@ from freqid.data import (
     references_of,
     that_estimates,
 )
-from freqid.frf.local_windows import Form, Lines, Local, inflation, local_models
+from freqid.frf.local_windows import Form, Lines, inflation, local_models
 from freqid.frf.measured import aliased_of, measured
 from freqid.frf.spectra import spectra
 from freqid.lti import tuned
@@ -124,12 +124,10 @@ def _estimate(
         _dense(lines, form.width)
     if width is None:
         lines, form = _widened(sets, signals, band, lines, form)
-    local = local_models(lines, form)
+    local = local_models(lines, form, 0 if signals is None else sets[0].n_inputs)
     spectrum = None
     if signals is None:
         spectrum = (np.abs(lines.U[..., lines.wanted]) ** 2).mean(axis=0)
-    else:
-        local = _through(local, sets[0].n_inputs)
     frf = measured(
         sets[0],
         lines.frequency[lines.wanted],
@@ -251,14 +249,3 @@ def _lines(
     if len(f) < width:
         raise InputError(f"data hold {len(f)} lines for a window of {width}; narrow the window")
     return Lines(U, Y, f, chosen(f, asked))
-
-
-def _through(local: Local, m: int) -> Local:
-    """From reference to [y; u] to the plant: G = G_yr G_ur⁻¹, and its variance to first order."""
-    Z, variance, share, _ = local
-    p = Z.shape[1] - m
-    back = np.linalg.inv(Z[:, p:])
-    G = Z[:, :p] @ back
-    # δG = (δG_yr − G δG_ur) G_ur⁻¹; output and input noise are taken as unrelated
-    each = variance[:, :p] + np.abs(G) ** 2 @ variance[:, p:]
-    return Local(G, each @ np.abs(back) ** 2, share[:, :p, :1].repeat(m, axis=-1), None)

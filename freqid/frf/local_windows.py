@@ -14,6 +14,7 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
 from freqid.data import LineNoise
 from freqid.frf.local_fits import Solution, fitted
+from freqid.frf.local_references import Values, between, related
 
 # windows that are worked on at once
 _BLOCK = 256
@@ -70,33 +71,41 @@ class _Equations(NamedTuple):
     size: FloatArray
 
 
-def local_models(lines: Lines, form: Form) -> Local:
-    """The local models' values at all wanted lines."""
+def local_models(lines: Lines, form: Form, behind: int = 0) -> Local:
+    """The local models' values at all wanted lines; with so many channels ``behind`` the outputs,
+    the plant's inputs as answers to a reference, those of the plant between the two.
+    """
     centres = np.flatnonzero(lines.wanted)
     # a wide window serves the few lines around its own: its functions hold for all of them
     served = max(form.width // _LINES_A_WINDOW, 1)
     own = centres[np.minimum(np.arange(0, len(centres), served) + served // 2, len(centres) - 1)]
     members = np.minimum(np.arange(len(own) * served), len(centres) - 1).reshape(-1, served)
     shape = lines.Y.shape[1], lines.U.shape[1], len(lines.U)
-    known = len(centres) * form.width * np.prod(shape) <= _KEPT
+    known = len(centres) * form.width * np.prod(shape) * (1 + behind) <= _KEPT
     parts = []
     for start in range(0, len(own), _BLOCK):
         run = slice(start, start + _BLOCK)
         near = (centres[members[run]] - own[run, None]) / (form.width / 2)
         equations = _laid_out(lines, own[run], form)
         each = [_evaluated(equations, output, near, form) for output in range(shape[0])]
-        parts.append([np.stack(x, axis=1) for x in zip(*each, strict=True)])
-        if not known:
-            parts[-1][3] = parts[-1][3][:, :, :0]
-    G, variance, share, rows, power = (np.concatenate(x) for x in zip(*parts, strict=True))
-    shown = G[: len(centres)], variance[: len(centres)], share[: len(centres)]
+        G, variance, share, rows, left = (np.stack(x, axis=1) for x in zip(*each, strict=True))
+        block = Values(G, variance, share, rows, left @ left.conj().swapaxes(1, 2))
+        if behind:
+            block = between(block, behind)
+        parts.append(block if known else block._replace(rows=block.rows[..., :0]))
+    values = Values(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+    G, variance, share, rows = (x[: len(centres)] for x in values[:4])
     if not known:
-        return Local(*shown, None)
+        return Local(G, variance, share, None)
     K = len(lines.frequency)
     first = _first(own, form, K).repeat(served)[: len(centres)]
     nearest = np.searchsorted((own[1:] + own[:-1]) / 2, np.arange(K))
-    rows = rows[: len(centres)].reshape(len(centres), *shape, form.width)
-    return Local(*shown, LineNoise(first, rows, power[nearest].T))
+    rows = rows.reshape(*rows.shape[:-1], shape[2], form.width)
+    noise = values.noise[nearest]
+    if behind:
+        return Local(G, variance, share, related(first, rows, noise))
+    power = np.einsum("Kcc->cK", noise).real
+    return Local(G, variance, share, LineNoise(first, rows, power))
 
 
 def inflation(lines: Lines, form: Form) -> float:
@@ -158,7 +167,8 @@ def _evaluated(
     """One output's model at the lines (W, s) that each window serves.
 
     Response, variance and share are (W·s, inputs), what each line of the window adds to the
-    response is (W·s, inputs, n), and the noise of the output's lines is (W,).
+    response is (W·s, inputs, n), and what it leaves of the
+    output is (W, n), such that the sum of its squares is the variance of a line's noise.
     """
     solution, gain = _fitted(equations, output), equations.gain[output]
     (W, s), m = near.shape, gain.shape[1]
@@ -181,8 +191,5 @@ def _evaluated(
     share = np.broadcast_to(np.clip(1 - power, 0, 1)[:, None, None], G.shape)
     size = equations.size[:, output]
     rows = rows / size[:, None, None, None]
-    return (
-        *(x.reshape(W * s, m) for x in (G, variance, share)),
-        rows.reshape(W * s, m, -1),
-        power * size**2,
-    )
+    left = solution.residual * (size / np.sqrt(solution.freedom))[:, None]
+    return *(x.reshape(W * s, m) for x in (G, variance, share)), rows.reshape(W * s, m, -1), left
