@@ -12,6 +12,8 @@ from freqid.plots.style import Dash, Style
 
 Part = dict[str, object]
 _DASHES: dict[Dash | None, str] = {"--": "dash", "-.": "dashdot"}
+# labels of a phase, at the most
+_LABELS = 6
 
 
 def trace(
@@ -58,11 +60,30 @@ def bode_traces(curve: BodeCurve, mode: str = "lines") -> list[Part]:
     return traces
 
 
-def bode_axes(split: float, ticks: Part, amplitude: str = "amplitude") -> Part:
-    """Axes of ``amplitude`` above phase, which begins at ``split`` of the height."""
+def bode_axes(
+    split: float, low: float, high: float, curves: list[BodeCurve], amplitude: str = "amplitude"
+) -> Part:
+    """Axes of ``amplitude`` above phase, which begins at ``split`` of the height, for curves from
+    ``low`` to ``high`` (Hz).
+    """
+    phases = np.concatenate([curve.phase for curve in curves])
+    turned = float(np.ptp(np.append(phases[np.isfinite(phases)], 0)))
+    # a delay turns the phase many times
+    every = 90 * 2 ** max(int(np.ceil(np.log2(max(turned, 1) / (90 * _LABELS)))), 0)
     return {
-        "xaxis": {"type": "log", "anchor": "y2", "title": {"text": "frequency / Hz"}, **ticks},
+        "xaxis": {"type": "log", "anchor": "y2", "title": {"text": "frequency / Hz"},
+                  **_decades(low, high)},
         "yaxis": {"type": "log", "domain": [split, 1], "title": {"text": escape(amplitude)},
                   "exponentformat": "power", "dtick": 1},
-        "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}, "dtick": 90},
+        "yaxis2": {"domain": [0, 0.4], "title": {"text": "phase / degrees"}, "dtick": every},
     }  # fmt: skip
+
+
+def _decades(low: float, high: float) -> Part:
+    """Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten, or at these alone where
+    there are many, each with its number.
+    """
+    first, last = int(np.floor(np.log10(max(low, 1e-9)))), int(np.ceil(np.log10(high)))
+    steps = (1, 2, 5) if high < 1e3 * low else (1,)
+    values = [m * 10.0**k for k in range(first, last + 1) for m in steps]
+    return {"tickvals": values, "ticktext": [f"{v:g}" for v in values]}

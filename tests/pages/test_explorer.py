@@ -505,6 +505,63 @@ def test_own_records_of_any_rate(dt):
     assert shown.response is not None
 
 
+def slow_record():
+    """A heater's, 0.3 mHz to 0.46 Hz, 12 s late."""
+    heater = fq.GreyBox(
+        lambda K, tau: ([[-1 / tau]], [[K / tau]], [[1.0]], [[0.0]]),
+        [fq.Parameter("K", 1.0), fq.Parameter("tau", 60.0), fq.Parameter("Td", 0.0, "s")],
+        input_delay="Td",
+    )
+    true = heater.with_values(K=0.9, tau=180.0, Td=12.0)
+    record = fq.simulate(true, np.repeat([0.0, 10.0, 4.0, 8.0], 900), 1.0)
+    return heater, record.with_noise(0.02, seed=1)
+
+
+def test_a_delay_that_begins_at_nothing_is_drawn():
+    """The page had stayed empty: nothing is a part of it."""
+    from freqid.pages.explorer.figures import bias_figure, bode_figure
+
+    heater, record = slow_record()
+    shown = scene(
+        replace(State.first(Own(heater), record), factor=1, hold="remembered", high=0.05), record
+    )
+    bars = bias_figure(shown)["data"][0]
+    assert dict(zip(bars["x"], bars["text"], strict=True))["Td"].startswith("12")
+    assert np.isfinite(bars["y"]).all()
+    assert "Td" in "".join(sentence(shown)[0]) or "tau" in sentence(shown)[0]
+    bode = bode_figure(shown)
+    by_name = {(c["name"], c["yaxis"]): c for c in bode["data"]}
+    model = by_name["estimate", "y2"]
+    # model and points reach as low, lie on one another and have numbers below them
+    assert model["x"][0] < 1e-3
+    measured = by_name["measured", "y2"]
+    low = np.array(measured["x"]) < 0.01
+    along = np.interp(np.array(measured["x"])[low], model["x"], model["y"])
+    assert np.abs(np.array(measured["y"])[low] - along).max() < 30
+    ticks = np.array(bode["layout"]["xaxis"]["tickvals"])
+    assert np.sum((ticks > 1e-4) & (ticks < 0.5)) >= 3
+    reach = np.ptp(model["y"])
+    assert reach / bode["layout"]["yaxis2"]["dtick"] <= 8
+
+
+def test_what_breaks_behind_the_page_is_said_on_it(monkeypatch):
+    app = application(fq.simulate(fq.first_order(), fq.white_noise(400), 0.01))
+    monkeypatch.setattr(answers, "believed", lambda shown: 1 / 0)
+    key = next(name for name in app.callback_map if "believed" in name)
+    asked = {
+        "output": key,
+        "outputs": [{"id": "believed", "property": "children"},
+                    {"id": "verdict", "property": key.rpartition("verdict.")[2].strip(".")}],
+        "inputs": [{"id": "settled", "property": "data", "value": "?factor=1"}],
+        "changedPropIds": ["settled.data"], "state": [],
+    }  # fmt: skip
+    reply = app.server.test_client().post(
+        "/_dash-update-component", json=asked, headers={"Host": "127.0.0.1"}
+    )
+    assert reply.status_code == 200
+    assert "division by zero" in reply.json["sideUpdate"]["verdict"]["children"]
+
+
 def test_a_record_of_two_outputs_says_what_is_drawn():
     from freqid.pages.explorer.figures import bias_figure, bode_figure, nyquist_figure, time_figure
 

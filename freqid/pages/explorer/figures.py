@@ -46,26 +46,31 @@ def bode_figure(shown: Scene) -> Part:
     curves = list(_curves(shown))
     # one plant's phase begins where the others' does, and points are put next to what fits them
     along = curves[0].response
+    low, high = _band(shown)
+    inside = (along.frequency >= low) & (along.frequency <= high)
+    # beyond the band a delay that is nominal may be turns off
+    beside = along.select((low, high)) if inside.any() else along
     fitted = next((one.response for one in curves if one.label == "estimate"), along)
+    drawn = [
+        bode_curve(one, fitted, scattered=True)
+        if one.label == "measured"
+        else bode_curve(one, beside)
+        for one in curves
+    ]
     data = [
         part
-        for one in curves
-        for part in bode_traces(
-            bode_curve(one, fitted, scattered=True)
-            if one.label == "measured"
-            else bode_curve(one, along),
-            "markers" if one.label == "measured" else "lines",
-        )
+        for one in drawn
+        for part in bode_traces(one, "markers" if one.label == "measured" else "lines")
     ]
-    low, high = _band(shown)
-    ticks = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
     band = {
         "type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1,
         "fillcolor": COLOURS[5], "opacity": 0.12, "line": {"width": 0}, "layer": "below",
     }  # fmt: skip
     layout = base("Frequency response") | bode_axes(
         0.48,
-        {"tickvals": ticks},
+        float(along.frequency[0]),
+        float(along.frequency[-1]),
+        drawn,
         amplitude_label(unit_of([one.response for one in curves])),
     )
     return {"data": data, "layout": layout | {"shapes": [] if shown.state.sine else [band]}}
@@ -133,9 +138,11 @@ def bias_figure(shown: Scene) -> Part:
     if est is None or label_of(shown.state) == "black box, ZOH":
         note = "a black box has no physical parameters" if est is not None else "no fit"
         return {"data": [], "layout": base(f"Parameters: {note}")}
-    ratio = [est[n] / truth[n] for n in est.names]
-    std = np.sqrt(np.diag(est.covariance_matrix)) / np.abs([truth[n] for n in est.names])
-    away, half = np.array(ratio) - 1, Z95 * std
+    # a delay that begins at nothing is no part of that: its number alone is told
+    size = np.array([truth[n] or np.inf for n in est.names])
+    ratio = np.where(np.isfinite(size), [est[n] for n in est.names] / size, 1)
+    std = np.sqrt(np.diag(est.covariance_matrix)) / np.abs(size)
+    away, half = ratio - 1, Z95 * std
     at, low, high = (_spread(v) for v in (away, away - half, away + half))
     bars = {"type": "data", "symmetric": False, "array": (high - at).tolist(),
             "arrayminus": (at - low).tolist(), "color": "#7f7f7f"}  # fmt: skip

@@ -116,7 +116,7 @@ def _built(
         "freqid", title="freqid explorer", update_title="", serve_locally=True,
         suppress_callback_exceptions=True, index_string=page(),
         # plotly.js is five megabytes as it stands
-        compress=find_spec("flask_compress") is not None,
+        compress=find_spec("flask_compress") is not None, on_error=_told,
     )  # fmt: skip
     app.layout = outside(dash)
     answers = Answers(subjects)
@@ -124,6 +124,17 @@ def _built(
     guard(app.server, hosts)
     receive(app.server, subjects)
     return app, answers
+
+
+def _told(error: Exception) -> None:
+    """Say on the page what went wrong behind it, which would leave it empty, and in the terminal
+    where.
+    """
+    import dash
+
+    logging.getLogger("freqid").error("the explorer's page", exc_info=error)
+    text = f"This setting cannot be drawn: {type(error).__name__}: {error}"
+    dash.set_props("verdict", {"children": text, "className": "verdict doubt"})
 
 
 def _wire(dash: ModuleType, app: Dash, answers: Answers) -> None:

@@ -145,7 +145,7 @@ def _frequencies(plants: Iterable[GreyBox], state: State, nyquist: float) -> Flo
     modes = [c for plant in plants for c in resonances(plant)]
     dense = [c * (1 + 0.5 * np.linspace(-1, 1, 121) ** 3) for c in modes]
     f = np.concatenate(
-        [np.geomspace(min(max(state.low / 4, 0.2), nyquist / 50), nyquist, 160), *dense]
+        [np.geomspace(min(max(state.low / 4, nyquist / 5000), nyquist / 50), nyquist, 160), *dense]
     )
     return np.unique(f[(f > 0) & (f < nyquist * 0.9999)])
 

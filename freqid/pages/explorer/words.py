@@ -34,12 +34,14 @@ def sentence(shown: Scene) -> tuple[str, bool]:
     truth = shown.state.model()
     std = dict(zip(est.names, np.sqrt(np.diag(est.covariance_matrix)), strict=True))
     away = {n: est[n] / truth[n] - 1 for n in est.names if truth[n]}
-    # a sign that is impossible says more than any percentage
-    worst = min(away, key=lambda n: (est[n] * truth[n] > 0, -abs(away[n])))
+    # a sign that is impossible says more than any percentage; of nothing there is no part
+    worst = min(
+        est.names, key=lambda n: (n not in away, est[n] * truth[n] > 0, -abs(away.get(n, 0)))
+    )
     found = f"{est[worst]:.4g}{_give_or_take(std[worst], est[worst])}"
     text = (
         f"{worst} = {found} where {truth[worst]:.4g} is {shown.truth}"
-        if abs(away[worst]) > 1e-3
+        if abs(away.get(worst, 1)) > 1e-3
         else f"Every parameter is {shown.truth} to a tenth of a per cent"
     )
     # beside one's own record the plant is a guess, and no estimate is wrong for leaving it

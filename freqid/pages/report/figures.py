@@ -90,19 +90,15 @@ def _responses(est: Estimate, measured: FrequencyResponse, title: str, note: str
     step = max(len(measured.frequency) // _POINTS, 1)
     some = FrequencyResponse(measured.frequency[::step], measured.response[..., ::step])
     data, fitted = Shown(some, "data", _DATA), Shown(model, "model", _ORANGE)
-    return [
-        _figure(
-            f"{title}{measured.input_names[i]} to {measured.output_names[o]}",
-            note,
-            bode_traces(bode_curve(data, model, (o, i), scattered=True), "markers")
-            + bode_traces(bode_curve(fitted, model, (o, i))),
-            520,
-            1.08,
-            bode_axes(0.46, _decades(low, high), amplitude_label(measured.unit(o, i)))
-            | {"hovermode": "x unified"},
-        )
-        for o, i in np.ndindex(*measured.response.shape[:2])
-    ]
+    found = []
+    for o, i in np.ndindex(*measured.response.shape[:2]):
+        points = bode_curve(data, model, (o, i), scattered=True)
+        curves = [points, bode_curve(fitted, model, (o, i))]
+        drawn = bode_traces(points, "markers") + bode_traces(curves[1])
+        axes = bode_axes(0.46, low, high, curves, amplitude_label(measured.unit(o, i)))
+        name = f"{title}{measured.input_names[i]} to {measured.output_names[o]}"
+        found.append(_figure(name, note, drawn, 520, 1.08, axes | {"hovermode": "x unified"}))
+    return found
 
 
 def _of_the_data(est: Estimate, measured: FrequencyResponse) -> str:
@@ -115,13 +111,6 @@ def _of_the_data(est: Estimate, measured: FrequencyResponse) -> str:
         f"{_ZOOM} The data are the ratio of the DFTs, whose scatter at weak lines is no fault of "
         "the model."
     )
-
-
-def _decades(low: float, high: float) -> Part:
-    """Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten, each with its number."""
-    first, last = int(np.floor(np.log10(max(low, 1e-9)))), int(np.ceil(np.log10(high)))
-    values = [m * 10.0**k for k in range(first, last + 1) for m in (1, 2, 5)]
-    return {"tickvals": values, "ticktext": [f"{v:g}" for v in values]}
 
 
 def _measured(est: Estimate) -> FrequencyResponse | None:
