@@ -90,8 +90,8 @@ def _turned(frf: FrequencyResponse, u: Sequence[int], y: Sequence[int]) -> Frequ
         kept = {**frf.of_averages}
     elif isinstance(frf, EmpiricalResponse):
         kept = {"input_phase": frf.input_phase}
-    elif isinstance(frf, LocalResponse) and frf.line_noise is not None:
-        kept = {"line_noise": frf.line_noise.of(y, u)}
+    elif isinstance(frf, LocalResponse):
+        kept = {**frf.of_windows(y, u)}
     elif isinstance(frf, PeriodicResponse):
         # outputs come first in the noise
         both = np.array([*y, *(len(y) + i for i in u)])

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
-from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError, IntArray
+from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError, IntArray, State
+from freqid.data.averaged_response import FREEDOM
 from freqid.data.band import Band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 # the column of a table that holds how the noise of lines gets into each
 NOISE = "line noise"
+# lines by which it is judged how much of their noise lines share
+_JUDGED = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,21 +60,37 @@ class LineNoise:
 
     def along(self, at: ComplexArray) -> FloatArray:
         """Covariance (P, P) of Re Σ conj(at)·error, ``at`` being (P, outputs, inputs, K)."""
-        import scipy.sparse
-
-        K, p, m, E, w = self.rows.shape
-        n = self.power.shape[1]
-        reached = (self.first[:, None] + np.arange(w))[:, None] + n * np.arange(E)[:, None]
+        p, m = self.rows.shape[1:3]
         total = np.zeros((len(at), len(at)))
-        line = np.repeat(np.arange(K), E * w)
         for output in range(p):
-            met = np.zeros((len(at), E * n), complex)
-            for i in range(m):
-                entries = self.rows[:, output, i].ravel(), (line, reached.ravel())
-                spread = scipy.sparse.csr_array(entries, shape=(K, E * n))
-                met += at[:, output, i].conj() @ spread
-            total += (met * np.tile(self.power[output], E) @ met.conj().T).real / 2
+            met = sum(at[:, output, i].conj() @ self._spread(output, i) for i in range(m))
+            total += (met @ met.conj().T).real / 2
         return total
+
+    @property
+    def shared(self) -> float:
+        """Sum of the squares of a line's correlations with all lines, on average: one where each
+        has its own noise.
+        """
+        K, p, m = self.rows.shape[:3]
+        some = np.unique(np.linspace(0, K - 1, _JUDGED).astype(int))
+        total = 0.0
+        for output, i in np.ndindex(p, m):
+            spread = self._spread(output, i)
+            size = np.sqrt(np.maximum((abs(spread) ** 2).sum(axis=1), 1e-300))
+            met = abs(spread[some] @ spread.conj().T).power(2) @ (1 / size**2)
+            total += float(np.mean(met / size[some] ** 2))
+        return total / (p * m)
+
+    def _spread(self, output: int, i: int) -> scipy.sparse.csr_array:
+        """What noise of unit variance adds to one channel pair, (K, E·n)."""
+        K, _, _, E, w = self.rows.shape
+        n = self.power.shape[1]
+        at = self.first[:, None] + np.arange(w)
+        rows = self.rows[:, output, i] * np.sqrt(self.power[output, at])[:, None]
+        reached = at[:, None] + n * np.arange(E)[:, None]
+        line = np.repeat(np.arange(K), E * w)
+        return scipy.sparse.csr_array((rows.ravel(), (line, reached.ravel())), shape=(K, E * n))
 
     def as_texts(self, variance: FloatArray) -> list[str]:
         """What each line of a response of a variance (outputs, inputs, K) has of it, as a column of
@@ -140,18 +160,39 @@ class LocalResponse(FrequencyResponse):
 
     Attributes:
         line_noise: how the noise of the outputs' lines gets into it; None where it is not known.
+        freedom: complex degrees of freedom of each variance, what a window leaves beside its
+            unknowns; None where that is not known.
 
     The other arguments are as in ``FrequencyResponse``. The error bars of a ``fit`` to it count
     that neighbouring lines err together. Made by ``local_polynomial`` and ``local_rational``.
     """
 
     line_noise: LineNoise | None
+    freedom: float | None
 
     def __init__(
-        self, *given: object, line_noise: LineNoise | None = None, **fields: object
+        self,
+        *given: object,
+        line_noise: LineNoise | None = None,
+        freedom: float | None = None,
+        **fields: object,
     ) -> None:
         super().__init__(*given, **fields)  # type: ignore[arg-type]
-        self.__dict__["line_noise"] = line_noise
+        self.__dict__.update(line_noise=line_noise, freedom=freedom)
+
+    def __setstate__(self, state: State) -> None:
+        """Restore; what was written before lacks what was not known then."""
+        super().__setstate__({"freedom": None} | state)
+
+    def of_windows(
+        self, outputs: Sequence[int], inputs: Sequence[int]
+    ) -> Mapping[str, LineNoise | float | None]:
+        """What some of its channels, in this order, have beyond other responses, by name."""
+        known = self.line_noise
+        return {
+            "line_noise": None if known is None else known.of(outputs, inputs),
+            "freedom": self.freedom,
+        }
 
     @that_follows
     def select(self, limits: tuple[float, float]) -> LocalResponse:
@@ -159,11 +200,14 @@ class LocalResponse(FrequencyResponse):
         kept = super().select(limits)
         at = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
         noise = None if self.line_noise is None else self.line_noise.some(at)
-        return LocalResponse(**{**kept.__dict__, "line_noise": noise})
+        own = {"line_noise": noise, "freedom": self.freedom}
+        return LocalResponse(**{**kept.__dict__, **own})
 
     def to_frame(self) -> pd.DataFrame:
         """As of any response, with a column of the noise that lines share, for ``from_frame``."""
         frame = super().to_frame()
         if self.line_noise is not None and self.variance is not None:
             frame[NOISE] = self.line_noise.as_texts(self.variance)
+            if self.freedom is not None:
+                frame[FREEDOM] = self.freedom
         return frame

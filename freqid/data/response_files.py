@@ -222,7 +222,8 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
     found = FrequencyResponse(f, fields.pop("response"), **fields, **names, **kept)  # type: ignore[arg-type]
     if shared is not None and found.variance is not None:
         noise = LineNoise.of_texts(shared, found.variance)
-        return LocalResponse(**found.__dict__, line_noise=noise)
+        told = float(numbers_of(first, FREEDOM)[0]) if FREEDOM in frame.columns else None
+        return LocalResponse(**found.__dict__, line_noise=noise, freedom=told)
     if PHASE in frame.columns:
         return EmpiricalResponse(**found.__dict__, input_phase=numbers_of(first, PHASE))
     averaged: dict[str, Any] = {}
@@ -254,8 +255,9 @@ def picked(
         chosen.append(slice(at, at + 1))
     o, i = chosen
     p, m = (range(len(names)) for names in (frf.output_names, frf.input_names))
-    own = frf.line_noise if isinstance(frf, LocalResponse) else None
-    kept: dict[str, Any] = {} if own is None else {"line_noise": own.of(p[o], m[i])}
+    kept: dict[str, Any] = {}
+    if isinstance(frf, LocalResponse):
+        kept = {**frf.of_windows(p[o], m[i])}
     if isinstance(frf, AveragedResponse):
         kept = {**frf.of_averages}
     if isinstance(frf, EmpiricalResponse):

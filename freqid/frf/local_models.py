@@ -136,7 +136,8 @@ def _estimate(
         form.width - 1,
         aliased_of(sets),
     )
-    return LocalResponse(**frf.__dict__, line_noise=local.noise)
+    freedom = form.width * len(sets) - _unknown(form.order, form.poles, *lines.U.shape[:2])
+    return LocalResponse(**frf.__dict__, line_noise=local.noise, freedom=float(freedom))
 
 
 def _told_apart(lines: Lines, first: Record) -> None:
@@ -174,7 +175,7 @@ def _dense(lines: Lines, width: int) -> None:
 def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> Form:
     """Orders and a width with more equations than unknowns; ValueError for one with fewer."""
     E = len(sets)
-    unknown = (order + 1) * (sets[0].n_inputs + E) + poles
+    unknown = _unknown(order, poles, E, sets[0].n_inputs)
     if width is None:
         # polynomials bend soon: a third more equations than unknowns; fractions may have more
         width = max(int((1.7 if poles else 1.34) * unknown / E) + 1, 2 * order + 3) | 1
@@ -186,6 +187,11 @@ def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> 
             f"width={width} gives {width * E} equations for {unknown} unknowns; widen it"
         )
     return Form(order, poles, width)
+
+
+def _unknown(order: int, poles: int, experiments: int, inputs: int) -> int:
+    """Unknowns of a window."""
+    return (order + 1) * (inputs + experiments) + poles
 
 
 def _widened(

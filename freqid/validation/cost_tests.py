@@ -5,8 +5,9 @@ from __future__ import annotations
 import scipy
 
 from freqid.checks import InputError, an
-from freqid.data import DataSet, PeriodicResponse, as_band
+from freqid.data import DataSet, LocalResponse, PeriodicResponse, as_band
 from freqid.fitting import Estimate
+from freqid.validation.window_terms import window_terms
 
 
 def cost_test(est: Estimate) -> dict[str, float]:
@@ -15,9 +16,9 @@ def cost_test(est: Estimate) -> dict[str, float]:
     2·V is then chi-square with as many degrees of freedom as real values less parameters (Pintelon
     and Schoukens, 2012, section 11.4.3). Returns cost, expected, ratio and p_value: a small p says
     that the model is too simple, one next to 1 that the variances are too large. Covariances that
-    are estimates themselves, those of ``periodic``, raise what is expected and its scatter: each
-    term is then F-distributed, and those of lines whose scatter was pooled vary together. Raises
-    ValueError for a fit that was not weighted.
+    are estimates themselves, those of ``periodic`` and of local models, raise what is expected and
+    its scatter: each term is then F-distributed, and those of lines whose scatter was pooled, or
+    whose windows overlap, vary together. Raises ValueError for a fit that was not weighted.
     """
     an("est", est, Estimate)
     if not _noise_is_told(est):
@@ -27,6 +28,7 @@ def cost_test(est: Estimate) -> dict[str, float]:
         )
     share = max(est.n_rows - len(est.names), 1) / max(est.n_rows, 1)
     told = [_of_means(est, d) for d in est.data if isinstance(d, PeriodicResponse)]
+    told += [_of_windows(est, d) for d in est.data if isinstance(d, LocalResponse)]
     rows = est.n_rows - sum(n for n, _, _ in told)
     # a complex error of unit variance has half of it in each of its parts
     expected = share * (rows / 2 + sum(mean for _, mean, _ in told))
@@ -50,6 +52,16 @@ def _noise_is_told(est: Estimate) -> bool:
     if "error='log'" in call:
         return all(getattr(d, "variance", None) is not None for d in est.data)
     return any(isinstance(d, PeriodicResponse) for d in est.data)
+
+
+def _of_windows(est: Estimate, data: LocalResponse) -> tuple[int, float, float]:
+    """The same of local models."""
+    band = as_band(est.band)
+    lines = data if band is None else data.select(band)
+    terms, told = lines.response.size, window_terms(lines)
+    if told is None:
+        return 2 * terms, terms, terms
+    return 2 * terms, terms * told[0], terms * told[1]
 
 
 def _of_means(est: Estimate, data: DataSet) -> tuple[int, float, float]:
