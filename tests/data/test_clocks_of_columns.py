@@ -95,6 +95,22 @@ def test_signals_with_clocks_of_their_own_are_no_rows(tmp_path, names, other):
     assert {"u", "y"} <= set(fq.channels(path).index)
 
 
+def test_the_slower_of_two_clocks_ends_in_empty_rows(tmp_path):
+    """Found: its times were a channel, and rows were paired that had nothing to do together."""
+    t, part = np.arange(N) * DT, N // 4
+    slow, y = np.full((2, N), np.nan)
+    slow[:part], y[:part] = 4 * t[:part], np.cumsum(U)[::4][:part]
+    path = tmp_path / "log.csv"
+    pd.DataFrame({"t_u": t, "u": U, "t_y": slow, "y": y}).to_csv(path, index=False)
+    with pytest.raises(ValueError, match=r"both times.*from_logs"):
+        fq.read(path, inputs="u", outputs="y")
+    # a count of the same clock that ends early is no second one
+    pd.DataFrame({"t_u": t, "u": U, "t_y": np.where(t < t[part], t, np.nan), "y": U}).to_csv(
+        path, index=False
+    )
+    assert any("same clock" in note for note in fq.read(path, inputs="u", outputs="y").notes)
+
+
 @pytest.mark.parametrize("second", ["time.1", "time_ms", "time since 1970"])
 def test_another_count_of_the_same_clock_is_left_out(tmp_path, second):
     t = np.arange(N) * DT
