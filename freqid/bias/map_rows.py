@@ -14,7 +14,15 @@ from freqid.bias.batched_fit import Batch, Problem, solve
 from freqid.bias.conditions import Conditions
 from freqid.checks import BoolArray, FloatArray, InputError
 from freqid.excitation import InputSpectrum
-from freqid.fitting import Answers, Evidence, GreyStructure, SearchOptions, descend, findings
+from freqid.fitting import (
+    Answers,
+    Evidence,
+    GreyStructure,
+    SearchOptions,
+    descend,
+    findings,
+    uninterrupted,
+)
 from freqid.lti import TOLERANCE, Hold, as_hold
 from freqid.models import GreyBox
 
@@ -156,4 +164,6 @@ def _alone(model: GreyBox, row: Row, shared: Conditions) -> Answer:
     except (InputError, ArithmeticError, np.linalg.LinAlgError) as error:
         count = len(model.free_parameters)
         return Answer(np.full(count, np.nan), np.nan, False, str(error))
+    # a map that is ended from the keyboard ends, in place of one row
+    uninterrupted(est.message)
     return Answer(est.values, est.cost, est.converged, "; ".join(est.signs))

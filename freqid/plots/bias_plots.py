@@ -57,7 +57,8 @@ def plot_bias_map(
     with context():
         if ax is None:
             width = max(3.2, 1.4 + 0.42 * len(names))
-            size = (width * len(holds), 1.6 + 0.45 * len(factors))
+            # the label of the bar has to fit beside few factors, too
+            size = (width * len(holds), max(3.2, 1.6 + 0.45 * len(factors)))
             _, axes = plt.subplots(1, len(holds), sharey=True, figsize=size, squeeze=False)
             ax = axes[0]
         for axis, hold in zip(ax, holds, strict=True):

@@ -83,7 +83,7 @@ def test_progress_in_a_log_file_is_a_line_a_tenth(plant, capsys):
 
 def test_bounds_hold(plant):
     bounded = plant.with_bounds(d=(0, 100))
-    table = fq.bias_map(bounded, chirps(1), [10], ["zoh"], base_dt=T1)
+    table = fq.bias_map(bounded, {"white": fq.WhiteSpectrum()}, [2, 5], ("zoh",), 0.01)
     assert table.set_index("parameter").loc["d", "estimate"] >= 0
 
 
@@ -197,3 +197,16 @@ def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
     )
     assert len(alone) == 2
     assert table["converged"].all()
+
+
+def test_a_map_ends_when_it_is_told_to(monkeypatch):
+    """Found: each Ctrl-C cost one row, and the map went on and said that it was done."""
+    from freqid.fitting.search import descent
+
+    def interrupted(*args, **kwargs):
+        raise KeyboardInterrupt
+
+    bounded = fq.first_order().with_bounds(a=(0.0, 500.0))
+    monkeypatch.setattr(descent, "_descended", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        fq.bias_map(bounded, {"white": fq.WhiteSpectrum()}, [2, 5], ("zoh",), 0.01)
