@@ -79,7 +79,9 @@ def verdict(est: Estimate) -> Verdict:
         reasons.insert(0, f"not converged: {est.message}")
     if not est.converged or (serious and _useless(serious[0])):
         return Verdict("do not use", reasons)
-    if est.witness.verdict == "lacking":
+    # what is held elsewhere is what a black box has more
+    held = bool(serious) and getattr(serious[0], "kind", "") == "held"
+    if est.witness.verdict == "lacking" and not held:
         reasons.append(est.witness.sentence)
     reasons += _lonely(est) + _barely(est)
     reasons += _open(est, std) or _untold(est, std) or _once(est, std)

@@ -215,8 +215,10 @@ class Inquiry(Lone):
         if turn and (complete or not outdone(turn[0].number or 0.0, self.named, scene)):
             return instead_of_swapped(self, turn) or turn
         named = self.named
-        if not named or (other := instead(self, scene, named)):
-            return other if named else []
+        if other := instead(self, scene, named):
+            return other
+        if not named:
+            return []
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
         least = (most := evidence(scene, named[0])) * (_WORTH if most > 0 else 1)
