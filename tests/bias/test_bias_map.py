@@ -201,12 +201,19 @@ def test_a_row_that_cannot_be_refined_is_fitted_alone(monkeypatch):
 
 def test_a_map_ends_when_it_is_told_to(monkeypatch):
     """Found: each Ctrl-C cost one row, and the map went on and said that it was done."""
-    from freqid.fitting.search import descent
+    from freqid.fitting.cost.objective import Objective
 
-    def interrupted(*args, **kwargs):
-        raise KeyboardInterrupt
+    whole, calls = Objective._compute, []
 
+    def interrupted(self, x):
+        calls.append(x)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return whole(self, x)
+
+    # a bound, so that each row is fitted by itself
     bounded = fq.first_order().with_bounds(a=(0.0, 500.0))
-    monkeypatch.setattr(descent, "_descended", interrupted)
+    monkeypatch.setattr(Objective, "_compute", interrupted)
     with pytest.raises(KeyboardInterrupt):
         fq.bias_map(bounded, {"white": fq.WhiteSpectrum()}, [2, 5], ("zoh",), 0.01)
+    assert len(calls) < 8
