@@ -11,7 +11,7 @@ from freqid.checks import ComplexArray, FloatArray, InputError, steps
 from freqid.data import Band, Record, StampedRecord, channel_counts
 from freqid.fitting.cost.experiments import Evaluation, SpectralExperiment
 from freqid.fitting.cost.lines import Lines
-from freqid.fitting.reading import Reading
+from freqid.fitting.reading import InitialState, Reading
 from freqid.fitting.reading_sets import read_for
 from freqid.frf import lines_of
 from freqid.lti import Hold, PeriodicHold, Plane, eliminate
@@ -92,11 +92,12 @@ def errors_in_time(
     Those of lines in time, but where a model in continuous time integrates an input that is held
     from sample to sample: without the line at zero a constant force would be free.
     """
-    reading = Reading.of(record, hold, domain="time")
+    state: InitialState = "zero" if initial_state == "zero" else "estimate"
+    reading = Reading.of(record, hold, domain="time", initial_state=state)
     held = reading.hold
     every = isinstance(held, PeriodicHold) and np.isclose(held.period, record.input_dt, rtol=1e-9)
     plain = model.integrates and not (model.dt or model.late)
-    if band is None and every and initial_state == "estimate" and plain:
+    if state == "zero" or (band is None and every and initial_state == "estimate" and plain):
         return _at_samples(model, reading).reshape(model.n_outputs, -1).T
     return line_errors(model, record, hold, band, initial_state, offset).in_time()
 

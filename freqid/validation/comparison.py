@@ -125,8 +125,8 @@ def compare(
         hold: what the input does; None is what the fit assumed of its data, and else what the
             record remembers. A discrete black box simulates at the hold that it was fitted with.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
-            input to be periodic. Offsets of the outputs are fitted with it where the Estimate was
-            (``offset="estimate"``). A plant that integrates is simulated with the constant part of
+            input to be periodic, ``"zero"`` begins at rest. Offsets of the outputs are fitted with
+            it where the Estimate was (``offset="estimate"``). A plant that integrates is simulated with the constant part of
             the input, which a fit leaves out with the line at zero: its ``fit_percent`` may be
             higher than what is told here where a force or an offset of the input was not recorded.
             Behind a delay, of a discrete model and of an input that is held for longer than its
@@ -156,13 +156,15 @@ def compare(
     if isinstance(record, StampedRecord):
         return _at_stamps(fitted, record, own_hold(model, hold, record), band)
     limits = as_band(band, record.nyquist)
-    choice("initial_state", initial_state, ("estimate", "steady"))
+    choice("initial_state", initial_state, ("estimate", "steady", "zero"))
     given, hold = fitted, own_hold(model, hold, record)
     free = offset_is_free(model)
     residual = -errors_in_time(given, record, hold, initial_state, free, limits)
     y = record.outputs[: len(residual)]
     if limits is not None:
         y = part_inside(y, record.dt, limits)
+        if initial_state == "zero":
+            residual = part_inside(residual, record.dt, limits)
     centred = np.linalg.norm(y - y.mean(axis=0), axis=0)
     left = np.linalg.norm(residual, axis=0)
     size = np.linalg.norm(record.outputs[: len(residual)], axis=0)

@@ -404,3 +404,21 @@ def test_costs_without_weights_are_not_tested():
             fq.cost_test(fq.fit(fq.first_order(), data))
     weighted = fq.fit(fq.first_order(), fq.local_polynomial(record), weights="noise")
     assert 0.5 < fq.cost_test(weighted)["ratio"] < 2
+
+
+@pytest.mark.parametrize("band", [None, (1.0, 30.0)])
+def test_a_model_compared_from_rest_is_its_simulation(band):
+    plant = fq.first_order()
+    record = fq.simulate(plant, 1 + fq.white_noise(600, seed=1), 0.01).with_noise(0.01, seed=2)
+    other = plant.with_values(a=1.1 * plant["a"])
+    left = record.y - fq.simulate(other, record.u, 0.01).y
+    found = fq.compare(other, record, initial_state="zero", band=band)
+    if band is None:
+        assert np.allclose(found.residuals, left, atol=1e-12)
+        # a free initial state explains part of it
+        assert found.fit_percent[0] < fq.compare(other, record).fit_percent[0]
+    else:
+        lines = np.fft.rfft(left)
+        f = np.fft.rfftfreq(600, 0.01)
+        lines[(f < band[0]) | (f > band[1])] = 0
+        assert np.allclose(found.residuals, np.fft.irfft(lines), atol=1e-9)

@@ -41,7 +41,11 @@ def places_of(
         for name in d.conditions:
             if name not in model.conditions and name not in model.values:
                 allowed = [*model.conditions, *model.values]
-                raise InputError(unknown(f"conditions of data set {number}", name, allowed))
+                text = unknown(f"conditions of data set {number}", name, allowed)
+                raise InputError(
+                    f"{text}; tell the model of it, GreyBox(conditions=...), or make the data "
+                    "without it"
+                )
             if name in model.ties:
                 raise InputError(f"condition {name!r} is tied to {model.ties[name]!r} in the model")
         known = {n: v for n, v in d.conditions.items() if n in model.values}
