@@ -126,9 +126,10 @@ def compare(
             record remembers. A discrete black box simulates at the hold that it was fitted with.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
             input to be periodic, ``"zero"`` begins at rest. Offsets of the outputs are fitted with
-            it where the Estimate was (``offset="estimate"``). A plant that integrates is simulated with the constant part of
-            the input, which a fit leaves out with the line at zero: its ``fit_percent`` may be
-            higher than what is told here where a force or an offset of the input was not recorded.
+            it where the Estimate was (``offset="estimate"``). A plant that integrates is simulated
+            with the constant part of the input, which a fit leaves out with the line at zero: its
+            ``fit_percent`` may be higher than what is told here where a force or an offset of the
+            input was not recorded.
             Behind a delay, of a discrete model and of an input that is held for longer than its
             samples a constant force stays free here as well.
         band: in Hz; only what lies inside it is compared, of both, and told of the initial state.

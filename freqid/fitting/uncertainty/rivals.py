@@ -13,6 +13,8 @@ from freqid.fitting.uncertainty.minimum import Minimum
 _RIVAL = 10.0
 # standard errors from the other at which it is another, and evaluations
 _APART, _LIMIT = 4.0, 60
+# times the cost of a rival that a minimum which the search has met has at the most
+_HOPELESS = 2.0
 # costs that agree to this part are those of one response
 _TWIN = 1e-6
 
@@ -28,7 +30,10 @@ def rival_of(minimum: Minimum, std: FloatArray, vague: bool) -> FloatArray | Non
         return None
     most = highest_rival(minimum, std / structure.scale)
     begun = [structure.start] if vague else []
-    for x in [*(values / structure.scale for values in minimum.others), *begun]:
+    met = [values / structure.scale for values in minimum.others]
+    # minima that leave so much more will not come so far down
+    near = [x for x in met if (p := minimum.objective.point(x)) and p.cost <= _HOPELESS * most]
+    for x in [*near, *begun]:
         try:
             other = minimise(minimum.objective, x, limit=_LIMIT)
         except InputError:
