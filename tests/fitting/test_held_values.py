@@ -56,6 +56,41 @@ def test_a_pendulum_with_one_value_taken_as_known(name, value):
     assert est.warnings[0].number == pytest.approx(plant[name], rel=0.02)
 
 
+def rubbed(seed, part=0.4):
+    """A lag whose input loses a part of its own size to friction, sample by sample."""
+    u = fq.white_noise(600, seed=seed)
+    grow, gain = np.exp(-5 * DT), (1 - np.exp(-5 * DT))
+    x, y = 0.0, np.zeros(600)
+    for k in range(600):
+        y[k] = x
+        x = grow * x + gain * (u[k] - part * np.tanh(x / 0.02))
+    return fq.Record(u, y, DT).with_noise(0.02 * y.std(), seed=seed + 9)
+
+
+def test_friction_beside_what_is_held_rightly_is_friction():
+    """A faster lag imitates it, and leaves of it what speaks as well."""
+    plant = fq.GreyBox(lag, [fq.Parameter("b", 5.0), fq.Parameter("a", 5.0, fixed=True)])
+    for seed in range(2):
+        est = fq.fit(plant, rubbed(seed))
+        assert not est.verdict.trusted
+        assert "held" not in [w.kind for w in est.warnings]
+
+
+def test_two_that_are_held_and_do_the_same_are_both_said():
+    circuit = fq.GreyBox(
+        lambda R, L, C: ([[0, 1 / C], [-1 / L, -R / L]], [[0], [1 / L]], [[1.0, 0]], [[0.0]]),
+        [fq.Parameter("R", 2.0), fq.Parameter("L", 0.1), fq.Parameter("C", 0.02)],
+    )
+    record = fq.simulate(circuit, fq.white_noise(1500, seed=1), 0.01).with_noise(0.02, seed=2)
+    est = fq.fit(circuit.with_values(C=0.025).fix("L", "C"), record)
+    assert est.warnings[0].kind == "held"
+    assert "hardly tell" in est.warnings[0]
+    # cut errors are those of a wrong fit
+    robust = fq.fit(circuit.with_values(C=0.025).fix("L", "C"), record, loss="huber")
+    assert "held" not in [w.kind for w in robust.warnings]
+    assert not robust.verdict.trusted
+
+
 def test_what_is_held_rightly_is_not_said():
     """Right values, and another fault beside them: a delay, and saturation."""
     u = 3 * fq.white_noise(800, seed=5)

@@ -5,7 +5,8 @@ like.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -22,24 +23,36 @@ from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.models import GreyBox, Parameter
 
-# part of a mode's evidence that one unknown needs, and of all that its first order has to promise
-_AS_MUCH, _PROMISING = 0.8, 0.2
+# times the evidence of another simple thing, which a value set free imitates, that it needs, and
+# the part of that which its first order has to promise
+_MORE, _PROMISING = 1.5, 0.2
+# part of the largest gain from which another would do as well, part of what is left that is hardly
+# any, and of the data's energy that is too much
+_ALIKE, _HARDLY, _LITTLE = 0.98, 0.9, 0.5
 # part of its size by which a value is at a bound, standard errors by which it has to leave it, and
 # by which others then move that it is serious
 _AT, _LEFT, _MOVED = 1e-6, 4.0, 1.0
 
 
-def held_elsewhere(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
+def held_elsewhere(
+    inquiry: Asking,
+    scene: Scene,
+    named: Sequence[Asked],
+    still: Callable[[Estimate], Sequence[Asked]],
+) -> list[Finding]:
     """A finding where one parameter set free explains the data better than what speaks, each
-    unknown counted.
+    unknown counted, and leaves nothing of it; ``still`` is what speaks against another estimate.
     """
     model, structure = inquiry.model, inquiry.minimum.structure
     if not isinstance(model, GreyBox) or not plain(structure) or model.dt:
         return []
+    if inquiry.minimum.inflation != 1:
+        # errors that were cut are those of the fit as it is
+        return []
     told = {name for r in inquiry.readings for name in r.data.conditions}
     held = list(_held(model, told))
     enough = max(
-        ((_AS_MUCH if a.name in LACKING else 1.0) * evidence(scene, a) for a in named), default=0.0
+        ((1.0 if a.name in LACKING else _MORE) * evidence(scene, a) for a in named), default=0.0
     )
     n, gains = max(scene.freedom, 2), _gains(inquiry, model, held)
     if gains is None:
@@ -56,23 +69,31 @@ def held_elsewhere(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> lis
     est = _fitted(model, p, inquiry.readings)
     if est is None or better(est.minimum.cost) <= max(enough, 0.0):
         return []
+    left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
     was, value, std = model[p.name], float(est[p.name]), float(est.parameters["std"][p.name])
-    # what is known to no good stays where it is
-    if not abs(value - was) > _LEFT * std:
+    # what is known to no good stays where it is, and what explains little is not it
+    if not abs(value - was) > _LEFT * std or left > _LITTLE:
+        return []
+    # what is true leaves nothing of what spoke before
+    if named and {a.name for a in named} & {a.name for a in still(est)}:
         return []
     kept = "is held at" if p.fixed else "is at its bound"
-    left = est.minimum.cost / max(est.minimum.objective.energy, 1e-300)
+    like = [q.name for q, g in zip(held, gains, strict=True) if g >= _ALIKE * gains[most]]
+    others = [name for name in like if name != p.name]
+    which = f" (or {', '.join(others)}, which the data hardly tell from it)" if others else ""
     text = (
-        f"{p.name} {kept} {was:.6g}, and set free comes out at {value:.4g} ± {1.96 * std:.2g}, "
-        f"with {100 * (1 - np.sqrt(left)):.4g} % of the data explained; free it, or check its "
-        "value and what else is taken as known"
+        f"{p.name} {kept} {was:.6g}, and set free comes out at {value:.4g} ± {1.96 * std:.2g}"
+        f"{which}, with {100 * (1 - np.sqrt(left)):.4g} % of the data explained; free it, or check "
+        "its value and what else is taken as known"
     )
-    return [Finding("held", text, _weight(inquiry, est), number=value)]
+    return [Finding("held", text, "serious" if named else _weight(inquiry, est), number=value)]
 
 
 def _weight(inquiry: Asking, est: Estimate) -> Severity:
-    """Minor where hardly any other parameter moves."""
+    """Minor where it hardly explains anything, and no other parameter moves."""
     minimum = inquiry.minimum
+    if est.minimum.cost < _HARDLY * minimum.cost:
+        return "serious"
     before = minimum.structure.physical(minimum.x)  # type: ignore[attr-defined]
     std = np.sqrt(np.maximum(np.diag(minimum.covariance), 0))[: len(before)]
     moved = np.abs([est[name] - value for name, value in before.items()])
@@ -110,9 +131,10 @@ def _gains(inquiry: Asking, model: GreyBox, held: Sequence[Parameter]) -> FloatA
     if not held:
         return None
     try:
-        structure = GreyStructure(_set_free(model, held))
-        point = inquiry.minimum.objective.of(structure, None).point(structure.start)
-    except Exception:  # a user's function need not know how to move what is fixed
+        with warnings.catch_warnings(action="ignore"):
+            structure = GreyStructure(_set_free(model, held))
+            point = inquiry.minimum.objective.of(structure, None).point(structure.start)
+    except (Exception, SystemExit):  # a user's function need not know how to move what is fixed
         return None
     if point is None:
         return None
@@ -132,7 +154,8 @@ def _gains(inquiry: Asking, model: GreyBox, held: Sequence[Parameter]) -> FloatA
 def _fitted(model: GreyBox, p: Parameter, readings: Sequence[Reading]) -> Estimate | None:
     """The estimate with this parameter free, begun from where it is; None where there is none."""
     try:
-        released = _set_free(model, [p])
-        return fitter_of(released)(released, readings, SearchOptions(n_starts=1))
-    except Exception:  # as above
+        with warnings.catch_warnings(action="ignore"):
+            released = _set_free(model, [p])
+            return fitter_of(released)(released, readings, SearchOptions(n_starts=1))
+    except (Exception, SystemExit):  # as above
         return None

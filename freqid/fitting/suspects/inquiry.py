@@ -20,6 +20,7 @@ from freqid.fitting.suspects.coarse import coarse
 from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
 from freqid.fitting.suspects.halves import LITTLE, confirmed, modes_differ
+from freqid.fitting.suspects.held_values import held_elsewhere
 from freqid.fitting.suspects.holds import (
     HOLDS,
     beyond_the_data,
@@ -200,6 +201,10 @@ class Inquiry(Lone):
         other = [*beyond_noise(self.minimum), *coarse(self.scene, self._std)]
         return [*other, *(f for f in found if f.kind not in [o.kind for o in other])]
 
+    def _against(self, est: Estimate) -> list[Asked]:
+        """What speaks against another estimate from the same data."""
+        return Inquiry(est.minimum, est.model, self.readings, self.share).named
+
     def _on_suspects(self) -> list[Finding]:
         scene = self.scene
         if scene is None:
@@ -215,8 +220,10 @@ class Inquiry(Lone):
         if turn and (complete or not outdone(turn[0].number or 0.0, self.named, scene)):
             return instead_of_swapped(self, turn) or turn
         named = self.named
-        if other := instead(self, scene, named):
+        if named and (other := instead(self, scene, named)):
             return other
+        if held := held_elsewhere(self, scene, named, self._against):
+            return held
         if not named:
             return []
         # a change beside a fault of a sensor is another thing, however weak

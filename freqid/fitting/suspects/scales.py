@@ -19,7 +19,6 @@ from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.held_values import held_elsewhere
 from freqid.fitting.suspects.late_instead import late_for_another
 from freqid.fitting.suspects.late_outputs import late_output
 from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
@@ -85,16 +84,11 @@ class _Channel:
 
 
 def instead(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
-    """A finding where what speaks is another thing: a channel on another scale, or late, or a
-    parameter that is held elsewhere.
-    """
-    if not named:
-        return held_elsewhere(inquiry, scene, named)
+    """A finding where what speaks is another thing: a channel on another scale, or late."""
     return (
         on_another_scale(inquiry, scene, named)
         or late_output(inquiry, scene, named)
         or late_for_another(inquiry, scene, named)
-        or held_elsewhere(inquiry, scene, named)
     )
 
 
