@@ -14,8 +14,8 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, IntArray
 from freqid.data import LineNoise
 
-# errors squared over their variance that are believed
-_CHANCE = 4.0
+# errors squared over their variance that are believed, and the part of a sum that is rounding
+_CHANCE, _ROUNDING = 4.0, 1e-13
 
 
 class Values(NamedTuple):
@@ -47,8 +47,9 @@ def between(answers: Values, m: int) -> Values:
     rows = np.concatenate([through[:, :p, :, None], of_inputs], axis=3)
     noise = np.repeat(_of_outputs(answers.noise, p), len(Z) // len(answers.noise), axis=0)
     spread = np.einsum("koab,koibn->koian", noise, rows.conj())
-    told = np.einsum("koian,koian->koi", rows, spread).real
     apart = np.einsum("koian,koaa->koi", np.abs(rows) ** 2, noise.real)
+    # parts that cancel leave rounding
+    told = np.maximum(np.einsum("koian,koian->koi", rows, spread).real, _ROUNDING * apart)
     variance = _of_a_ratio(told, apart, through[:, p:], spread[..., 1:, :], noise[:, :, 1:, 1:])
     rows = rows * np.sqrt(variance / np.where(told > 0, told, np.inf))[:, :, :, None, None]
     return Values(G, variance, answers.share[:, :p, :1].repeat(m, axis=-1), rows, answers.noise)
@@ -61,8 +62,8 @@ def _of_a_ratio(
     spread: ComplexArray,
     noise: ComplexArray,
 ) -> FloatArray:
-    """Variance (K, outputs, m) of G = G_yr G_ur⁻¹, of which first orders have ``told`` V,
-    and ``apart`` were its parts unrelated.
+    """Variance (K, outputs, m) of G = G_yr G_ur⁻¹, which is ``told`` as V to first order, and would
+    be ``apart`` were its parts unrelated.
 
     e = G₀ − G is (δG_yr − G₀ δG_ur) G_ur⁻¹ without any order left out, so that with the relative
     error h of an input |e|² is no more than c (V + 2|e cov(δG, h)| + |e|² var h), with the chance

@@ -13,7 +13,6 @@ from freqid.data import (
     Band,
     DataSet,
     FrequencyResponse,
-    LocalResponse,
     PeriodicResponse,
     Record,
     StampedRecord,
@@ -23,7 +22,6 @@ from freqid.fitting import in_order_of, line_errors, met, offset_is_free
 from freqid.lti import Hold
 from freqid.models import ModelLike, as_model
 from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
-from freqid.validation.window_terms import window_terms
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -210,15 +208,12 @@ def _of_response(c: Comparison) -> pd.DataFrame:
     freedom = None
     if isinstance(frf, AveragedResponse | PeriodicResponse):
         freedom = frf.freedom
-    told = window_terms(frf) if isinstance(frf, LocalResponse) else None
     for o, output in enumerate(frf.output_names):
         for i, name in enumerate(frf.input_names):
             each = left[o, i]
             K = len(each)
             q, null = _size(np.abs(each) ** 2, freedom), scipy.stats.chi2(2 * K)
-            if told is not None:
-                q, null = q / (2 * K), scipy.stats.norm(told[0], np.sqrt(told[1] / K))
-            elif frf.reach > _WINDOWED and freedom is None:
+            if frf.reach > _WINDOWED and freedom is None:
                 q, null = q / (2 * K), _few_lines(K / (frf.reach + 1))
             elif frf.reach:
                 # lines of a window go together: as many as are apart

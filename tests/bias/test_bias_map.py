@@ -83,7 +83,7 @@ def test_progress_in_a_log_file_is_a_line_a_tenth(plant, capsys):
 
 def test_bounds_hold(plant):
     bounded = plant.with_bounds(d=(0, 100))
-    table = fq.bias_map(bounded, {"white": fq.WhiteSpectrum()}, [2, 5], ("zoh",), 0.01)
+    table = fq.bias_map(bounded, chirps(1), [10], ["zoh"], base_dt=T1)
     assert table.set_index("parameter").loc["d", "estimate"] >= 0
 
 

@@ -99,3 +99,10 @@ def test_two_outputs_and_two_inputs_behind_two_references():
     assert np.mean(size < 9) > 0.96
     again = fq.FrequencyResponse.from_frame(frf.to_frame())
     assert np.allclose(again.line_noise.variance, frf.line_noise.variance, rtol=0.02)
+
+
+def test_a_loop_without_noise_has_variances_that_are_no_less_than_rounding():
+    frf = fq.local_rational(in_a_loop(1, 0.0), band=(2, 200), reference=True)
+    assert np.isfinite(frf.variance).all()
+    assert (frf.variance > 0).all()
+    assert fq.fit(MODEL, frf, weights="noise")["d"] == pytest.approx(TRUE["d"], rel=1e-3)
