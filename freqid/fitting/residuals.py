@@ -15,7 +15,7 @@ from freqid.fitting.reading import InitialState, Reading
 from freqid.fitting.reading_sets import read_for
 from freqid.frf import lines_of
 from freqid.lti import Hold, PeriodicHold, Plane, eliminate
-from freqid.models import Model
+from freqid.models import Model, simulate
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,8 @@ def errors_in_time(
     Those of lines in time, but where a model in continuous time integrates an input that is held
     from sample to sample: without the line at zero a constant force would be free.
     """
+    if initial_state == "zero" and model.dt:
+        return _of_a_sampled_model(model, record)
     state: InitialState = "zero" if initial_state == "zero" else "estimate"
     reading = Reading.of(record, hold, domain="time", initial_state=state)
     held = reading.hold
@@ -100,6 +102,16 @@ def errors_in_time(
     if state == "zero" or (band is None and every and initial_state == "estimate" and plain):
         return _at_samples(model, reading).reshape(model.n_outputs, -1).T
     return line_errors(model, record, hold, band, initial_state, offset).in_time()
+
+
+def _of_a_sampled_model(model: Model, record: Record) -> FloatArray:
+    """Errors ŷ − y (N, outputs) from rest; ValueError for a record at another rate."""
+    if record.factor > 1 or not np.isclose(record.dt, model.dt, rtol=1e-9):
+        raise InputError(
+            f"initial_state='zero' of a model sampled at {model.dt:g} s needs a record at that "
+            f"rate, and this one has dt={record.dt:g} s; use 'estimate'"
+        )
+    return np.asarray(simulate(model, record.u, record.dt).outputs - record.outputs)
 
 
 def _at_samples(model: Model, reading: Reading) -> FloatArray:

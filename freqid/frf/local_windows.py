@@ -167,8 +167,8 @@ def _evaluated(
     """One output's model at the lines (W, s) that each window serves.
 
     Response, variance and share are (W·s, inputs), what each line of the window adds to the
-    response is (W·s, inputs, n), and what it leaves of the
-    output is (W, n), such that the sum of its squares is the variance of a line's noise.
+    response is (W·s, inputs, n), and what it leaves of the output is (W, n), such that the sum of
+    its squares is the variance of a line's noise.
     """
     solution, gain = _fitted(equations, output), equations.gain[output]
     (W, s), m = near.shape, gain.shape[1]

@@ -28,7 +28,7 @@ def cost_test(est: Estimate) -> dict[str, float]:
         )
     share = max(est.n_rows - len(est.names), 1) / max(est.n_rows, 1)
     told = [_of_means(est, d) for d in est.data if isinstance(d, PeriodicResponse)]
-    told += [_of_windows(est, d) for d in est.data if isinstance(d, LocalResponse)]
+    told += [_of_windows(est, i, d) for i, d in enumerate(est.data) if isinstance(d, LocalResponse)]
     rows = est.n_rows - sum(n for n, _, _ in told)
     # a complex error of unit variance has half of it in each of its parts
     expected = share * (rows / 2 + sum(mean for _, mean, _ in told))
@@ -54,11 +54,14 @@ def _noise_is_told(est: Estimate) -> bool:
     return any(isinstance(d, PeriodicResponse) for d in est.data)
 
 
-def _of_windows(est: Estimate, data: LocalResponse) -> tuple[int, float, float]:
+def _of_windows(est: Estimate, number: int, data: LocalResponse) -> tuple[int, float, float]:
     """The same of local models."""
     band = as_band(est.band)
     lines = data if band is None else data.select(band)
     terms, told = lines.response.size, window_terms(lines)
+    if est.problem is not None:
+        # weights of nothing leave lines out
+        terms = est.minimum.experiments[number].n_rows // 2
     if told is None:
         return 2 * terms, terms, terms
     return 2 * terms, terms * told[0], terms * told[1]

@@ -51,7 +51,7 @@ def response_at(omega):
 @pytest.mark.parametrize("part", [0.15, 0.7])
 @pytest.mark.parametrize("estimate", [fq.local_polynomial, fq.local_rational])
 def test_error_bars_of_a_light_resonance_in_a_loop(estimate, part):
-    """Its damping was 2.0 to 2.4 bars off (rms): noise of both was taken for unrelated."""
+    """The worst parameter was 1.8 to 2.2 bars off (rms): noise of both was taken for unrelated."""
     size = []
     for seed in range(8):
         frf = estimate(in_a_loop(seed, part), band=(2, 200), reference=True)

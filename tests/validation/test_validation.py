@@ -422,3 +422,18 @@ def test_a_model_compared_from_rest_is_its_simulation(band):
         f = np.fft.rfftfreq(600, 0.01)
         lines[(f < band[0]) | (f > band[1])] = 0
         assert np.allclose(found.residuals, np.fft.irfft(lines), atol=1e-9)
+
+
+def test_sampled_black_boxes_are_compared_from_rest_at_their_own_rate():
+    """Found in review: one of 97.7 % came out at -84."""
+    record = fq.simulate(fq.first_order(), fq.white_noise(600, seed=1), 0.01).with_noise(
+        0.01, seed=2
+    )
+    est = fq.fit(fq.OutputError(1), record)
+    plant = est.model.state_space()
+    system = plant.A, plant.B, plant.C, plant.D, 0.01
+    simulated = scipy.signal.dlsim(system, record.u)[1].ravel()
+    found = fq.compare(est, record, initial_state="zero")
+    assert np.allclose(found.residuals, record.y - simulated, atol=1e-12)
+    with pytest.raises(ValueError, match=r"at that rate.*use 'estimate'"):
+        fq.compare(est, record.decimate(2), initial_state="zero")

@@ -57,3 +57,15 @@ def test_degrees_of_freedom_stay_with_a_response():
     again = fq.FrequencyResponse.from_frame(frf.to_frame())
     for same in (frf.select((2, 20)), frf.with_conditions(q=1.0), again):
         assert same.freedom == 3
+
+
+def test_lines_that_weights_leave_out_are_not_expected():
+    frf = fq.local_polynomial(noisy(3, 4000), band=(1, 100))
+    weights = 1 / frf.variance
+    weights[..., ::3] = 0
+    found = [
+        fq.cost_test(fq.fit(fq.first_order(), frf, weights=w, n_starts=1))
+        for w in (weights, "noise")
+    ]
+    assert found[0]["expected"] == pytest.approx(2 / 3 * found[1]["expected"], rel=0.01)
+    assert found[0]["ratio"] == pytest.approx(1, abs=0.15)

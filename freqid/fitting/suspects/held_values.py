@@ -16,6 +16,7 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
+from freqid.fitting.search.interrupted import uninterrupted
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.order import LACKING, evidence
 from freqid.fitting.suspects.refits import plain
@@ -156,6 +157,8 @@ def _fitted(model: GreyBox, p: Parameter, readings: Sequence[Reading]) -> Estima
     try:
         with warnings.catch_warnings(action="ignore"):
             released = _set_free(model, [p])
-            return fitter_of(released)(released, readings, SearchOptions(n_starts=1))
+            est = fitter_of(released)(released, readings, SearchOptions(n_starts=1))
     except (Exception, SystemExit):  # as above
         return None
+    uninterrupted(est.message)
+    return est
