@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -14,7 +14,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import Stream, check_arrays, whole_file
 from freqid.frf.function_identity import identity_of
-from freqid.frf.segments import Averaging, products, taper
+from freqid.frf.segments import Averaging, taper
 
 # seconds between two writings of a state; part of the largest sample that is down to rounding
 _EVERY, _ROUNDING = 5.0, 1e-9
@@ -83,16 +83,12 @@ class RunningSums:
             raise made._too_late()
         return made
 
-    def add(self, spectra: Iterable[Mapping[str, ComplexArray]], count: int, samples: int) -> None:
-        """Take the spectra of ``count`` segments more, which moves on by so many samples."""
+    def add(self, sums: Mapping[str, ComplexArray], count: int, samples: int) -> None:
+        """Take the sums by pair of ``count`` segments more, which moves on by so many samples."""
         before = self.sums
         if before.ended and not self.grows:
             raise self._too_late()
-        total = dict(before.total)
-        for each in spectra:
-            for pair in self.pairs:
-                S = products(each[pair[0]], each[pair[1]])
-                total[pair] = total[pair] + S if pair in total else S
+        total = {pair: before.total[pair] + S if before.count else S for pair, S in sums.items()}
         # in one piece, so that what is written belongs together whenever that is
         self.sums = _Sums(total, before.count + count, before.at + samples)
         if self.path is not None and time.monotonic() - self.written > _EVERY:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import repeat
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import ComplexArray, FloatArray, InputError, finite, flag, whole
+from freqid.checks import FloatArray, InputError, finite, flag, whole
 from freqid.data import Record, Stream
 
 # segments of a single record where none are asked for
@@ -24,10 +22,6 @@ _WHOLE = ("boxcar", "rectangular")
 _TIED = 0.01
 # samples whose segments are taken at once
 _PIECE = 1 << 19
-# samples that are transformed at once: more leave the processor's cache; fewer than so many are
-# transformed before a thread has begun
-_NEAR, _BESIDE = 160_000, 1 << 15
-
 # segments that show where in one the input acts; relative difference of some that are the same
 _SHOWN, _SAME = 16, 1e-6
 
@@ -74,48 +68,6 @@ class Averaging:
             )
         return length, length - int(length * overlap)
 
-    def transforms(
-        self, channels: Mapping[str, FloatArray], length: int, step: int
-    ) -> Iterator[dict[str, ComplexArray]]:
-        """DFTs (channels, segments, lines) of tapered segments, as many at a time as stay near.
-
-        ``channels`` are samples (channels, n) by name. The next ones overwrite what is yielded.
-        """
-        window = taper(self.window, length)
-        views = {
-            name: np.lib.stride_tricks.sliding_window_view(x, length, axis=1)[:, ::step]
-            for name, x in channels.items()
-        }
-        count = next(iter(views.values())).shape[1]
-        batch = max(_NEAR // length, 1)
-        # new memory for each batch takes longer than what is written into it, and only numpy's
-        # FFT, which is the same as scipy's, writes into memory that is there
-        batch = min(batch, count)
-        near = {
-            name: (
-                np.empty((len(x), batch, length)),
-                np.empty((len(x), batch, length // 2 + 1), complex),
-            )
-            for name, x in channels.items()
-        }
-
-        def transformed(name: str, at: int) -> ComplexArray:
-            some = views[name][:, at : at + batch]
-            tapered, lines = (each[:, : some.shape[1]] for each in near[name])
-            self._level(some, tapered)
-            tapered *= window
-            return np.fft.rfft(tapered, out=lines)
-
-        starts = range(0, count, batch)
-        if batch * length < _BESIDE or callable(self.detrend):
-            for at in starts:
-                yield {name: transformed(name, at) for name in views}
-            return
-        # inputs and outputs beside one another: numpy lets other threads run meanwhile
-        with ThreadPoolExecutor(max_workers=2) as pool:
-            for at in starts:
-                yield dict(zip(views, pool.map(transformed, views, repeat(at)), strict=True))
-
     def density(self, length: int, dt: float) -> tuple[FloatArray, FloatArray]:
         """Frequencies (Hz), and what makes |X|² a density of one side, in units squared per Hz."""
         f = np.fft.rfftfreq(length, dt)
@@ -123,7 +75,7 @@ class Averaging:
         scale[[0, *([-1] if length % 2 == 0 else [])]] /= 2
         return f, scale
 
-    def _level(self, segments: FloatArray, out: FloatArray) -> None:
+    def level(self, segments: FloatArray, out: FloatArray) -> None:
         """The segments without their trend, into ``out``."""
         if self.detrend is False:
             out[:] = segments
@@ -154,25 +106,6 @@ def pieces(
         n = min(per, left - first)
         part = slice(first * step, (first + n - 1) * step + length)
         yield n, {name: x[:, part] for name, x in every.items()}
-
-
-def products(a: ComplexArray, b: ComplexArray) -> ComplexArray:
-    """Sums over segments of a bᴴ, (lines, channels of a, channels of b)."""
-    found = np.empty((a.shape[-1], len(a), len(b)), complex)
-    for i, x in enumerate(a):
-        for j, y in enumerate(b):
-            if a is b and j < i:
-                found[:, i, j] = found[:, j, i].conj()
-            elif a is b and j == i:
-                parts = np.ascontiguousarray(x).view(float)
-                power = np.einsum("sk,sk->k", parts, parts)
-                found[:, i, j] = power[::2] + power[1::2]
-            else:
-                # a third quicker than an einsum of complex numbers
-                both = y.conj()
-                both *= x
-                found[:, i, j] = both.sum(axis=0)
-    return found
 
 
 def taper(window: Window, length: int) -> FloatArray:

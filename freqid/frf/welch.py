@@ -12,6 +12,7 @@ from freqid.checks import ComplexArray, FloatArray, InputError, flag, path_of
 from freqid.data import Bar, Record, Reference, Stream, as_band, as_records, chosen, references_of
 from freqid.frf.measured import aliased_of
 from freqid.frf.running_sums import RunningSums
+from freqid.frf.segment_sums import SegmentSums
 from freqid.frf.segments import (
     Averaging,
     Detrend,
@@ -127,17 +128,18 @@ def spectral(
             raise InputError(f"state={str(state)!r} is kept of a stream; records are in memory")
         sums = RunningSums.kept(path_of("state", state), pairs, records, averaging, length, step)
     # what is beyond numbers is told below, by name
-    with np.errstate(over="ignore", invalid="ignore"):
+    adding = SegmentSums(averaging, length, step, pairs)
+    with np.errstate(over="ignore", invalid="ignore"), adding:
         for i, record in enumerate(sets):
             signal = None if signals is None else signals[i]
             if isinstance(record, Stream):
                 with Bar(progress, record.n_samples, sums.sums.at, "samples") as advance, sums:
                     for n, channels in pieces(record, length, step, signal, sums.sums.at):
-                        sums.add(averaging.transforms(channels, length, step), n, n * step)
+                        sums.add(adding.of(channels), n, n * step)
                         advance(n * step)
                 continue
             for n, channels in pieces(record, length, step, signal):
-                sums.add(averaging.transforms(channels, length, step), n, n * step)
+                sums.add(adding.of(channels), n, n * step)
     total, count = dict(sums.sums.total), sums.sums.count
     f, density = averaging.density(length, first.dt)
     if not all(np.isfinite(S).all() for S in total.values()):

@@ -7,7 +7,7 @@ import pytest
 import scipy.signal
 
 import freqid as fq
-from freqid.frf import running_sums
+from freqid.frf import running_sums, segment_sums
 from freqid.frf.function_identity import identity_of
 
 N, DT = 30_000, 1e-3
@@ -55,7 +55,7 @@ def test_an_interrupted_pass_goes_on(tmp_path, method, monkeypatch):
     again = method(fq.open(lambda: blocks(False), dt=DT), 700, state=kept)
     # a finished state is not worked out again
     calls = []
-    monkeypatch.setattr(running_sums, "products", lambda *a: calls.append(a))
+    monkeypatch.setattr(segment_sums, "_products", lambda *a: calls.append(a))
     third = method(fq.open(lambda: blocks(False), dt=DT), 700, state=kept)
     assert not calls
     for name in ("response", "variance", "uu", "yu", "averages"):
