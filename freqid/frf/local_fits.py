@@ -12,9 +12,11 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
 
-# steps towards what is least in the outputs, and the gain below which they end: the first two take
-# off what the equations bend, later ones put poles next to lines and follow their noise
-_STEPS, _SETTLED = 2, 1e-2
+# steps towards what is least in the outputs, and the gain below which they end
+_MOST, _SETTLED = 20, 1e-2
+# the first ones take off what the equations bend; later ones would put poles next to lines and
+# follow their noise, and are taken while they gain more than the unknowns' share of it
+_FIRST = 2
 # the most by which a step may change a denominator at a line: one that halves nears a pole
 _TURN = 0.5
 # times the variance that the equations tell of the window's own line is the most that is believed
@@ -48,12 +50,15 @@ def fitted(known: ComplexArray, bends: FloatArray, b: ComplexArray) -> Solution:
     x = _descended(known, bends, b, equations.x)
     left, A = _left(known, bends, b, x)
     outputs = _solution(A, left)
-    # first orders say nothing of a pole next to a line of little input
+    # first orders say nothing of a pole next to a line of little input: they are believed as far as
+    # the equations or the steps that were taken go
     told, most = (
         (np.abs(s.rows[:, 0]) ** 2).sum(axis=1) * (np.abs(r) ** 2).sum(axis=1)
         for s, r in ((outputs, left), (equations, equations.residual))
     )
-    less = np.sqrt(np.minimum(_BELIEVED * most / np.maximum(told, 1e-300), 1))
+    moved = np.abs(x[:, 0] - equations.x[:, 0]) ** 2 * outputs.freedom
+    believed = np.maximum(_BELIEVED * most, moved)
+    less = np.sqrt(np.minimum(believed / np.maximum(told, 1e-300), 1))
     return Solution(x, outputs.rows * less[:, None, None], left, outputs.freedom)
 
 
@@ -63,7 +68,8 @@ def _descended(
     """Unknowns some steps on, (W, q); none is taken that leaves a window more than it had."""
     x, R = begun.copy(), known.shape[-1]
     open_ = np.ones(len(x), bool)
-    for _ in range(_STEPS):
+    share = max(begun.shape[1] / (b.shape[1] - begun.shape[1]), _SETTLED)
+    for taken in range(1, _MOST + 1):
         K, B, y, was = known[open_], bends[open_], b[open_], x[open_]
         left, A = _left(K, B, y, was)
         step = _step(A, left)
@@ -73,7 +79,7 @@ def _descended(
         before = (np.abs(left) ** 2).sum(axis=1)
         gain = before - (np.abs(_left(K, B, y, trial)[0]) ** 2).sum(axis=1)
         x[open_] = np.where(gain[:, None] > 0, trial, was)
-        open_[open_] = gain > _SETTLED * before
+        open_[open_] = gain > (_SETTLED if taken < _FIRST else share) * before
         if not open_.any():
             break
     return x
