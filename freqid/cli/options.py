@@ -218,11 +218,12 @@ def ends(between: tuple[float, float] | None) -> tuple[float | None, float | Non
 
 def hold_of(text: str | None) -> holds.Hold | str | None:
     """The hold that ``--hold`` names; a name alone is left to the record."""
-    if text is None or ":" not in text:
+    if text is None or text == "estimate":
         return text
-    kind, _, period = text.partition(":")
+    kind, told, period = text.partition(":")
     try:
-        return holds.Hold.named[kind].at(float(period))
+        named = holds.Hold.named[kind]
+        return named.at(float(period)) if told else text
     except (KeyError, ValueError):
         raise InputError(
             f"--hold {text} is not a hold; expected zoh, foh, bl, zoh:PERIOD or foh:PERIOD (s)"
