@@ -40,7 +40,11 @@ def _whitening(number: IntArray, n_samples: int, w: FloatArray) -> tuple[Complex
     By the cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing, 2010, chapter 13).
     """
     every = np.arange(n_samples // 2 + 1)
-    logarithm = np.interp(every, number, np.log(np.maximum(w, 1e-300))) / 2
+    told = np.log(np.maximum(w, 1e-300))
+    logarithm = np.interp(every, number, told) / 2
+    if number[0] == 1 and len(number) > 1:
+        # even about zero: taken for flat there, the filter would remember all of a record
+        logarithm[0] = (4 * told[0] - told[1]) / 6
     cepstrum = scipy.fft.irfft(logarithm, n_samples)
     folded = np.zeros(n_samples)
     half = (n_samples + 1) // 2

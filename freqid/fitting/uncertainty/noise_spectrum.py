@@ -51,14 +51,16 @@ def settled(variance: FloatArray) -> FloatArray:
     return np.asarray(np.where((scatter > _SCATTERED) & ~alone, smooth, variance))
 
 
-def _spectrum(error: ComplexArray) -> FloatArray:
+def _spectrum(error: ComplexArray, n_samples: int = 0) -> FloatArray:
     """The noise's power for errors (channels, K): an autoregression, where that makes it even.
+
+    Of the DFT of ``n_samples``, where they are all of its lines, zero being left out or not.
 
     Local means beside it would follow the very lines that they are to weigh, of which a parameter
     may have few.
     """
     power = np.abs(error) ** 2
-    shape = _autoregressive(power)
+    shape = _autoregressive(power, n_samples)
     whitened = power / shape
     local = local_mean(whitened)
     for row, each in enumerate(whitened):
@@ -76,8 +78,11 @@ def local_mean(power: FloatArray) -> FloatArray:
     return np.maximum(smooth, 0.0)
 
 
-def _autoregressive(power: FloatArray) -> FloatArray:
+def _autoregressive(power: FloatArray, n_samples: int = 0) -> FloatArray:
     """Spectra of autoregressions for periodograms (channels, K), ones where none is needed.
+
+    Lines of a band count as all there are. The whole DFT of ``n_samples`` has each at its own
+    frequency: half a line aside the filter that whitens such noise would remember all of a record.
 
     Levinson's recursion, the order by Bayes' criterion, or by Akaike's where that is clearly lower
     there (Stoica and Moses, Spectral Analysis of Signals, 2005, sections 3.5.1, C.4 and C.8):
@@ -88,7 +93,13 @@ def _autoregressive(power: FloatArray) -> FloatArray:
     shape = np.ones(power.shape)
     if most < 1:
         return shape
+    angle = np.pi * np.arange(K) / max(K - 1, 1)
     r = scipy.fft.irfft(power, axis=-1)[:, : most + 1]
+    if n_samples // 2 in (K - 1, K):
+        at = np.arange(n_samples // 2 + 1)[-K:]
+        angle = 2 * np.pi * at / n_samples
+        every = power if at[0] == 0 else np.concatenate([power[:, :1], power], axis=1)
+        r = scipy.fft.irfft(every, n_samples, axis=-1)[:, : most + 1]
     going = r[:, 0] > 0
     left = np.where(going, r[:, 0], 1.0)
     a = np.zeros_like(r)
@@ -114,7 +125,7 @@ def _autoregressive(power: FloatArray) -> FloatArray:
     chosen = np.where(clearly[:, None], kept[1], kept[0])
     coloured = chosen[:, 1:].any(axis=1)
     if coloured.any():
-        z = np.exp(-1j * np.pi * np.arange(K) / max(K - 1, 1))
+        z = np.exp(-1j * angle)
         gain = np.abs(np.polynomial.polynomial.polyval(z, chosen[coloured].T)) ** 2
         shape[coloured] = 1 / np.maximum(gain, 1e-300)
     return shape
@@ -126,7 +137,7 @@ def noise_weights(error: ComplexArray, n_samples: int) -> FloatArray:
     In a record's cost, Σ 2|E|²/N, every real value then adds a half, as it does to a response's
     under weights of 1/variance. Outputs have units of their own, and each its own least variance.
     """
-    variance = _spectrum(error)
+    variance = _spectrum(error, n_samples)
     floor = 1e-12 * variance.max(axis=-1, keepdims=True, initial=0)
     # an output without errors has no variance: it counts as what is hardly any of the others
     floor = np.where(floor > 0, floor, floor.max(initial=0))
