@@ -92,6 +92,18 @@ def test_texts(kind, tmp_path):
     check(fq.read(path))
 
 
+@pytest.mark.parametrize("units", [",%,degF", ",%,furlong", ",psi,m3/h"])
+def test_a_row_of_units_below_the_name_of_a_time(units, tmp_path):
+    """As historians print them; channels had been called by their units, without a word."""
+    path = tmp_path / "log.csv"
+    body = [f"2024-03-31 00:{i // 2:02d}:{30 * (i % 2):02d},{i % 7},{i % 5}\n" for i in range(60)]
+    path.write_text(f"Date/Time,FIC101.OP,TI205.PV\n{units}\n" + "".join(body))
+    record = fq.read(path)
+    assert (record.input_names, record.output_names) == (("FIC101.OP",), ("TI205.PV",))
+    assert list(record.units.values()) == units.split(",")[1:]
+    assert record.dt == 30
+
+
 def test_units_are_kept(tmp_path):
     path = tmp_path / "log.txt"
     path.write_text(TEXTS["seconds in brackets"])

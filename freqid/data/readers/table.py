@@ -32,7 +32,8 @@ _WHOLE = {
 _SMOOTHER = 1 / 3
 _UNIT = (
     r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2"
-    r"|m/s²|g|Hz|Pa|bar|K|°C|%|counts?)"
+    r"|m/s²|g|Hz|Pa|kPa|MPa|hPa|mbar|bar|psi|K|°C|degC|°F|degF|%|counts?|kg|kg/s|kg/h|t/h|L/min"
+    r"|l/min|L/h|l/h|L/s|l/s|m³/h|m3/h|m³/s|m3/s|gpm|kW)"
 )
 # as oscilloscopes write units below the names of their channels, and settings above these
 _SPOKEN, _SETTINGS = r"(?i:seconds?|volts?|amps?|amperes?|hertz|watts?)", 60
@@ -139,7 +140,7 @@ def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[
     if not full:
         return [f"column{i + 1}" for i in range(width)], {}, False
     given, below = (
-        (full[-2], full[-1]) if len(full) > 1 and _are_units(full[-1]) else (full[-1], [])
+        (full[-2], full[-1]) if len(full) > 1 and _are_units(full[-1], full[-2]) else (full[-1], [])
     )
     names, units = [], {}
     for i, text in enumerate(given):
@@ -186,13 +187,16 @@ def _are_names(cells: Sequence[str]) -> bool:
     return all(re.match(r"[^\W\d]", c) for c in cells)
 
 
-def _are_units(cells: Sequence[str]) -> bool:
-    """Whether a row is one of units: brackets, or short words of which several are known."""
+def _are_units(cells: Sequence[str], above: Sequence[str]) -> bool:
+    """Whether a row is one of units: brackets, or short words of which several are known, or one
+    where nothing stands below the name of a time.
+    """
     words = [c.strip() for c in cells if c.strip()]
     if all(re.fullmatch(r"[\[(].*[\])]", w) or w == "-" for w in words):
         return True
     known = sum(w == "-" or bool(re.fullmatch(rf"{_UNIT}|{_SPOKEN}", w)) for w in words)
-    return bool(words) and known >= 0.6 * len(words)
+    enough = 1 if all(above) and not cells[0].strip() else 0.6 * len(words)
+    return bool(words) and known >= enough
 
 
 def _uncommented(line: str) -> str:
