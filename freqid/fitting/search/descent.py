@@ -12,6 +12,7 @@ from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.objective import Objective, Point, Structure
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.search.bounded import within_bounds
+from freqid.fitting.search.leaps import AT_A_LEAP, leaps
 from freqid.fitting.search.valleys import through
 from freqid.fitting.search.worth import Worth, WorthlessError
 from freqid.lti import solved
@@ -137,6 +138,8 @@ def _descended(
             }
             if how == "edge" and not _stopped(objective, x):
                 how = "minimum"
+            if how == "limit" and leaps(objective, x):
+                return Solution(x, end, True, AT_A_LEAP)
             return Solution(x, end, how == "minimum", said[how])
         # where no such step gains anything, next to what cannot be computed, reflective ones may
         begin, tolerance = near.x, max(tolerance, _BOUNDED)
@@ -151,6 +154,8 @@ def _descended(
     least = _EDGE * point.cost + objective.rounding
     if objective.failure is not None and wanted @ wanted > least and _stopped(objective, result.x):
         return Solution(result.x, point, False, _fallen(objective))
+    if result.status == 0 and leaps(objective, result.x):
+        return Solution(result.x, point, True, AT_A_LEAP)
     return Solution(result.x, point, result.status > 0, result.message)
 
 
