@@ -13,8 +13,8 @@ from freqid.checks import ComplexArray, FloatArray
 from freqid.frf.segments import Averaging, taper
 
 # values that a thread takes at once: more leave the processor's cache, and with fewer threads wait
-# for one another; samples below which a thread has not begun before the work is done
-_AT_ONCE, _BESIDE = 1 << 19, 1 << 16
+# for one another; samples below which one has done the work before two have shared it
+_AT_ONCE, _BESIDE = 1 << 19, 1 << 18
 
 
 class SegmentSums:
@@ -48,12 +48,16 @@ class SegmentSums:
         # as many rounds for the one thread as for the other
         rounds = max(-(-count * self.length * width // (2 * _AT_ONCE)), 1)
         batch = -(-count // (2 * rounds))
-        parts = (
+        parts = [
             {name: x[:, at : at + batch] for name, x in views.items()}
             for at in range(0, count, batch)
-        )
+        ]
         # numpy lets other threads run in transforms and products; their sums come in order
-        found = (map if alone else self._pool.map)(self._summed, parts)
+        try:
+            found = (map if alone else self._pool.map)(self._summed, parts)
+        except RuntimeError:
+            # no thread can begin any more once the interpreter ends
+            found = map(self._summed, parts)
         total = next(iter(found))
         for more in found:
             for pair, S in more.items():

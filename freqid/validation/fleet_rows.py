@@ -64,7 +64,9 @@ def _in_time(seen: pd.Series, column: str) -> Array:
             "give dates, as of pandas.to_datetime, or ordered categories"
         )
     try:
-        return pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True).to_numpy()
+        times = pd.to_datetime(pd.Series(texts), format="ISO8601", utc=True)
+        # with a zone they would be objects
+        return times.dt.tz_localize(None).to_numpy()
     except (ValueError, TypeError, OverflowError):
         parted = [re.split(r"(\d+)", t) for t in texts]
         keys = [[(int(p), "") if p.isdecimal() else (-1, p) for p in each] for each in parted]

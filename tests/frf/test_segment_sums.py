@@ -1,5 +1,8 @@
 """Sums over segments in two threads, beside scipy's csd segment by segment."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scipy
@@ -37,3 +40,17 @@ def test_what_is_beyond_numbers_is_said_once_by_threads_too():
     rows = 1e200 * np.random.default_rng(0).standard_normal((400_000, 2))
     with pytest.raises(ValueError, match="beyond numbers"):
         fq.h1(fq.Record(rows[:, 0], rows[:, 1], DT), 1000)
+
+
+def test_averages_where_no_thread_can_begin(tmp_path):
+    """In what an interpreter does at its end, after all threads."""
+    script = tmp_path / "late.py"
+    script.write_text(
+        "import atexit, numpy as np, freqid as fq\n"
+        "u = np.random.default_rng(0).standard_normal(300_000)\n"
+        "record = fq.Record(u, np.roll(u, 1), 1e-3)\n"
+        "print(len(fq.h1(record.slice(0, 2), 1000).frequency))\n"
+        "atexit.register(lambda: print(len(fq.h1(record, 1000).frequency)))\n"
+    )
+    told = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert told.stdout.split() == ["500", "500"], told.stderr

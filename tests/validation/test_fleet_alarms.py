@@ -213,3 +213,15 @@ def test_texts_in_the_order_of_their_numbers():
     assert [t.get_text() for t in axis.get_xticklabels()] == ["Oct", "Nov", "Dec", "Jan"]
     with pytest.raises(ValueError, match="order is not that of time"):
         fq.fleet_alarms(runs.assign(at=months.astype(str)), "k", by="at")
+
+
+def test_days_as_texts_are_dates():
+    """As a CSV gives them: KeyError in the plot."""
+    runs = fleet([2, 0], 20)
+    days = pd.date_range("2026-01-01", periods=len(runs))
+    drawn = [fq.plot_fleet(runs.assign(at=at), "k", by="at") for at in (days, days.astype(str))]
+    left, right = (
+        axis.collections[0].get_offsets() if axis.collections else axis.lines[0].get_xdata()
+        for axis in drawn
+    )
+    assert np.array_equal(left, right)
