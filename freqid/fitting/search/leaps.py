@@ -10,6 +10,8 @@ from freqid.fitting.cost.objective import Objective
 AT_A_LEAP = "The cost leaps next to the minimum, as it does at whole samples of a delay."
 # parts of a step by which a leap is told from a slope
 _PARTS = 1e-2, 1e-3
+# of the cost: less is rounding
+_SEEN = 1e-6
 
 
 def leaps(objective: Objective, x: FloatArray) -> bool:
@@ -25,4 +27,4 @@ def leaps(objective: Objective, x: FloatArray) -> bool:
     near = [objective.point(np.clip(x + part * step, lower, upper)) for part in _PARTS]
     rises = [-np.inf if p is None else p.cost - point.cost for p in near]
     # what is smooth rises in proportion to the step
-    return rises[0] > 0 and rises[1] > rises[0] / 2
+    return min(rises) > _SEEN * point.cost and rises[1] > rises[0] / 2
