@@ -18,6 +18,7 @@ import numpy as np
 from freqid.checks import FloatArray, InputError
 from freqid.data import DataSet, Record
 from freqid.fitting.at_limits import at_limits
+from freqid.fitting.black_box.output_error import with_scatter
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.heard_back import related
 from freqid.fitting.loop_box import LoopBox
@@ -149,7 +150,7 @@ def with_loop_noise(
         return est, share
     minimum = dataclasses.replace(est.minimum, score=score)
     spread = Spread(est.scatter.change, minimum)
-    return dataclasses.replace(est, problem=minimum, uncertainty=spread), share
+    return with_scatter(est, minimum, spread), share
 
 
 def _explained(records: Sequence[Record], order: int) -> tuple[list[Record], float, Loop, int]:

@@ -326,3 +326,17 @@ def test_a_start_that_is_noise_tells_no_pole():
     assert rms[0] < 1.2, rms
     # what is left is of poles near zero, where the plant is no longer straight in it
     assert rms[1] < 2, rms
+
+
+def test_an_integrator_in_a_loop_does_not_grow_for_certain():
+    """A pole at 1.00012 ± 0.00042 was "unstable", by errors without the noise of the loop."""
+    rng = np.random.default_rng(500)
+    r, noise = rng.normal(size=2000), 0.05 * rng.normal(size=2000)
+    x, u = np.zeros(2002), np.zeros(2002)
+    for t in range(2000):
+        x[t] = 0.02 * u[t - 1] + 0.018 * u[t - 2] + 1.9 * x[t - 1] - 0.9 * x[t - 2]
+        u[t] = r[t] - 0.8 * (x[t] + noise[t])
+    est = fq.fit(fq.OutputError(2), fq.Record(u[:2000], x[:2000] + noise, 0.01, reference=r))
+    assert np.abs(est.model.poles).max() > 1
+    assert est.verdict.grade == "trust"
+    assert any("less than two standard errors" in w for w in est.warnings)

@@ -36,7 +36,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import UncomputableError, polish
 from freqid.fitting.sight import out_of_sight
-from freqid.fitting.signs import Evidence, findings
+from freqid.fitting.signs import Evidence, findings, unstable
 from freqid.fitting.sufficiency import enough_rows, moving, told_apart
 from freqid.fitting.uncertainty.error_bars import pole_scatter
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
@@ -210,6 +210,17 @@ def coefficient_estimate(
         signs=findings(evidence),
         **minimum.outcome(),
     )
+
+
+def with_scatter(est: Estimate, minimum: Minimum, spread: Spread) -> Estimate:
+    """A black box whose errors turned out to be others: whether a motion grows is asked anew."""
+    others = [s for s in est.signs if s.kind != "unstable"]
+    if len(others) < len(est.signs) and est.dt:
+        duration, none = minimum.objective.n_rows * est.dt, np.zeros(0)
+        growing = _growing(est.model, duration).tolist()
+        growth = _growth(minimum, spread, duration)
+        others += unstable(Evidence([], none, none, "", growing=growing, growth=growth))
+    return dataclasses.replace(est, problem=minimum, uncertainty=spread, signs=others)
 
 
 def _growing(model: Model, duration: float) -> ComplexArray:
