@@ -14,6 +14,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import Record
+from freqid.fitting.black_box.output_error import with_scatter
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
@@ -62,8 +63,7 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     )
     minimum = dataclasses.replace(est.minimum, inflation=1 / inside**2)
     spread = Spread(est.scatter.change, minimum)
-    est = dataclasses.replace(est, problem=minimum, uncertainty=spread, notes=[*est.notes, note])
-    return est, cut
+    return with_scatter(dataclasses.replace(est, notes=[*est.notes, note]), minimum, spread), cut
 
 
 def _cut(

@@ -20,7 +20,7 @@ _WHOLE = ("boxcar", "rectangular")
 
 # correlation of noise over input at two lines that is none, of independent segments
 _TIED = 0.01
-# samples whose segments are taken at once
+# samples whose segments are taken at once, of long ones two: one for each thread
 _PIECE = 1 << 19
 # segments that show where in one the input acts; relative difference of some that are the same
 _SHOWN, _SAME = 16, 1e-6
@@ -101,7 +101,7 @@ def pieces(
     every = {"u": r.inputs[:: r.factor].T[:, : r.n_samples], "y": r.outputs.T}
     if reference is not None:
         every["r"] = reference.T
-    left, per = (r.n_samples - length) // step + 1, max(_PIECE // step, 1)
+    left, per = (r.n_samples - length) // step + 1, max(_PIECE // step, 2)
     for first in range(0, left, per):
         n = min(per, left - first)
         part = slice(first * step, (first + n - 1) * step + length)

@@ -7,7 +7,7 @@ import freqid as fq
 
 
 def test_a_delay_of_whole_samples_is_a_minimum():
-    """ "Not converged" in 1 of 60 such records: one sample on one output more is left open."""
+    """1 of 60 such records had not converged: one sample on one output more is left open."""
     rng, k = np.random.default_rng(2), np.arange(400)
     u = np.where((k > 40) & (k < 160), 1.0, np.where((k > 200) & (k < 320), -1.0, 0.0))
     plant = scipy.signal.StateSpace([[-1 / 3, 0], [0.05, 0]], [[1 / 3], [0]], [[0, 1]], [[0]])

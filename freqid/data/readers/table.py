@@ -189,7 +189,7 @@ def _are_names(cells: Sequence[str]) -> bool:
 
 def _are_units(cells: Sequence[str], above: Sequence[str]) -> bool:
     """Whether a row is one of units: brackets, or short words of which several are known, or one
-    where nothing stands below the name of a time.
+    of them where nothing stands below the first name, as that of a time.
     """
     words = [c.strip() for c in cells if c.strip()]
     if all(re.fullmatch(r"[\[(].*[\])]", w) or w == "-" for w in words):

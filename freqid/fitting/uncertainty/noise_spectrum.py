@@ -93,13 +93,13 @@ def _autoregressive(power: FloatArray, n_samples: int = 0) -> FloatArray:
     shape = np.ones(power.shape)
     if most < 1:
         return shape
-    angle = np.pi * np.arange(K) / max(K - 1, 1)
-    r = scipy.fft.irfft(power, axis=-1)[:, : most + 1]
+    every, period = power, 2 * (K - 1)
     if n_samples // 2 in (K - 1, K):
-        at = np.arange(n_samples // 2 + 1)[-K:]
-        angle = 2 * np.pi * at / n_samples
-        every = power if at[0] == 0 else np.concatenate([power[:, :1], power], axis=1)
-        r = scipy.fft.irfft(every, n_samples, axis=-1)[:, : most + 1]
+        period = n_samples
+        if n_samples // 2 == K:
+            every = np.concatenate([power[:, :1], power], axis=1)
+    angle = 2 * np.pi * np.arange(period // 2 + 1)[-K:] / period
+    r = scipy.fft.irfft(every, period, axis=-1)[:, : most + 1]
     going = r[:, 0] > 0
     left = np.where(going, r[:, 0], 1.0)
     a = np.zeros_like(r)
