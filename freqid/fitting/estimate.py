@@ -82,7 +82,7 @@ class Estimate(Questioned, Shown):
     hold: Hold
     dt: float
     n_rows: int
-    signs: list[Finding] = field(default_factory=list)
+    signs: Sequence[Finding] = field(default_factory=list)
     n_starts: int = 1
     n_agreed: int = 1
     problem: Minimum | None = field(default=None, repr=False)

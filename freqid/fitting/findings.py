@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, Protocol, overload
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +48,38 @@ class Finding(str):
         self,
     ) -> tuple[str, str, Severity, float | None, float | None]:
         return self.kind, self[len(self.kind) + 2 :], self.severity, self.number, self.p_value
+
+
+class Unread(Sequence[Finding]):
+    """Findings that are read when somebody asks for them: error bars take a part of a fit's time.
+
+    A pickle takes the findings themselves.
+    """
+
+    def __init__(self, read: Callable[[], list[Finding]]) -> None:
+        self._read = read
+
+    @cached_property
+    def _found(self) -> list[Finding]:
+        return self._read()
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    @overload
+    def __getitem__(self, index: int) -> Finding: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Finding]: ...
+
+    def __getitem__(self, index: int | slice) -> Finding | list[Finding]:
+        return self._found[index]
+
+    def __repr__(self) -> str:
+        return repr(self._found)
+
+    def __reduce__(self) -> tuple[type[list[Finding]], tuple[list[Finding]]]:
+        return list, (self._found,)
 
 
 class Inquired(Protocol):

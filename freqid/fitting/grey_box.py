@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, unknown
-from freqid.data import Record, input_dt, output_dt, rate_factor, units_of_channels
-from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.data import Record, input_dt, output_dt, rate_factor
 from freqid.fitting.cost.nuisance import HoldPeriod
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -19,23 +18,20 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.fitters import SearchOptions, check_late, fits
 from freqid.fitting.grey_search import search_grey
+from freqid.fitting.grey_signs import signs_of
 from freqid.fitting.physical_minimum import physical_minimum
 from freqid.fitting.reading import Reading
-from freqid.fitting.reading_sets import aliased_part, read_for
+from freqid.fitting.reading_sets import read_for
 from freqid.fitting.search.descent import Solution, minimise
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.search.stopping import Found
-from freqid.fitting.sight import gone_with, hold_that_changes, out_of_sight
-from freqid.fitting.signs import Evidence, findings
 from freqid.fitting.sufficiency import enough_rows
 from freqid.fitting.twins import nearest_to_start
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.witness import Testimony
-from freqid.lti import Hold, InputHolds, StateSpace, ZeroOrderHold, rounding, sentence
+from freqid.lti import ZeroOrderHold
 from freqid.models import GreyBox
 
-# rates less far apart cost no fit as many digits as are worth a word
-_APART = 1e4
 # a value that a start gives for a tied parameter is that of its expression up to rounding
 _SAME = 1e-9
 
@@ -223,75 +219,28 @@ def checked_start(model: GreyBox, start: Mapping[str, float] | None) -> Mapping[
     return values
 
 
-def _rounding(
-    plant: StateSpace, hold: Hold, reading: Reading, fitted: Experiment
-) -> tuple[float, str]:
-    """How far rounding of the matrices moves what was fitted, and the sentence on it."""
-    lines = fitted if isinstance(fitted, SpectralExperiment) else reading.at_lines().lines()
-    omega = lines.lines.omega
-    if isinstance(hold, InputHolds) or not len(omega):
-        return 0.0, ""
-    low = omega[omega > 0].min(initial=np.inf)
-    at = np.geomspace(low, omega.max(), 3) if low < np.inf else omega[:0]
-    lost = rounding(plant, hold, at, _APART)
-    return lost, sentence(plant, lost) if lost else ""
-
-
 def _estimate(
     structure: GreyStructure, minimum: Minimum, found: Found, readings: Sequence[Reading]
 ) -> Estimate:
-    reading, model = readings[0], structure.at(minimum.x)
-    plant = model.state_space()
+    reading, hold = readings[0], readings[0].hold
     values, count = minimum.x * structure.scale, structure.count
-    spread = Spread(structure.scale, minimum)
-    std = np.sqrt(np.diag(spread.covariance))
-    hold, held = reading.hold, None
     if HoldPeriod.name in structure.names:
-        place = structure.names.index(HoldPeriod.name)
-        held = float(values[place]), float(std[place])
-        hold = ZeroOrderHold(held[0])
-    poles = np.linalg.eigvals(plant.A).astype(complex)
-    evidence = Evidence(
-        structure.parameters,
-        values[:count],
-        std[:count],
-        "" if minimum.solution.converged else minimum.solution.message,
-        minimum.determined.sentences,
-        held,
-        output_dt(reading.data),
-        minimum.objective.n_rows,
-        len(values),
-        out_of_sight=out_of_sight(poles, hold_that_changes(hold, reading.data)),
-        gone=gone_with(model, poles, structure.parameters, output_dt(reading.data)),
-        aliased=aliased_part(readings),
-        rounding=_rounding(plant, hold, reading, minimum.objective.experiments[0]),
-        units=dict.fromkeys(
-            each
-            for r in readings
-            for each in units_of_channels(
-                (*r.data.input_names, *r.data.output_names), getattr(r.data, "units", {})
-            )
-        ),
-        tied=[(model.parameter(n), tie, model[n]) for n, tie in model.ties.items()],
-        exact=minimum.exact,
-        # what rounding leaves wants nothing
-        wanted=values[:count] if minimum.exact else (minimum.unbounded * structure.scale)[:count],
-    )
+        hold = ZeroOrderHold(float(values[structure.names.index(HoldPeriod.name)]))
     return Estimate(
-        model=model,
+        model=structure.at(minimum.x),
         names=structure.names,
         values=values,
         nominal=np.array(
             [p.value for p in structure.parameters] + [np.nan] * (len(values) - count)
         ),
         units=structure.units,
-        uncertainty=spread,
+        uncertainty=Spread(structure.scale, minimum),
         problem=minimum,
         hold=hold,
         dt=output_dt(reading.data),
         n_starts=found.n_starts,
         # the descent from a start itself, beside its first stage, is no start of its own
         n_agreed=min(found.n_agreed, found.n_starts),
-        signs=findings(evidence),
+        signs=signs_of(structure, minimum, readings, hold),
         **minimum.outcome(),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class Questioned:
     """The part of an Estimate that answers for it. Each question is asked once, when it is read."""
 
-    signs: list[Finding]
+    signs: Sequence[Finding]
     testimony: Callable[[], Witness] | None
     inquiry: Inquired | None
     problem: Minimum | None
