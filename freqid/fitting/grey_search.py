@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import cast
 
 import numpy as np
@@ -25,7 +27,7 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.fitters import SearchOptions
 from freqid.fitting.left_open import without_hiding
 from freqid.fitting.reading import Reading
-from freqid.fitting.search.descent import Solution, minimise, polish
+from freqid.fitting.search.descent import Solution, minimise, polish, straight_down
 from freqid.fitting.search.guide import Guide
 from freqid.fitting.search.interrupted import best_so_far
 from freqid.fitting.search.noise_floor import noise_floor
@@ -36,6 +38,8 @@ from freqid.fitting.sight import hold_that_changes, out_of_sight
 
 # lines on which the minimum is looked for, and how many times more for noise as large as the signal
 _LINES, _NOISY = 600, 10
+# a number of lines beside which so many times more are another one
+_FEWER = 1.1
 # and how many times more where these leave a doubt
 _MORE = 8
 # part of the cost on all lines that a step from the minimum on few may gain
@@ -82,26 +86,38 @@ def _search(
         return Found(polish(objective, structure.start, limit=most))
     if in_time:
         spectral = [r.lines() for r in at_lines]
+    every = sum(e.n_lines for e in spectral)
+    floor = cache(lambda: noise_floor(spectral))
+
+    def on(lines: int) -> Objective:
+        """The cost on about so many lines."""
+        few = thinned_to(spectral, lines)
+        scouts.append(objective if few is spectral and not in_time else Objective(structure, few))
+        return scouts[-1]
+
     # long records have more lines than it takes: refine on all of them last
-    floor = noise_floor(spectral)
-    lines = _lines_wanted(spectral, floor)
-    few = thinned_to(spectral, lines)
-    scout = objective if few is spectral and not in_time else Objective(structure, few)
-    scouts.append(scout)
-    found = None if in_time else _without_noise(scout, structure, few, floor)
+    lines = every if every < 2 * _LINES else _LINES
+    scout, found, straight = on(lines), None, {}
+    if not in_time:
+        straight[structure.start.tobytes()] = straight_down(scout, structure.start)
+        found = _without_noise(scout, straight, floor)
+    if found is None and lines < every:
+        wanted = _lines_wanted(spectral, floor())
+        if wanted > _FEWER * lines:
+            lines, used, straight = wanted, scout.n_evaluations, {}
+            scout = on(lines)
+            scout.n_evaluations += used
     if found is None:
-        every = sum(e.n_lines for e in spectral)
-        share = sum(e.n_lines for e in few) / every
+        share = sum(e.n_lines for e in _spectral(scout)) / every
         part = share < 1 and options.n_starts is None
         survey = Surveyed(structure, at_lines, floor, lines, share, part)
-        found, beside = _searched(survey, scout, options)
+        found, beside = _searched(survey, scout, options, straight=straight)
         if part and (not found.sure or (not in_time and _misled(objective, found))):
             # what so many lines leave open more of them may tell
-            more = thinned_to(spectral, _MORE * lines)
-            wide = Objective(structure, more)
+            wide = Objective(structure, thinned_to(spectral, _MORE * lines))
             scouts.append(wide)
             wide.n_evaluations = scout.n_evaluations
-            share = sum(e.n_lines for e in more) / every
+            share = sum(e.n_lines for e in _spectral(wide)) / every
             data = Surveyed(structure, at_lines, floor, _MORE * lines, share)
             again = None if found.sure else _followed(data, wide, beside, found)
             if again is None:
@@ -115,6 +131,10 @@ def _search(
     if scout is objective:
         return found
     return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+
+
+def _spectral(scout: Objective) -> Sequence[SpectralExperiment]:
+    return cast("Sequence[SpectralExperiment]", scout.experiments)
 
 
 def _misled(objective: Objective, found: Found) -> bool:
@@ -135,7 +155,7 @@ class Surveyed:
 
     structure: GreyStructure
     readings: Sequence[Reading]
-    floor: float
+    floor: Callable[[], float]
     lines: int
     share: float
     part: bool = False
@@ -172,7 +192,11 @@ def _followed(
 
 
 def _searched(
-    data: Surveyed, scout: Objective, options: SearchOptions, known: FloatArray | None = None
+    data: Surveyed,
+    scout: Objective,
+    options: SearchOptions,
+    known: FloatArray | None = None,
+    straight: dict[bytes, Solution | None] | None = None,
 ) -> tuple[Found, Beside | BesidePlaces | None]:
     """The minimum on these lines, no worse than what is known, and the black boxes it aimed at."""
     structure, readings, start = data.structure, data.readings, data.structure.start
@@ -184,7 +208,7 @@ def _searched(
     if known is None and (start != structure.start).any():
         # what the black box's delays lead to has to stand beside the user's own
         known = structure.start
-    few = cast("Sequence[SpectralExperiment]", scout.experiments)
+    few = _spectral(scout)
 
     def deepened(x: FloatArray) -> Guide | None:
         nonlocal beside
@@ -194,10 +218,12 @@ def _searched(
         beside = deeper
         return guide_of(beside, structure, few, data.share)
 
-    # who begins with a mode out of sight means it
-    aliased = (lambda x: False) if data.hidden(start) else data.hidden
+    def aliased(x: FloatArray) -> bool:
+        # who begins with a mode out of sight means it
+        return data.hidden(x) and not data.hidden(start)
+
     guide = guide_of(beside, structure, few, data.share)
-    search = Search(scout, guide, data.floor, aliased, deepened, data.part)
+    search = Search(scout, guide, data.floor, aliased, deepened, data.part, straight)
     if beside is None and isinstance(structure, PlacedStructure):
         # nothing says when it is enough, and each start is a fit of everything
         search.most = _ALONE
@@ -209,19 +235,16 @@ def _searched(
 
 def _without_noise(
     scout: Objective,
-    structure: GreyStructure,
-    few: Sequence[SpectralExperiment],
-    floor: float,
+    straight: Mapping[bytes, Solution | None],
+    floor: Callable[[], float],
 ) -> Found | None:
     """The minimum of data that are down to rounding, which needs no black box; None for others."""
-    energy = sum(e.energy for e in few)
-    if not 0 < floor <= _QUIET * energy:
-        return None
-    try:
-        found = Found(polish(scout, structure.start, limit=_DIRECT))
-    except InputError:
-        return None
-    return found if found.solution.cost <= _EXACT * energy else None
+    energy, (near,) = scout.energy, straight.values()
+    if near is None and 0 < floor() <= _QUIET * energy:
+        start = cast(GreyStructure, scout.structure).start
+        with contextlib.suppress(InputError):
+            near = polish(scout, start, limit=_DIRECT)
+    return Found(near) if near is not None and near.cost <= _EXACT * energy else None
 
 
 def _lines_wanted(experiments: Sequence[SpectralExperiment], noise: float) -> int:

@@ -34,19 +34,23 @@ def matched(structure: GreyStructure, x: FloatArray) -> FloatArray | None:
     """Unknowns with the response of those at ``x``, from the start on; None where they are the same
     or the start is near anyway.
     """
-    begin = np.array([structure.meant[name] for name in structure.physical_names])
-    look = _Look.at(structure, x, begin)
-    if look is None:
+    if structure.unknown:
         return None
-    moved = np.log(look.values[look.told] / begin[look.told])
-    walked = np.log(np.abs(x[look.told] / structure.start[look.told]))
+    begin = np.array([structure.meant[name] for name in structure.physical_names])
+    values = x * structure.scale
+    told = begin * values > 0
+    moved = np.log(values[told] / begin[told])
+    walked = np.log(np.abs(x[told] / structure.start[told]))
     if min(np.sum(np.abs(way) > _MOVED) for way in (moved, walked)) < 2:
         # an answer of other values has moved more than one, and a refit begins from a chosen one
+        return None
+    look = _Look.at(structure, x, begin)
+    if look is None:
         return None
     (other,) = look.ends(begin[None])
     if other is None:
         return None
-    nearer = np.log(np.abs(other[look.told] * structure.scale[look.told] / begin[look.told]))
+    nearer = np.log(np.abs(other[told] * structure.scale[told] / begin[told]))
     return other if np.abs(nearer).sum() < np.abs(moved).sum() else None
 
 

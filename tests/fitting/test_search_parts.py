@@ -94,8 +94,8 @@ def test_starts_on_few_lines_are_counted_once(monkeypatch):
     plant, record, start = noisy_axis()
     searched = grey_search._searched
 
-    def after_many(*given):
-        found, beside = searched(*given)
+    def after_many(*given, **more):
+        found, beside = searched(*given, **more)
         return dataclasses.replace(found, n_starts=13, n_agreed=9, sure=False), beside
 
     monkeypatch.setattr(grey_search, "_searched", after_many)

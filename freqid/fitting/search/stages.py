@@ -49,19 +49,22 @@ class Search:
 
     ``floor`` is the cost that the data's own noise explains. Where the first start does not end
     next to the guide's black box, the guide is ``deepened`` before other starts are tried; not on
-    a ``part`` of the lines that leaves an unknown open, which more of them may tell.
+    a ``part`` of the lines that leaves an unknown open, which more of them may tell. ``straight``
+    are the ends of steps straight down that were made, by where they began.
     """
 
     def __init__(
         self,
         objective: Objective,
         guide: Guide,
-        floor: float,
+        floor: Callable[[], float],
         aliased: Callable[[FloatArray], bool] = lambda x: False,
         deepened: Deepened = lambda x: None,
         part: bool = False,
+        straight: dict[bytes, Solution | None] | None = None,
     ) -> None:
         self.objective, self.guide = objective, guide
+        self._straight = {} if straight is None else straight
         self.aliased, self.deepened = aliased, deepened
         self.floor, self.most, self.part = floor, BUDGET, part
         self._best_log_cost = np.inf
@@ -171,7 +174,7 @@ class Search:
         A first stage may lead away from what is near: unless its end is sure, it has to stand
         beside the descent from the start. Raises InputError where that cannot be computed.
         """
-        near = None if rule.bound is None else straight_down(self.objective, start)
+        near = None if rule.bound is None else self._near(start)
         if near is not None:
             straight = Found(near)
             if rule.sure(straight) or rule.convinced(straight):
@@ -191,6 +194,13 @@ class Search:
             # one start that ends twice in one place is no other that agrees
             return found.joined(other, rule.rounding, visits=0)
         return Found(minimise(self.objective, start))
+
+    def _near(self, start: FloatArray) -> Solution | None:
+        """Where steps straight down from the start lead; None where one does not."""
+        key = start.tobytes()
+        if key not in self._straight:
+            self._straight[key] = straight_down(self.objective, start)
+        return self._straight[key]
 
     def _first_stage(self, start: FloatArray) -> FloatArray | None:
         structure = LogStructure(self.objective.structure, start)

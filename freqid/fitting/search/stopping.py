@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,7 +100,7 @@ class StopRule:
 
     n_starts: int | None
     rounding: float
-    floor: float
+    floor: Callable[[], float]
     bound: Bound | None
     most: int = BUDGET
 
@@ -171,7 +172,7 @@ class StopRule:
         # starts of both kinds, on a leash and without
         both = found.n_starts > 4 * ROUND
         if self.bound is None:
-            if cost <= _EXPLAINED * self.floor or found.n_stale >= _PATIENCE:
+            if cost <= _EXPLAINED * self.floor() or found.n_stale >= _PATIENCE:
                 return True
             return found.n_agreed >= 3 and both
         if cost > self.bound.cost * (1 + _MISSED) and not self.explains(cost):
