@@ -49,7 +49,7 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
     """The minimum from a point of a stable chart where a descent met the circle, with the poles
     held that want to leave it; None where the rounds do not end.
     """
-    centre, before, held_before = chart.matrices(x), np.inf, -1
+    centre, before, held_before = _where_held(chart.matrices(x)), np.inf, -1
     edge: Edge | None = None
     held_there: Edge | None = None
     for _ in range(_ROUNDS):
@@ -77,6 +77,14 @@ def at_the_edge(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) 
         edge = (held, found, objective) if found.converged else None
         held_there = edge if count else held_there
     return None
+
+
+def _where_held(at: StateSpace) -> StateSpace:
+    """A model whose poles are no nearer to the circle than where they are held: on a line that they
+    all but touch, a step is rounding.
+    """
+    radius = float(np.abs(np.linalg.eigvals(at.A)).max(initial=0.0))
+    return at._replace(A=at.A * (RADIUS / radius)) if radius > RADIUS else at
 
 
 def on_the_circle(chart: Chart, x: FloatArray, experiments: Sequence[Experiment]) -> Edge | None:
