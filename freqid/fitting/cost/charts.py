@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import copy
 import warnings
+from functools import partial
 
 import numpy as np
 import scipy
@@ -29,6 +30,8 @@ from freqid.lti import (
 
 # how far from a pole its response is asked
 _ASIDE = 1e-6
+# eigenvectors whose inverse has no larger entries keep the digits that a Gramian needs
+_WELL = 1e4
 
 
 class Chart:
@@ -179,23 +182,47 @@ def balanced(model: StateSpace) -> StateSpace:
     A, B, C, D = model
     if not len(A):
         return model
-    if np.abs(np.linalg.eigvals(A)).max() >= 1 - 1e-9:
+    eigenvalues, V = np.linalg.eig(A)
+    if np.abs(eigenvalues).max() >= 1 - 1e-9:
         size_B, size_C = float(np.linalg.norm(B)), float(np.linalg.norm(C))
         ratio = np.sqrt(size_C / size_B) if size_B and size_C else 1.0
         return StateSpace(A, B * ratio, C / ratio, D)
+    for gramians in (partial(_gramians_in_modes, eigenvalues, V), partial(_gramians, A)):
+        try:
+            L, K = (np.linalg.cholesky(G) for G in gramians(B, C))
+        except np.linalg.LinAlgError:
+            continue
+        U, s, Vt = np.linalg.svd(K.T @ L)
+        T = L @ Vt.T / np.sqrt(s)
+        Ti = (U / np.sqrt(s)).T @ K.T
+        return StateSpace(Ti @ A @ T, Ti @ B, C @ T, D)
+    return model
+
+
+def _gramians_in_modes(
+    eigenvalues: ComplexArray, V: ComplexArray, B: FloatArray, C: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Reachability and observability Gramians by the eigenvectors V, in which each entry is the sum
+    of a geometric series; LinAlgError where those are badly conditioned.
+    """
+    inverse = np.linalg.inv(V)
+    if not np.abs(inverse).max() * len(V) < _WELL:
+        raise np.linalg.LinAlgError("the eigenvectors are nearly dependent")
+    series = 1 / (1 - eigenvalues[:, None] * eigenvalues.conj())
+    b, c = inverse @ B, C @ V
+    reach = V @ (b @ b.conj().T * series) @ V.conj().T
+    observe = inverse.conj().T @ (c.conj().T @ c * series.conj()) @ inverse
+    return reach.real, observe.real
+
+
+def _gramians(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same whatever the eigenvectors are; LinAlgError where scipy finds none."""
     with warnings.catch_warnings():
         # poles next to both ends of the real axis perturb the Gramians, of which any will do
         warnings.simplefilter("ignore", RuntimeWarning)
         reach = scipy.linalg.solve_discrete_lyapunov(A, B @ B.T, method="bilinear")
         observe = scipy.linalg.solve_discrete_lyapunov(A.T, C.T @ C, method="bilinear")
-    try:
-        L, K = np.linalg.cholesky(reach), np.linalg.cholesky(observe)
-    except np.linalg.LinAlgError:
-        return model
-    U, s, Vt = np.linalg.svd(K.T @ L)
-    T = L @ Vt.T / np.sqrt(s)
-    Ti = (U / np.sqrt(s)).T @ K.T
-    return StateSpace(Ti @ A @ T, Ti @ B, C @ T, D)
+    return reach, observe
 
 
 def to_plane(model: StateSpace, plane: Plane) -> StateSpace:
