@@ -10,18 +10,24 @@ from numbers import Real
 
 from freqid.checks import InputError, finite, flag
 
+# what is physical where nobody has said it: this very tuple, and no other that is equal
+_UNSAID = (0, math.inf)
+
 
 @dataclass(frozen=True)
 class Parameter:
     """A physical parameter: its name, nominal value, unit and what is known of its range.
 
     ``lower`` and ``upper`` bound the search of a fit. ``physical`` (low, high) only flags: an
-    estimate outside it is reported in ``est.warnings``, never prevented. ``prior`` (mean, standard
+    estimate outside it is reported in ``est.warnings``, never prevented. Not given, it is (0, inf),
+    or all numbers where the value itself is negative. ``prior`` (mean, standard
     deviation) is what was known before the experiment. Raises ValueError for a value that is not
     finite or outside its bounds, for bounds that cross, and for a fixed parameter with a prior.
 
     >>> Parameter("k", 1.5e5, unit="N m/rad", lower=0).name
     'k'
+    >>> Parameter("k", 1.5e5).physical, Parameter("coupling", -20.0).physical
+    ((0, inf), (-inf, inf))
     """
 
     name: str
@@ -30,7 +36,7 @@ class Parameter:
     lower: float = -math.inf
     upper: float = math.inf
     fixed: bool = False
-    physical: tuple[float, float] = (0, math.inf)
+    physical: tuple[float, float] = _UNSAID
     prior: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
@@ -49,6 +55,9 @@ class Parameter:
                 f"parameter {self.name}: lower={self.lower!r} must be below upper={self.upper!r}"
             )
         self._check_bounds()
+        if self.physical is _UNSAID:
+            # said from now on: the same at another value, as at an estimate, is as physical as here
+            object.__setattr__(self, "physical", (0 if self.value >= 0 else -math.inf, math.inf))
         try:
             least, most = (float(v) for v in self.physical)
         except (TypeError, ValueError):

@@ -179,3 +179,28 @@ def test_what_is_no_switch_and_no_unit_is_refused():
         fq.Parameter("x", 1.0, fixed="no")
     with pytest.raises(ValueError, match="x: unit=5 must be text"):
         fq.Parameter("x", 1.0, unit=5)
+
+
+def test_a_negative_value_says_that_it_may_be_negative():
+    """A coupling of -20 is no fault, and that of a value that was positive is one."""
+    plant = fq.GreyBox(
+        lambda a, c: ([[-a]], [[c]], [[1.0]], None),
+        [fq.Parameter("a", 30.0), fq.Parameter("c", -20.0)],
+    )
+    assert plant.parameter("c").physical == (-np.inf, np.inf)
+    record = fq.simulate(plant, fq.white_noise(400, seed=1), 1e-3).with_noise(1e-3, seed=2)
+    assert "not physical" not in [w.kind for w in fq.fit(plant, record).warnings]
+    turned = plant.with_values(c=20.0)
+    assert turned.parameter("c").physical == (-np.inf, np.inf)
+    asked = fq.GreyBox(plant.matrices, [fq.Parameter("a", 30.0), fq.Parameter("c", 20.0)])
+    wrong = fq.fit(asked, record)
+    assert "not physical" in [w.kind for w in wrong.warnings]
+    # at the estimate it is as unphysical, whatever else is changed of it there
+    for other in (wrong.model, wrong.model.fix("a"), wrong.model.with_bounds(c=(-100, 100))):
+        assert other["c"] < 0
+        assert other.parameter("c").physical == (0, np.inf)
+
+
+def test_who_says_what_is_physical_is_believed():
+    assert fq.Parameter("c", -20.0, physical=(0, np.inf)).physical == (0, np.inf)
+    assert fq.Parameter("c", 20.0, physical=(-np.inf, 0)).physical == (-np.inf, 0)
