@@ -80,7 +80,16 @@ class Averaging:
         if self.detrend is False:
             out[:] = segments
         elif callable(self.detrend):
-            out[:] = self.detrend(segments)
+            found = np.asarray(self.detrend(segments))
+            if found.shape != segments.shape or found.dtype.kind not in "fiu":
+                what = (
+                    f"an array {found.shape} of {found.dtype}" if found.shape else f"{found!r:.80}"
+                )
+                raise InputError(
+                    f"detrend returned {what}; expected real numbers {segments.shape}, the samples "
+                    "that it was given without their trend"
+                )
+            out[:] = found
         elif self.detrend == "constant":
             np.subtract(segments, segments.mean(axis=-1, keepdims=True), out=out)
         else:
