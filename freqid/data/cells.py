@@ -18,7 +18,13 @@ def no_number(frame: pd.DataFrame, names: Sequence[str]) -> InputError:
     import pandas as pd
 
     for name in names:
-        wrong = frame[name].notna() & pd.to_numeric(frame[name], errors="coerce").isna()
+        column = frame[name]
+        wrong = column.notna() & pd.to_numeric(column, errors="coerce").isna()
+        if wrong.any() and column.dtype.kind not in "fiubc":
+            # beside a cell that is none, numbers with decimal commas have stayed texts
+            pointed = column.astype(str).str.replace(",", ".", regex=False)
+            others = column.notna() & pd.to_numeric(pointed, errors="coerce").isna()
+            wrong = others if others.any() else wrong
         if wrong.any():
             row = int(np.argmax(wrong.to_numpy()))
             return InputError(

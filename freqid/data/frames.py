@@ -28,7 +28,7 @@ from freqid.data.remembered import (
     kept_reference,
     kept_step,
 )
-from freqid.data.time_column import time_named, with_time
+from freqid.data.time_column import no_time, time_named, with_time
 from freqid.data.times_in_seconds import EPOCHS, of_this_world
 from freqid.lti import Hold
 
@@ -196,10 +196,7 @@ def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> flo
     times = _times(frame)
     if times is None:
         if dt is None:
-            raise InputError(
-                "dt=None, but the data have no column or index called 'time'; give dt in s (their "
-                f"columns are {', '.join(str(c) for c in frame.columns)})"
-            )
+            raise no_time(frame)
         return positive("dt", dt, "s")
     # times that are no numbers are refused below
     with np.errstate(all="ignore"):

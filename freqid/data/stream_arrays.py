@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
-from freqid.data.readers.columns import CLOCKS, step_of, unit_of
+from freqid.data.readers.columns import CLOCKS, clock_number, step_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
@@ -56,7 +56,10 @@ class _Arrays:
                 self.hollow[name] = f"{there} of {whole} chunks, the rest is {array.fill_value:g}"
         elif array.size == 1:
             folder = self.numbers.setdefault(_folder(name), {})
-            folder[_leaf(name)] = float(np.ravel(array[()])[0])
+            leaf, value = _leaf(name), float(np.ravel(array[()])[0])
+            told = clock_number(leaf, value, unit_of(array.attrs)) if leaf in CLOCKS else value
+            if told is not None:
+                folder[leaf] = told
 
     def add_clocks(self, folder: str, attributes: Mapping[str, Source]) -> None:
         """Note what the attributes of a folder, or of an array in it, say of the sample time."""

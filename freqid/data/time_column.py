@@ -32,8 +32,9 @@ _NAMES = {
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
     "x_value", "tout", "ms", "us", "µs", "ns", "datum", "uhrzeit", "zeitstempel", "fecha", "heure",
 }  # fmt: skip
-# steps that differ by no more than this part make an unnamed column a time
-_EVEN = 1e-3
+# steps that differ by no more than this part make an unnamed column a time, of at least so many
+# rows, if nearly all are such
+_EVEN, _FEWEST, _NEARLY_ALL = 1e-3, 3, 0.9
 # steps in s that nobody samples a machine with
 _SLOW = 0.2
 # names of the time with a unit behind them, which may be something else behind another name
@@ -65,6 +66,9 @@ def with_time(
     name = _found(frame, time, units, dt)
     if name is None:
         return frame, []
+    if "time" in units and "time" not in frame.columns:
+        # who tells the unit of the time means it, whatever its column is called
+        units = {name: units["time"], **units}
     seconds, said = in_seconds(name, frame[name], units.get(name, ""))
     others = frame.drop(columns=[*signals], errors="ignore")
     same = same_clock(others, name, seconds, units) if one_clock and time is None else []
@@ -139,19 +143,47 @@ def _found(
     x = frame[frame.columns[0]]
     if x.dtype.kind not in "fiu":
         return first if _is_stamp(x) else None
-    values = x.to_numpy(dtype=float)
-    with np.errstate(over="ignore", invalid="ignore"):
-        gaps = np.diff(values)
-    even = np.isfinite(values).all() and gaps.min() > 0
-    if not even or np.abs(gaps - gaps.mean()).max() > _EVEN * gaps.mean():
+    if not runs_as_a_time(x):
         return None
+    values = x.to_numpy(dtype=float)
+    gaps = np.diff(values)
     # what counts rows tells nothing of their time, unless somebody says its unit
     rows = (gaps == 1).all() and values[0] in (0, 1)
     return None if rows and first not in units else first
 
 
+def runs_as_a_time(column: Column) -> bool:
+    """Whether numbers rise in steps that are nearly all the same: some rows may be lost."""
+    if column.dtype.kind not in "fiu" or len(column) < _FEWEST:
+        return False
+    values = column.to_numpy(dtype=float)
+    with np.errstate(over="ignore", invalid="ignore"):
+        gaps = np.diff(values)
+    if not np.isfinite(values).all() or gaps.min() <= 0:
+        return False
+    usual = np.median(gaps)
+    return bool((np.abs(gaps - usual) <= _EVEN * usual).mean() >= _NEARLY_ALL)
+
+
+def no_time(frame: pd.DataFrame) -> InputError:
+    """The error for a table without a time, with the column that may be it."""
+    first = frame.columns[0]
+    may_be = f"; {first!r} may be it: call it 'time'" if runs_as_a_time(frame[first]) else ""
+    return InputError(
+        "dt=None, but the data have no column or index called 'time'; give dt in s (their columns "
+        f"are {', '.join(str(c) for c in frame.columns)}{may_be})"
+    )
+
+
 def _is_stamp(column: Column) -> bool:
-    return column.dtype.kind in "mM" or converted(column.iloc[:5]) is not None
+    if column.dtype.kind in "mM":
+        return True
+    try:
+        return converted(column.iloc[:5]) is not None
+    except InputError:
+        # which cell is none of the others' kind the whole column tells
+        converted(column)
+        raise
 
 
 def same_clock(

@@ -43,6 +43,8 @@ LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours
 DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
 _DATED = rf"\s*{DATE.pattern}\s"
 _DAY = 86_400.0
+# two numbers of a date, day and month, before its year
+_SLASHED, _MONTHS = re.compile(r"\s*(\d{1,2})[/-](\d{1,2})[/-]\d{4}"), 12
 # the end of a stamp whose time of day says how far it is from universal time
 _OFFSET = r":\d{2}[\d.,]*\s*(?:Z|[+-]\d{2}:?\d{2})\s*$"
 # beyond it a difference may be more than a double holds
@@ -77,7 +79,7 @@ def converted(column: Column) -> Column | None:
             f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
         )
     # with dots the day comes first
-    first = bool(texts.contains(r"\d\.\d+\.").any())
+    first = bool(texts.contains(r"\d\.\d+\.").any()) or _begins_with_the_day(column)
     dated, apart = bool(texts.match(_DATED).any()), texts.contains(_OFFSET)[column.notna()]
     if apart.any() and not apart.all():
         return None  # which hour the others mean would be a guess
@@ -103,6 +105,36 @@ def converted(column: Column) -> Column | None:
     return None
 
 
+def _begins_with_the_day(column: Column) -> bool:
+    """Whether dates such as 05/03/2026 have the day in front: beyond 12 it is no month, and within
+    a record it changes sooner than the month does.
+    """
+    if not _SLASHED.match(str(column.iloc[0])):
+        return False
+    parts = column.astype(str).str.extract(_SLASHED).dropna().astype(int)
+    front, behind = parts[0], parts[1]
+    if max(front.max(), behind.max()) > _MONTHS:
+        return bool(front.max() > _MONTHS)
+    return bool(front.nunique() > behind.nunique())
+
+
+def _first_that_is_none(column: Column) -> int:
+    """The first row of a column of times that holds none; 0 where most are none."""
+    import pandas as pd
+
+    there, wrong = column.notna(), []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for times in (
+            pd.to_datetime(column, format="ISO8601", errors="coerce", utc=True),
+            pd.to_timedelta(column, errors="coerce"),
+            pd.to_datetime(column, format="mixed", errors="coerce", utc=True),
+        ):
+            wrong.append((there & pd.Series(times).isna()).to_numpy())
+    least = min(wrong, key=np.sum)
+    return int(np.argmax(least)) if 2 * least.sum() < len(least) else 0
+
+
 def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
     """A column as seconds, and the unit that it was in."""
     if column.dtype.kind == "M":
@@ -115,8 +147,10 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
     if column.dtype.kind not in "fiub":
         times = converted(column)
         if times is None:
+            row = _first_that_is_none(column)
             raise InputError(
-                f"column {name!r} holds {column.iloc[0]!r}, which is neither a number nor a time"
+                f"column {name!r} holds {column.iloc[row]!r} in row {row}, which is neither a "
+                "number nor a time"
             )
         return in_seconds(name, times, unit)
     values = of_this_world(name, _less_the_first(column.to_numpy()))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import Array, InputError
+from freqid.data.times_in_seconds import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 # scalars that tell a sample time in s, or a rate in Hz
 _STEPS, _RATES = ("dt", "Ts", "ts", "Dt", "h"), ("Fs", "fs", "FS", "sampling_rate", "sample_rate")
 CLOCKS = (*_STEPS, *_RATES)
+_RATE_UNITS = {
+    "hz": 1.0, "1/s": 1.0, "s^-1": 1.0, "samples/s": 1.0, "s/s": 1.0, "sps": 1.0,
+    "khz": 1e3, "ks/s": 1e3, "mhz": 1e6, "ms/s": 1e6,
+}  # fmt: skip
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
@@ -67,6 +72,15 @@ def step_of(numbers: Mapping[str, float]) -> float | None:
     step = next((numbers[n] for n in _STEPS if n in numbers), None)
     rate = next((numbers[n] for n in _RATES if n in numbers), None)
     return 1 / rate if step is None and rate is not None and rate > 0 else step
+
+
+def clock_number(name: str, value: float, unit: str) -> float | None:
+    """A number called as sample times and rates are, in s or Hz; None where its unit is none of
+    these: h may be a height.
+    """
+    factors = _RATE_UNITS if name in _RATES else UNITS
+    factor = factors.get(unit.casefold()) if unit else 1.0
+    return None if factor is None else value * factor
 
 
 def _is_long(x: Array) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import Array, InputError
-from freqid.data.readers.columns import CLOCKS, columns_of, unit_of
+from freqid.data.readers.columns import CLOCKS, clock_number, columns_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
 from freqid.data.readers.limits import check_size
@@ -46,8 +46,14 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
             taken += 8.0 * item.size
             check_size(path, taken)
             parent, _, leaf = name.rpartition("/")
-            found.setdefault(parent, {})[leaf] = item[()]
-            units.setdefault(parent, {})[leaf] = unit_of(item.attrs)
+            value, unit = item[()], unit_of(item.attrs)
+            if leaf in CLOCKS and item.size == 1:
+                told = clock_number(leaf, float(np.ravel(value)[0]), unit)
+                if told is None:
+                    return
+                value, unit = np.asarray(told), ""
+            found.setdefault(parent, {})[leaf] = value
+            units.setdefault(parent, {})[leaf] = unit
             clocks = {n: v for n, v in item.parent.attrs.items() if n in CLOCKS and np.size(v) == 1}
             found[parent] |= {n: np.asarray(v).reshape(()) for n, v in clocks.items()}
 

@@ -23,7 +23,7 @@ _THOUSANDS = {
     ".": re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(,\d{3}){2,})"),
     ",": re.compile(r"[+-]?\d{1,3}((\.\d{3})+,\d+|(\.\d{3}){2,})"),
 }
-_OTHER = {".": ",", ",": "."}
+OTHER = {".": ",", ",": "."}
 _WHOLE = {
     ".": re.compile(r"[+-]?\d{1,3}(,\d{3})+"),
     ",": re.compile(r"[+-]?\d{1,3}(\.\d{3})+"),
@@ -103,7 +103,7 @@ def _check_thousands(rows: Sequence[Sequence[str]], layout: Layout) -> None:
         if _leaps(whole) < _SMOOTHER * _leaps(parts):
             raise InputError(
                 f"column {layout.names[i]!r} holds {marked[0]}, which may be a thousand and more; "
-                f"give decimal={sign!r}, or decimal={_OTHER[sign]!r} where it parts thousands"
+                f"give decimal={sign!r}, or decimal={OTHER[sign]!r} where it parts thousands"
             )
 
 
@@ -212,7 +212,7 @@ def _is_number(cell: str, sign: str, mark: str, sure: bool = False) -> bool:
 
 
 def _in_thousands(cell: str, sign: str, mark: str, sure: bool) -> bool:
-    if mark == _OTHER[sign]:
+    if mark == OTHER[sign]:
         return False
     return bool(_THOUSANDS[sign].fullmatch(cell) or (sure and _WHOLE[sign].fullmatch(cell)))
 
@@ -251,7 +251,7 @@ def _tried(
     numbers = sum(_is_number(c, sign, mark, sure) for c in cells) / max(len(cells), 1)
     marked = any(_in_thousands(c, sign, mark, sure) for c in cells)
     names, units, headed = heading([r for r in rows[:first] if any(r)], width)
-    layout = Layout(mark, sign, first, names, units, headed, _OTHER[sign] if marked else None)
+    layout = Layout(mark, sign, first, names, units, headed, OTHER[sign] if marked else None)
     return round(share * numbers, 2), width, layout
 
 

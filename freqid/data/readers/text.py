@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import dataclasses
 import gzip
 import io
 import lzma
@@ -15,10 +16,11 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import InputError
+from freqid.data.cells import no_number
 from freqid.data.readers.kinds import damaged, reads, writes
 from freqid.data.readers.limits import check_size, limit_of
 from freqid.data.readers.preambles import body_of
-from freqid.data.readers.table import LOOK, Layout, layout_of
+from freqid.data.readers.table import LOOK, OTHER, Layout, layout_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,9 +83,14 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
         )  # fmt: skip
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise damaged("CSV", error) from None
-    frame = _with_names(frame, layout)
+    grouped = _without_thousands(frame, layout)
+    frame = _with_names(frame, layout if grouped is None else grouped)
     if clock is not None:
-        frame["time"] = clock[0] + clock[1] * frame["time"].to_numpy(dtype=float)
+        try:
+            count = frame["time"].to_numpy(dtype=float)
+        except ValueError:
+            raise no_number(frame, ["time"]) from None
+        frame["time"] = clock[0] + clock[1] * count
     frame.attrs["notes"] = [*said, *frame.attrs.get("notes", [])]
     return frame
 
@@ -157,6 +164,37 @@ def _text(path: Path) -> str:
 def _complete(lines: list[str], text: str) -> list[str]:
     """The lines without a last one that may be cut."""
     return lines[:-1] if len(lines) == LOOK and len(text) > 400 * LOOK else lines
+
+
+def _without_thousands(frame: pd.DataFrame, layout: Layout) -> Layout | None:
+    """The layout with the mark between thousands that whole numbers have, 1.500 beside 900, where
+    other columns tell the decimal sign; these become numbers. None where there is none.
+
+    Raises ValueError for a column that has the mark in each cell: those may be decimals.
+    """
+    sign = OTHER[layout.decimal]
+    if layout.thousands or sign == layout.separator:
+        return None
+    group = rf"[+-]?(\d{{1,3}}|[1-9]\d{{0,2}}({re.escape(sign)}\d{{3}})+)"
+    found = None
+    for i, name in enumerate(layout.names[: frame.shape[1]]):
+        column = frame.iloc[:, i]
+        if column.dtype.kind in "fiubc":
+            continue
+        cells = column.dropna().astype(str).str.strip()
+        marked = cells[cells.str.contains(sign, regex=False)]
+        if not len(marked) or not cells.str.fullmatch(group).all():
+            continue
+        if len(marked) == len(cells):
+            raise InputError(
+                f"column {name!r} holds {marked.iloc[0]} beside others with {layout.decimal!r} as "
+                f"their decimal sign: thousands, or decimals; give decimal={layout.decimal!r} "
+                f"where {sign!r} parts thousands, or mend the column"
+            )
+        values = column.astype(str).str.replace(sign, "", regex=False)
+        frame.isetitem(i, values.where(column.notna()).to_numpy(dtype=float))
+        found = dataclasses.replace(layout, thousands=sign)
+    return found
 
 
 def _with_names(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:

@@ -1,0 +1,170 @@
+"""Columns that may be read in two ways: thousands, times of any name, dates, units of the clock."""
+
+import datetime
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import freqid as fq
+
+N = 60
+TIMES = np.arange(N) * 1e-3
+U = np.round(np.random.default_rng(1).standard_normal(N), 4)
+LEVELS = np.where(np.arange(N) % 2, 900.0, 1500.0)
+
+
+def table(path, head, *columns, sep=";"):
+    rows = [sep.join(cells) for cells in zip(*columns, strict=True)]
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def german(values, digits):
+    return [f"{v:.{digits}f}".replace(".", ",") for v in values]
+
+
+def grouped(values, mark):
+    return [f"{int(v):,}".replace(",", mark) for v in values]
+
+
+def test_whole_thousands_beside_decimal_commas(tmp_path):
+    path = table(tmp_path / "a.csv", "t;u;y", german(TIMES, 3), german(U, 4), grouped(LEVELS, "."))
+    record = fq.read(path)
+    assert np.array_equal(record.y, LEVELS)
+    assert np.array_equal(record.u, U)
+    assert "'.' between thousands was taken off" in record.notes
+
+
+def test_and_beside_decimal_points(tmp_path):
+    columns = [f"{t:.3f}" for t in TIMES], [f"{u:.4f}" for u in U], grouped(LEVELS, ",")
+    record = fq.read(table(tmp_path / "a.csv", "t;u;y", *columns))
+    assert np.array_equal(record.y, LEVELS)
+
+
+def test_thousands_begin_below_the_first_rows(tmp_path):
+    """They are no decimals because the rows that are looked at first have none."""
+    count = np.arange(600) + 700.0
+    times, u = german(np.arange(600) * 1e-3, 3), german(np.tile(U, 10), 4)
+    record = fq.read(table(tmp_path / "a.csv", "t;u;y", times, u, grouped(count, ".")))
+    assert np.array_equal(record.y, count)
+
+
+def test_who_has_the_mark_in_each_cell_is_asked(tmp_path):
+    values = 1500.0 + np.arange(N)
+    path = table(tmp_path / "a.csv", "t;u;y", german(TIMES, 3), german(U, 4), grouped(values, "."))
+    with pytest.raises(ValueError, match=r"column 'y' holds 1\.500 .*give decimal=','"):
+        fq.read(path)
+    assert np.array_equal(fq.read(path, decimal=",").y, values)
+
+
+@pytest.mark.parametrize("cells", ["0.125", "1.50", "12.3456"])
+def test_decimals_with_points_stay_decimals(tmp_path, cells):
+    path = table(tmp_path / "a.csv", "t;u;y", german(TIMES, 3), german(U, 4), [cells] * N)
+    assert set(fq.read(path).y) == {float(cells)}
+
+
+@pytest.mark.parametrize("name", ["ts", "stamp", "Source"])
+def test_a_time_of_any_name_may_lack_rows(tmp_path, name):
+    there = [i for i in range(N) if not 20 <= i < 24]
+    columns = [[f"{x[i]:.6f}" for i in there] for x in (TIMES, U, LEVELS)]
+    path = table(tmp_path / "a.csv", f"{name},u,y", *columns, sep=",")
+    with pytest.raises(ValueError, match="4 samples are missing"):
+        fq.read(path)
+    assert fq.read(path, resample=True).n_samples == N
+
+
+def test_of_two_columns_the_time_is_named(tmp_path):
+    path = table(tmp_path / "a.csv", "ts,y", *[[f"{v:g}" for v in x] for x in (TIMES, U)], sep=",")
+    with pytest.raises(ValueError, match="'ts' may be it: call it 'time'"):
+        fq.read(path)
+
+
+def test_a_signal_that_rises_unevenly_is_no_time():
+    frame = pd.DataFrame({"a": np.cumsum(np.abs(U) + 0.1), "u": U, "y": LEVELS})
+    with pytest.raises(ValueError, match=r"give dt in s \(their columns are a, u, y\)"):
+        fq.Record.from_frame(frame)
+
+
+def test_the_unit_of_the_time_whatever_its_column_is_called(tmp_path):
+    count = [str(i) for i in range(N)]
+    path = table(tmp_path / "a.csv", "t,u,y", count, *[[f"{v:g}" for v in x] for x in (U, LEVELS)],
+                 sep=",")  # fmt: skip
+    assert fq.read(path, units={"time": "ms"}).dt == pytest.approx(1e-3)
+    assert fq.read(path, units={"t": "ms", "time": "s"}).dt == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("name,value,unit,dt", [
+    ("dt", 2.0, "ms", 2e-3), ("Ts", 500.0, "µs", 5e-4), ("fs", 2.0, "kHz", 5e-4),
+    ("dt", 2e-3, "", 2e-3), ("dt", 2e-3, "s", 2e-3),
+])  # fmt: skip
+def test_sample_times_have_units(tmp_path, name, value, unit, dt):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["u"], file["y"], file[name] = U, LEVELS, value
+        file[name].attrs["units"] = unit
+    assert fq.read(path).dt == pytest.approx(dt)
+    assert fq.open(path).dt == pytest.approx(dt)
+
+
+def test_what_is_called_as_a_sample_time_in_another_unit_is_none(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["u"], file["y"], file["h"] = U, LEVELS, 1.75
+        file["h"].attrs["unit"] = "m"
+    for reader in (fq.read, fq.open):
+        with pytest.raises(ValueError, match="dt"):
+            reader(path)
+        assert reader(path, dt=1e-3).dt == 1e-3
+
+
+@pytest.mark.parametrize("begin,step,form", [
+    ((2026, 3, 5, 23, 59, 40), {"seconds": 1}, "%d/%m/%Y %H:%M:%S"),
+    ((2026, 3, 1), {"hours": 12}, "%d/%m/%Y %H:%M:%S"),
+    ((2026, 3, 1), {"hours": 12}, "%m/%d/%Y %H:%M"),
+    ((2026, 3, 5, 23, 59, 40), {"seconds": 1}, "%m/%d/%Y %H:%M:%S"),
+    ((2026, 3, 5, 23, 59, 40), {"seconds": 1}, "%d-%m-%Y %H:%M:%S"),
+])  # fmt: skip
+def test_days_and_months(tmp_path, begin, step, form):
+    first, step = datetime.datetime(*begin), datetime.timedelta(**step)
+    stamps = [(first + k * step).strftime(form) for k in range(N)]
+    values = [[f"{v:g}" for v in x] for x in (U, LEVELS)]
+    record = fq.read(table(tmp_path / "a.csv", "Time,u,y", stamps, *values, sep=","))
+    assert record.dt == pytest.approx(step.total_seconds())
+
+
+def wrong_in_one(kind, cells):
+    broken = list(cells)
+    broken[17] = {"time": "End", "signal": "---"}[kind]
+    return broken
+
+
+@pytest.mark.parametrize("stamps", [
+    [f"2026-11-30T08:59:59.{i:03d}" for i in range(N)],
+    [f"08:59:58.{i:03d}" for i in range(N)],
+    [f"{t:.6f}" for t in TIMES],
+])  # fmt: skip
+@pytest.mark.parametrize("name", ["Time", "Source"])
+def test_the_cell_that_is_no_time_is_named(tmp_path, stamps, name):
+    values = [[f"{v:g}" for v in x] for x in (U, LEVELS)]
+    stamps = wrong_in_one("time", stamps)
+    with pytest.raises(ValueError, match="holds 'End' in row 17"):
+        fq.read(table(tmp_path / "a.csv", f"{name},u,y", stamps, *values, sep=","))
+
+
+def test_the_cell_that_is_no_number_is_named_beside_decimal_commas(tmp_path):
+    u = wrong_in_one("signal", german(U, 4))
+    path = table(tmp_path / "a.csv", "t;u;y", german(TIMES, 3), u, german(LEVELS, 1))
+    with pytest.raises(ValueError, match="first '---' in row 17 of 'u'"):
+        fq.read(path)
+
+
+def test_a_footer_below_an_oscilloscopes_rows_is_named(tmp_path):
+    rows = [f"{i},{U[i]},{LEVELS[i]},," for i in range(N)]
+    head = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-1.0e-01,1.0e-03"
+    path = tmp_path / "rigol.csv"
+    path.write_text("\n".join([head, *rows, "End,,"]), encoding="utf-8")
+    with pytest.raises(fq.InputError if hasattr(fq, "InputError") else ValueError, match="'End'"):
+        fq.read(path)
