@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from freqid.checks import FloatArray, InputError, IntArray
-from freqid.data.printed_times import printed_period
+from freqid.data.printed_times import printed_digit, printed_period
 
 # denominators of a ratio that two clocks are believed to have, smallest first
 _DENOMINATORS = 64
@@ -24,6 +24,9 @@ _EVEN = 0.5
 _DIGITS, _EXACT = 1e-13, 1e-7
 # rows on either side of where a time begins anew
 _ANEW = 10
+# ticks for each stamp from which on missing ones are doubted, how many are tried instead, and the
+# digits over which rounded stamps scatter about the line of their clock
+_MANY, _TRIED, _ROUNDED = 1.05, 200, 1.1
 
 
 def begins_anew(times: FloatArray) -> int | None:
@@ -162,7 +165,9 @@ def _numbered(t: FloatArray, gaps: FloatArray) -> IntArray:
     period = float(np.median(gaps))
     steps = np.maximum(np.round(gaps / period), 1).astype(int)
     if float(np.abs(gaps / period - steps).max()) < _CALM:
-        return np.concatenate([[0], np.cumsum(steps)])
+        number = np.concatenate([[0], np.cumsum(steps)])
+        fewer = _of_rounded(t, int(number[-1])) if number[-1] > _MANY * len(t) else None
+        return number if fewer is None else fewer
     # nothing missing: then no stamp is a whole period off the line through all of them
     every = np.arange(len(t))
     line = np.polyfit(every, t, 1)
@@ -176,6 +181,26 @@ def _numbered(t: FloatArray, gaps: FloatArray) -> IntArray:
     number = nearest - nearest[0] if (np.diff(nearest) > 0).all() else number
     # stamps that are late by more than half a period seem to skip ticks
     return every if _off(every, t) <= _off(number, t) else number
+
+
+def _of_rounded(t: FloatArray, most: int) -> IntArray | None:
+    """Ticks of an even clock whose stamps were rounded to a digit, the fewest missing, not half of
+    those of ``most``; None where no such clock is told.
+
+    Steps of 1 and 2 ms are those of 1.4 ms, and of 1 ms with many ticks missing where no line lies
+    within half a digit of all.
+    """
+    digit = printed_digit(t)
+    if digit is None:
+        return None
+    none = len(t) - 1
+    for last in range(none, none + min((most - none) // 2, _TRIED)):
+        number = np.round((t - t[0]) * (last / t[-1])).astype(int)
+        if (np.diff(number) > 0).all():
+            line = np.polyfit(number, t, 1)
+            if float(np.ptp(t - np.polyval(line, number))) <= _ROUNDED * digit:
+                return number
+    return None
 
 
 def _off(number: IntArray, t: FloatArray) -> float:

@@ -14,7 +14,7 @@ from freqid.data.clocks import begins_anew
 from freqid.data.logs import record_from_logs
 from freqid.data.readers.kinds import LOGS, Channel, Log
 from freqid.data.record import Record
-from freqid.data.regular_time import lost_between
+from freqid.data.regular_time import missing_of
 from freqid.data.remembered import is_kept
 from freqid.data.tables import frame_of
 from freqid.data.time_column import with_time
@@ -60,8 +60,7 @@ def _row(c: Channel) -> tuple[float, float, int, int, float, str]:
     if begins_anew(c.times) is not None:
         # where one experiment follows another is no step
         gaps = gaps[gaps > 0]
-    period, length = float(np.median(gaps)), float(gaps.sum())
-    missing = lost_between(gaps, period) if period > 0 else 0
+    length, missing = float(gaps.sum()), missing_of(gaps)
     return len(gaps) / length, float(np.std(gaps)), count, missing, length, c.unit
 
 

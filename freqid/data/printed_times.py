@@ -34,7 +34,7 @@ def printed_period(times: FloatArray) -> tuple[float, float] | None:
     period, start = np.polyfit(number, t, 1)
     away = t - start - period * number
     off = float(np.ptp(away)) / 2
-    digit = _digit(t)
+    digit = printed_digit(t)
     if digit is None or period <= 0 or off < 0.01 * period:
         return None
     steps = np.round(np.diff(t) / digit)
@@ -71,7 +71,7 @@ def plain_period(period: float, known_to: float) -> float:
     return period
 
 
-def _digit(times: FloatArray) -> float | None:
+def printed_digit(times: FloatArray) -> float | None:
     """The coarsest power of ten that all times are multiples of."""
     for k in range(10):
         scaled = times * 10.0**k

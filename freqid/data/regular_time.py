@@ -90,9 +90,14 @@ def rows_apart(y: FloatArray) -> int:
     return factor if regular and blank else 1
 
 
-def lost_between(gaps: FloatArray, period: float) -> int:
-    """Samples that lack between stamps: one that comes late is the nearer to the next."""
-    return max(int((np.rint(gaps / period) - 1).sum()), 0)
+def missing_of(gaps: FloatArray) -> int:
+    """Samples that lack between stamps, of which those that come late are nearer to the next, and
+    those of few digits have steps of two sizes.
+    """
+    if len(gaps) > 1 and (gaps > 0).all():
+        return Clock.of("time", np.concatenate([[0.0], np.cumsum(gaps)])).missing
+    period = float(np.median(gaps))
+    return max(int((np.rint(gaps / period) - 1).sum()), 0) if period > 0 else 0
 
 
 def uneven(times: FloatArray) -> str:
@@ -103,7 +108,7 @@ def uneven(times: FloatArray) -> str:
     said = (
         f"column 'time' is not uniform: {gaps[row - 1]:g} s before row {row}, {step:g} s on average"
     )
-    missing = lost_between(gaps, float(usual))
+    missing = missing_of(gaps)
     if gaps[row - 1] <= (_FEW + 1.5) * usual:
         lost = f"; {missing} samples are missing" if missing else ""
         return (

@@ -202,18 +202,15 @@ def same_clock(
         return found
     for other in map(str, frame.columns):
         alike = other != name and _stem(other) == stem and _may_be_time(units.get(other, ""))
-        if not alike or frame[other].dtype.kind not in "fiu":
-            continue
-        x = frame[other].to_numpy(dtype=float)
-        # of the slower of two clocks a table's last rows are empty
-        x = x[: np.max(np.flatnonzero(np.isfinite(x)), initial=-1) + 1]
-        if len(x) <= _FEW or not np.isfinite(x).all() or not (np.diff(x) > 0).all():
+        x = _counted(frame, name, other) if alike else None
+        if x is None or len(x) <= _FEW or not np.isfinite(x).all() or not (np.diff(x) > 0).all():
             continue
         # counts of one clock differ by their unit and by where they begin
         span = float(np.ptp(seconds[: len(x)]))
         unit = min(_RATIOS, key=lambda r: abs(np.log(np.ptp(x) / span / r)))
         apart = x / unit - seconds[: len(x)]
-        begins = abs(float(apart[0])) if unit == 1 and abs(apart[0]) < span else 0.0
+        later = apart[0] if unit == 1 else _told_apart(frame, (name, other), units)
+        begins = abs(float(later)) if abs(later) < span else 0.0
         if max(float(np.ptp(apart)), begins) > _OFF * float(np.median(steps)):
             raise InputError(
                 f"columns {name!r} and {other!r} are both times, and not of one clock: of signals "
@@ -224,10 +221,41 @@ def same_clock(
     return found
 
 
+def _counted(frame: pd.DataFrame, name: str, other: str) -> FloatArray | None:
+    """Another column of times in a unit of its own, dates in s since the first of the column
+    ``name``; None for what is neither.
+    """
+    import pandas as pd
+
+    column = frame[other]
+    if column.dtype.kind not in "fiu":
+        dates = [c if c.dtype.kind == "M" else converted(c) for c in (frame[name], column)]
+        first, times = dates
+        if first is None or times is None or first.dtype != times.dtype:
+            return None
+        column = (times - first.iloc[0]) / pd.Timedelta(seconds=1)
+    x = column.to_numpy(dtype=float)
+    # of the slower of two clocks a table's last rows are empty
+    return np.asarray(x[: np.max(np.flatnonzero(np.isfinite(x)), initial=-1) + 1])
+
+
+def _told_apart(frame: pd.DataFrame, names: tuple[str, str], units: Mapping[str, str]) -> float:
+    """By how many seconds the second of two counts begins later, where both say their units."""
+    told = [UNITS.get((units.get(n) or unit_in_name_of_time(n)).casefold()) for n in names]
+    first, second = (frame[n].iloc[0] for n in names)
+    if told[0] is None or told[1] is None or frame[names[0]].dtype.kind not in "fiu":
+        return 0.0
+    return float(second) * told[1] - float(first) * told[0]
+
+
 def _may_be_time(unit: str) -> bool:
     return not unit or unit.casefold() in UNITS
 
 
 def _stem(name: str) -> str:
-    """A name up to its first underscore, blank, dot or digit; T is another one than t."""
-    return re.split(r"[\W_\d]", name.strip(), maxsplit=1)[0]
+    """The part of a name that means the time: its first word, or its last, u_time; T is another one
+    than t. The first word of other names.
+    """
+    words = [w for w in re.split(r"[\W_\d]+", name.strip()) if w] or [name]
+    last = words[-1] if len(words[-1]) > 1 and words[-1].casefold() in _NAMES else words[0]
+    return words[0] if words[0].casefold() in _NAMES else last

@@ -94,7 +94,7 @@ def test_the_unit_of_the_time_whatever_its_column_is_called(tmp_path):
     assert fq.read(path, units={"t": "ms", "time": "s"}).dt == pytest.approx(1e-3)
 
 
-@pytest.mark.parametrize("name,value,unit,dt", [
+@pytest.mark.parametrize(("name", "value", "unit", "dt"), [
     ("dt", 2.0, "ms", 2e-3), ("Ts", 500.0, "µs", 5e-4), ("fs", 2.0, "kHz", 5e-4),
     ("dt", 2e-3, "", 2e-3), ("dt", 2e-3, "s", 2e-3),
 ])  # fmt: skip
@@ -120,7 +120,7 @@ def test_what_is_called_as_a_sample_time_in_another_unit_is_none(tmp_path):
         assert reader(path, dt=1e-3).dt == 1e-3
 
 
-@pytest.mark.parametrize("begin,step,form", [
+@pytest.mark.parametrize(("begin", "step", "form"), [
     ((2026, 3, 5, 23, 59, 40), {"seconds": 1}, "%d/%m/%Y %H:%M:%S"),
     ((2026, 3, 1), {"hours": 12}, "%d/%m/%Y %H:%M:%S"),
     ((2026, 3, 1), {"hours": 12}, "%m/%d/%Y %H:%M"),
@@ -166,5 +166,57 @@ def test_a_footer_below_an_oscilloscopes_rows_is_named(tmp_path):
     head = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-1.0e-01,1.0e-03"
     path = tmp_path / "rigol.csv"
     path.write_text("\n".join([head, *rows, "End,,"]), encoding="utf-8")
-    with pytest.raises(fq.InputError if hasattr(fq, "InputError") else ValueError, match="'End'"):
+    with pytest.raises(ValueError, match="first 'End' in row 60"):
         fq.read(path)
+
+
+def two_clocks(path, form, later, unit=""):
+    times = [form(t) for t in TIMES], [form(t + later) for t in TIMES]
+    columns = times[0], [f"{v:g}" for v in U], times[1], [f"{v:g}" for v in LEVELS]
+    return table(path, f"Time1{unit},u,Time2{unit},y", *columns, sep=",")
+
+
+CLOCKS = {
+    "s": (lambda t: f"{t:.6f}", " [s]"),
+    "ms": (lambda t: f"{1e3 * t:.3f}", " [ms]"),
+    "dates": (lambda t: f"2026-03-05 08:00:{t:09.6f}", ""),
+}
+
+
+@pytest.mark.parametrize("kind", CLOCKS)
+def test_two_times_that_begin_apart_are_two_clocks(tmp_path, kind):
+    """The output's samples came 20 ms later, and were read as if they had come with the input's."""
+    form, unit = CLOCKS[kind]
+    with pytest.raises(ValueError, match="'Time1' and 'Time2' are both times, and not of one"):
+        fq.read(two_clocks(tmp_path / "a.csv", form, 0.02, unit))
+    same = fq.read(two_clocks(tmp_path / "b.csv", form, 0.0, unit), inputs="u", outputs="y")
+    assert "column 'Time2' is of the same clock, and left out" in same.notes
+    assert same.dt == pytest.approx(1e-3)
+
+
+def test_times_called_after_their_signals(tmp_path):
+    columns = [[f"{v:.6f}" for v in x] for x in (TIMES, U, TIMES + 0.02, LEVELS)]
+    path = table(tmp_path / "a.csv", "u_time,u,y_time,y", *columns, sep=",")
+    with pytest.raises(ValueError, match="'u_time' and 'y_time' are both times, and not of one"):
+        fq.read(path)
+
+
+@pytest.mark.parametrize(("period", "digit"), [(10 / 7, 1.0), (10 / 3, 1.0), (10 / 7, 0.1)])
+@pytest.mark.parametrize("lost", [[], [100], [100, 101, 102], [50, 120]])
+def test_missing_samples_of_a_clock_of_few_digits(tmp_path, period, digit, lost):
+    """A step of 2 ms in stamps of whole ms at 700 Hz is no lost sample."""
+    times = np.delete(np.round(np.arange(200) * period / digit) * digit, lost)
+    columns = [f"{t:g}" for t in times], [str(k % 7) for k in range(len(times))]
+    path = table(tmp_path / "a.csv", "t [ms],u,y", *columns, columns[1], sep=",")
+    assert set(fq.channels(path)["missing"]) == {len(lost)}
+    if lost:
+        with pytest.raises(ValueError, match=f"; {len(lost)} samples are missing"):
+            fq.read(path)
+
+
+def test_a_clock_of_whole_milliseconds_may_lack_many(tmp_path):
+    """No line lies within half a digit of stamps of which every third, at random, is lost."""
+    there = np.flatnonzero(np.random.default_rng(2).random(300) > 1 / 3)
+    columns = [f"{k:d}" for k in there], [str(k % 7) for k in there]
+    path = table(tmp_path / "a.csv", "t [ms],u,y", *columns, columns[1], sep=",")
+    assert set(fq.channels(path)["missing"]) == {int(np.ptp(there)) + 1 - len(there)}

@@ -1,4 +1,4 @@
-"""What a fit does not compute: a black box where nothing is left, error bars until they are read."""
+"""What a fit leaves out: a black box where nothing is left, error bars until they are read."""
 
 import copy
 import pickle

@@ -183,7 +183,7 @@ def _without_thousands(frame: pd.DataFrame, layout: Layout) -> Layout | None:
             continue
         cells = column.dropna().astype(str).str.strip()
         marked = cells[cells.str.contains(sign, regex=False)]
-        if not len(marked) or not cells.str.fullmatch(group).all():
+        if not len(marked) or not cells.str.fullmatch(group).all() or not _has_decimals(frame):
             continue
         if len(marked) == len(cells):
             raise InputError(
@@ -195,6 +195,12 @@ def _without_thousands(frame: pd.DataFrame, layout: Layout) -> Layout | None:
         frame.isetitem(i, values.where(column.notna()).to_numpy(dtype=float))
         found = dataclasses.replace(layout, thousands=sign)
     return found
+
+
+def _has_decimals(frame: pd.DataFrame) -> bool:
+    """Whether a column of numbers has some behind the decimal sign."""
+    floats = (x.to_numpy() for _, x in frame.items() if x.dtype.kind == "f")
+    return any((x[np.isfinite(x)] % 1 != 0).any() for x in floats)
 
 
 def _with_names(frame: pd.DataFrame, layout: Layout) -> pd.DataFrame:
