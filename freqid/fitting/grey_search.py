@@ -98,7 +98,10 @@ def _search(
     # long records have more lines than it takes: refine on all of them last
     lines = every if every < 2 * _LINES else _LINES
     scout, found, straight = on(lines), None, {}
+    begun: dict[Objective, float] = {}
     if not in_time:
+        if (own := scout.point(structure.start)) is not None:
+            begun[scout] = own.cost
         straight[structure.start.tobytes()] = straight_down(scout, structure.start)
         found = _without_noise(scout, straight, floor)
     if found is None and lines < every:
@@ -130,7 +133,7 @@ def _search(
         return dataclasses.replace(found, solution=_in_time(objective, structure, found))
     if scout is objective:
         return found
-    return dataclasses.replace(found, solution=_on_all(objective, scout, found))
+    return dataclasses.replace(found, solution=_on_all(objective, scout, found, begun.get(scout)))
 
 
 def _spectral(scout: Objective) -> Sequence[SpectralExperiment]:
@@ -253,15 +256,19 @@ def _lines_wanted(experiments: Sequence[SpectralExperiment], noise: float) -> in
     return int(_LINES * (1 + _NOISY * noise / max(energy - noise, 1e-3 * energy)))
 
 
-def _on_all(objective: Objective, scout: Objective, found: Found) -> Solution:
-    """From the minimum on a part of the lines to that on all, no worse than the start."""
+def _on_all(objective: Objective, scout: Objective, found: Found, begun: float | None) -> Solution:
+    """From the minimum on a part of the lines to that on all, no worse than the start, which costs
+    what it had ``begun`` with on the part, where that is known.
+    """
     start = cast(GreyStructure, objective.structure).start
     if objective.point(found.solution.x) is None:
         # a lag that is next to nothing can be computed at some lines and not at others
         return polish(objective, start)
     best = polish(objective, found.solution.x)
-    there = scout.point(start)
-    if there is None or there.cost > _FAR * found.solution.cost + scout.rounding:
+    if begun is None:
+        there = scout.point(start)
+        begun = np.inf if there is None else there.cost
+    if begun > _FAR * found.solution.cost + scout.rounding:
         return best
     own = objective.point(start)
     if own is None or best.cost <= own.cost:

@@ -90,7 +90,9 @@ class Model(ABC):
         if not A.size:
             return False
         # rounding splits a double pole by the root of its size, and leaves the matrix singular
-        scaled = scipy.linalg.matrix_balance(A - np.eye(len(A)) if self.dt else A)[0]
+        scaled = scipy.linalg.lapack.dgebal(
+            A - np.eye(len(A)) if self.dt else A, scale=1, permute=1
+        )[0]
         s = np.linalg.svd(scaled, compute_uv=False)
         return bool(s[-1] <= 1e-13 * max(s[0], 1e-300))
 
