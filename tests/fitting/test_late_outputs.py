@@ -59,3 +59,30 @@ def test_outputs_that_go_together_are_not(late):
     est = fq.fit(MOTOR, measured("prbs", 2, late), n_starts=1)
     assert est.verdict.trusted == (late == (0, 0))
     assert not any(w.startswith("delay: output") for w in est.warnings)
+
+
+COIL = {"R": 4.0, "L": 1e-3, "K": 8.0, "m": 0.15, "c": 2.0, "k": 3000.0}
+
+
+def coil(R, L, K, m, c, k):
+    A = [[-R / L, 0, -K / L], [0, 0, 1], [K / m, -k / m, -c / m]]
+    return A, [[1 / L], [0], [0]], [[0, 1, 0], [1, 0, 0]], None
+
+
+@pytest.mark.parametrize("seed", [0])
+def test_a_late_input_is_no_late_output(seed):
+    """The dead time of a drive, of which a position shows little, was the current's logger's."""
+    dt, count, fine = 2e-4, 2500, 4
+    u = 5 * scipy.signal.chirp(np.arange(count) * dt, 5, count * dt, 400)
+    A, B, C = (np.array(M, float) for M in coil(**COIL)[:3])
+    step = scipy.signal.cont2discrete((A, B, C, np.zeros((2, 1))), dt / fine)[:4]
+    # a sample and a half: six of the finer steps
+    late = np.concatenate([np.zeros(6), np.repeat(u, fine)])[: fine * count]
+    y = scipy.signal.dlsim((*step, dt / fine), late)[1][::fine]
+    y += 0.02 * y.std(axis=0) * np.random.default_rng(seed).standard_normal(y.shape)
+    begun = zip(COIL, COIL.values(), [0.5, 2, 0.6, 2, 3, 0.7], strict=True)
+    plant = fq.GreyBox(coil, [fq.Parameter(n, f * v) for n, v, f in begun], outputs=["x", "i"])
+    found = fq.fit(plant, fq.Record(u, y, dt, output_names=["x", "i"]), weights="noise").warnings[0]
+    assert found.kind == "delay"
+    assert "the input acts" in found
+    assert found.number == pytest.approx(1.5 * dt, abs=0.6 * dt)

@@ -161,3 +161,27 @@ def test_what_segments_cut_off_an_integrator_behind_a_measured_input(seed):
     est = fq.fit(plant, fq.h1(made, 512, band=(1, 100)), weights="noise")
     assert kinds(est)[0] == "short segments"
     assert 1 < est.warnings[0].number < 4
+
+
+def test_an_unstable_plant_in_its_loop_answers_no_longer_than_the_loop():
+    """What segments cut off of a magnetic bearing's answer without its loop moved a by 1e13."""
+    dt, count = 2e-4, 5000
+    plant = fq.GreyBox(
+        lambda a, b: ([[0, 1], [a, 0]], [[0], [b]], [[1, 0]], None),
+        [fq.Parameter("a", 3e4), fq.Parameter("b", 80.0)],
+    )
+    A, B = (np.array(M, float) for M in plant.with_values(a=4e4, b=60.0).state_space()[:2])
+    phi, gamma = scipy.signal.cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), dt)[:2]
+    rng = np.random.default_rng(4)
+    reference = scipy.signal.lfilter([0.3], [1, -0.7], rng.standard_normal(count))
+    x, before, rate, u, y = np.zeros(2), 0.0, 0.0, np.zeros(count), np.zeros(count)
+    fades = np.exp(-dt / 5e-4)
+    for k in range(count):
+        y[k] = x[0] + 5e-5 * rng.standard_normal()
+        rate, before = fades * rate + (1 - fades) * (y[k] - before) / dt, y[k]
+        u[k] = reference[k] - 2000 * y[k] - 6 * rate
+        x = phi @ x + gamma[:, 0] * u[k]
+    data = fq.Record(u, y, dt, reference=reference)
+    est = fq.fit(plant, fq.h1(data, 1000, band=(5, 2000), reference=True), weights="noise")
+    assert "short segments" not in kinds(est)
+    assert est["b"] == pytest.approx(60, abs=5 * est.parameters["std"]["b"])

@@ -22,6 +22,8 @@ from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
+from freqid.fitting.suspects.sentences import CURES, words
+from freqid.fitting.uncertainty.rivals import physical
 from freqid.models import GreyBox, Model
 
 # what a late output looks like, and the part of a mode's evidence that one unknown needs
@@ -35,8 +37,8 @@ _LIMIT = 60
 
 
 def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
-    """A finding where one output some samples late explains the data better than what speaks, each
-    unknown counted.
+    """A finding where one output some samples late, or all of them as a late input has them,
+    explains the data better than what speaks, each unknown counted.
     """
     model, structure, readings = inquiry.model, inquiry.minimum.structure, inquiry.readings
     if named[0].name not in _LOOKS_LIKE or not isinstance(model, GreyBox) or not plain(structure):
@@ -46,11 +48,12 @@ def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[F
     assert isinstance(structure, GreyStructure)
     # as the fit itself has left them: one start again may end elsewhere
     now = _spread(model, readings)
-    each = [_Shifted(inquiry, structure, o, now) for o in range(model.n_outputs)]
+    every = range(model.n_outputs)
+    each = [_Shifted(inquiry, structure, which, now) for which in (*((o,) for o in every), every)]
     tried = [found for one in each if (found := one.best()) is not None]
     if not tried:
         return []
-    left, lag, output = min(tried)
+    left, lag, which = min(tried, key=lambda each: each[0])
     n = max(scene.freedom, 2)
     told = n * (now - left) - np.log(n) - 2 * np.log(2 * _FARTHEST * model.n_outputs)
     enough = [
@@ -60,6 +63,10 @@ def late_output(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[F
         return []
     record = readings[0].data
     assert isinstance(record, Record)
+    if len(which) > 1:
+        text = f"{words('delay', lag * record.dt, 's', 'the input')}, to a sample; {CURES['delay']}"
+        return [Finding("delay", text, number=lag * record.dt)]
+    (output,) = which
     rows = f"{abs(lag)} sample{'s' if abs(lag) > 1 else ''}"
     when, way = ("later", "up") if lag > 0 else ("earlier", "down")
     text = (
@@ -79,20 +86,22 @@ def _in_step(reading: Reading) -> bool:
 
 
 class _Shifted:
-    """The plant fitted to the data with one output some samples sooner, each time from where the
-    nearest other ended and from its start.
+    """The plant fitted to the data with outputs ``which`` some samples sooner, one or all of them,
+    each time from where the nearest other ended and from its start.
     """
 
-    def __init__(self, inquiry: Asking, found: GreyStructure, output: int, now: float) -> None:
-        self.readings, self.output = inquiry.readings, output
+    def __init__(
+        self, inquiry: Asking, found: GreyStructure, which: Sequence[int], now: float
+    ) -> None:
+        self.readings, self.which = inquiry.readings, which
         start = dict(zip(found.physical_names, found.values, strict=False))
         self.structure = GreyStructure(found.model.with_values(**start))
         # where each number of samples has led, and what it left
         self.ends = {0: inquiry.minimum.x * found.scale / self.structure.scale}
         self.known = {0: now}
 
-    def best(self) -> tuple[float, int, int] | None:
-        """The least spread, the samples that have it, and the output; None where none is best."""
+    def best(self) -> tuple[float, int, Sequence[int]] | None:
+        """The least spread, the samples that have it, and the outputs; None where none is best."""
 
         def best_of(lags: Iterable[int]) -> int:
             for lag in lags:
@@ -110,19 +119,20 @@ class _Shifted:
         while width:
             lag = best_of((lag - width, lag + width))
             width //= 2
-        return self.known[lag], lag, self.output
+        return self.known[lag], lag, self.which
 
     def spread(self, lag: int) -> float:
-        """What is left with that output so much sooner; infinite where nothing can be fitted."""
+        """What is left with these outputs so much sooner; infinite where nothing physical is."""
         structure = self.structure
-        shifts = [lag * (o == self.output) for o in range(structure.model.n_outputs)]
+        shifts = [lag * (o in self.which) for o in range(structure.model.n_outputs)]
         near = min(self.ends, key=lambda other: abs(other - lag))
         try:
             moved = [outputs_in_step(r, shifts) for r in self.readings]
             objective = Objective(structure, [r.experiment() for r in moved])
             tried = [polish(objective, x, limit=_LIMIT) for x in (structure.start, self.ends[near])]
-            self.ends[lag] = min(tried, key=lambda solution: solution.cost).x
-            return _spread(structure.at(self.ends[lag]), moved)
+            self.ends[lag] = end = min(tried, key=lambda solution: solution.cost).x
+            # a negative inductance is a lead that makes up for samples too many
+            return _spread(structure.at(end), moved) if physical(structure, end) else np.inf
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
             return np.inf
 

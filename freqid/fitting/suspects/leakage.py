@@ -14,6 +14,7 @@ import numpy as np
 from freqid.checks import ComplexArray, FloatArray
 from freqid.data import AveragedResponse
 from freqid.fitting.findings import Finding
+from freqid.fitting.sight import poles_of
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.suspects.sentences import farthest
@@ -22,6 +23,8 @@ from freqid.models import Model, simulate
 
 # standard errors, and part of itself, by which a parameter may be moved without a word
 _SMALL, _HARMLESS = 1.0, 1e-3
+# e-folds within a segment of a motion that no experiment without a loop has seen
+_GROWS = 1.0
 # periods that are one but for rounding
 _SAME = 1e-9
 # periods of the transform that makes the impulse response, in segments: it rings on into the next
@@ -57,6 +60,10 @@ def _lost(s: Seen, model: Model) -> FloatArray:
         return np.zeros(len(s.left))
     length = len(data.memory)
     own = s.own(model)
+    poles = poles_of(own)
+    if poles.real.max(initial=0.0) * length * data.dt > _GROWS:
+        # what was measured of such a plant was its answers in a loop, which end
+        return np.zeros(len(s.left))
     at = np.round(s.omega_input * length * data.dt / (2 * np.pi)).astype(int)
     hold = s.reading.hold
 
