@@ -11,7 +11,7 @@ import numpy as np
 from freqid.checks import Array, InputError, channel_names
 from freqid.data.readers.table import named
 from freqid.data.remembered import as_printed
-from freqid.data.times_in_seconds import in_seconds
+from freqid.data.times_in_seconds import UNITS, in_seconds, unit_in_name_of_time
 from freqid.lti import Hold
 
 # an array of some library, a path, or blocks: what it can do is asked of it
@@ -185,6 +185,12 @@ def seconds_between(before: Clock, after: Clock) -> float:
     """From the last stamp of a time to the first one of another, in s."""
     import pandas as pd
 
-    stamps = pd.Series(np.array([before.last, after.first]))
+    units = [(c.unit or unit_in_name_of_time(c.name)).casefold() for c in (before, after)]
+    scales = [UNITS.get(unit or "s") for unit in units]
+    ends = np.array([before.last, after.first])
+    if units[0] != units[1] and None not in scales and ends.dtype.kind in "fiu":
+        # a logger that was set up anew counts in another unit
+        return float(np.diff(ends * scales)[0])
+    stamps = pd.Series(ends)
     t, _ = in_seconds(before.name, stamps, before.unit)
     return float(t[1] - t[0])

@@ -144,7 +144,8 @@ def _of_blocks(source: Source, columns: Sequence[str] | None, both: Sequence[str
         nonlocal used
         if used and not again:
             raise InputError(
-                "this iterator of blocks has been used up; give a function that starts it anew"
+                "this iterator of blocks has been used up (state= looks at its beginning first); "
+                "give a function that starts it anew"
             )
         used = True
         started = source() if callable(source) else source

@@ -80,10 +80,11 @@ class Averaging:
         if self.detrend is False:
             out[:] = segments
         elif callable(self.detrend):
-            found = np.asarray(self.detrend(segments))
+            given = self.detrend(segments)
+            found = np.asarray(given)
             if found.shape != segments.shape or found.dtype.kind not in "fiu":
                 what = (
-                    f"an array {found.shape} of {found.dtype}" if found.shape else f"{found!r:.80}"
+                    f"an array {found.shape} of {found.dtype}" if found.shape else f"{given!r:.80}"
                 )
                 raise InputError(
                     f"detrend returned {what}; expected real numbers {segments.shape}, the samples "

@@ -151,3 +151,19 @@ def test_a_short_file_hides_no_gap(tmp_path, record, rows):
     if not rows:
         stream = fq.open(str(tmp_path / "log_*.parquet"))
         assert (stream.n_samples, stream.dt) == (500, DT)
+
+
+@pytest.mark.parametrize("lost", [0, 3])
+def test_a_log_goes_on_in_another_unit(tmp_path, lost):
+    """A logger that was set up anew counts in ms: its files had seemed to lack 9,990 s."""
+    rng = np.random.default_rng(5)
+    for i, (unit, size) in enumerate([("s", 1.0), ("ms", 1e3), ("s", 1.0)]):
+        k = np.arange(400 * i + lost * (i == 1), 400 * (i + 1))
+        frame = {f"t [{unit}]": 1e-3 * k * size, "u": rng.standard_normal(len(k))}
+        pd.DataFrame(frame | {"y": frame["u"]}).to_parquet(tmp_path / f"{i}.parquet")
+    pattern = tmp_path / "*.parquet"
+    if lost:
+        with pytest.raises(ValueError, match=r"0\.003 s are missing"):
+            fq.open(pattern, "u", "y").load()
+    else:
+        assert fq.open(pattern, "u", "y").load().n_samples == 1200

@@ -431,3 +431,18 @@ def test_polynomials_do_not_reach_from_line_to_line_of_several_periods(light, co
     true = light.frequency_response(means.omega, record.hold).response
     near = np.abs(means.frequency - 20) < 2
     assert np.abs(means.response / true - 1)[..., near].max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        (lambda x: None, "detrend returned None"),
+        (lambda x: x + 1j, "of complex128"),
+        (lambda x: x.mean(axis=-1, keepdims=True), "expected real numbers"),
+        (lambda x: x[..., :-1], "expected real numbers"),
+    ],
+)
+def test_what_is_no_detrended_segment_is_named(wrong, told):
+    record = fq.simulate(fq.first_order(), fq.white_noise(2000, seed=1), 1e-3)
+    with pytest.raises(ValueError, match=told):
+        fq.h1(record, 200, detrend=wrong)

@@ -277,3 +277,10 @@ def test_experiments_of_several_streams():
         fq.periodic(streams, 0.5, reference=True)
     with pytest.raises(ValueError, match="hold 1 periods"):
         fq.periodic(streams[0].select("a").slice(stop=0.6), 0.5)
+
+
+def test_an_iterator_that_can_be_read_once_keeps_no_state(tmp_path):
+    """What is said of it says why."""
+    stream = fq.open(iter([np.ones((2000, 2))]), "u", "y", dt=1e-3)
+    with pytest.raises(ValueError, match="state= looks at its beginning first"):
+        fq.h1(stream, 500, state=tmp_path / "a.npz")
