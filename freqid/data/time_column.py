@@ -148,7 +148,7 @@ def _found(
     values = x.to_numpy(dtype=float)
     gaps = np.diff(values)
     # what counts rows tells nothing of their time, unless somebody says its unit
-    rows = (gaps == 1).all() and values[0] in (0, 1)
+    rows = (np.rint(gaps) == gaps).all() and np.median(gaps) == 1 and values[0] in (0, 1)
     return None if rows and first not in units else first
 
 
@@ -227,10 +227,15 @@ def _counted(frame: pd.DataFrame, name: str, other: str) -> FloatArray | None:
     """
     import pandas as pd
 
-    column = frame[other]
+    column, own = frame[other], frame[name]
     if column.dtype.kind not in "fiu":
-        dates = [c if c.dtype.kind == "M" else converted(c) for c in (frame[name], column)]
-        first, times = dates
+        if own.dtype.kind in "fiu":
+            return None
+        try:
+            first, times = (c if c.dtype.kind == "M" else converted(c) for c in (own, column))
+        except InputError:
+            # numbers that stayed texts
+            return None
         if first is None or times is None or first.dtype != times.dtype:
             return None
         column = (times - first.iloc[0]) / pd.Timedelta(seconds=1)

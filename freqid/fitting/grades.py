@@ -25,6 +25,8 @@ _MANY = 10
 _VAGUE, _LOOSE = 0.5, 0.25
 # values more than unknowns from which these tell the noise
 _TELLING = 5
+# e-folds within the data beyond which a motion that grows is no drift of an integrator
+_E_FOLDS = 3.0
 # how often chance makes a gap to a black box as large that is next to none
 _BESIDE = 0.3
 # what makes numbers useless where it is what explains most of what is wrong, and the chance up to
@@ -200,6 +202,12 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
     # of values that are off by so much error bars are no more than their order of magnitude
     most = bool(np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2))
     most = most or len(vague) > max(len(relative) / 2, 1)
+    if outside and _runs_away(est):
+        return [
+            f"not told: {str(outside[0]).split(';')[0].split(': ')[-1]} by less than two standard "
+            "errors, and with that value the plant is unstable; keep it where it is physical "
+            "(with_bounds), give what is known of it (with_prior), or excite more"
+        ]
     if not most and (not outside or len(vague) < 2):
         return []
     which = f", and {str(outside[0]).split(';')[0].split(': ')[-1]}" if outside else ""
@@ -207,6 +215,18 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
         f"not told: the data leave {', '.join(vague)} uncertain by more than half of their values"
         f"{which}; give what is known of them (with_prior, with_bounds), or excite more"
     ]
+
+
+def _runs_away(est: Estimate) -> bool:
+    """Whether a motion of the plant grows beyond all that the data hold, which it did not where the
+    fit began.
+    """
+    duration = est.n_rows * est.dt
+    begun = est.model.with_values(**{
+        n: v for n, v in zip(est.names, est.nominal, strict=True) if n in est.model.values
+    })  # fmt: skip
+    grows, grew = (m.poles.real.max(initial=0.0) * duration > _E_FOLDS for m in (est.model, begun))
+    return bool(grows and not grew)
 
 
 def _once(est: Estimate, std: np.ndarray) -> list[str]:

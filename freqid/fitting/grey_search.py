@@ -103,7 +103,7 @@ def _search(
         if (own := scout.point(structure.start)) is not None:
             begun[scout] = own.cost
         straight[structure.start.tobytes()] = straight_down(scout, structure.start)
-        found = _without_noise(scout, straight, floor)
+        found = _without_noise(scout, straight, floor, options.n_starts is not None)
     if found is None and lines < every:
         wanted = _lines_wanted(spectral, floor())
         if wanted > _FEWER * lines:
@@ -240,10 +240,15 @@ def _without_noise(
     scout: Objective,
     straight: Mapping[bytes, Solution | None],
     floor: Callable[[], float],
+    counted: bool,
 ) -> Found | None:
-    """The minimum of data that are down to rounding, which needs no black box; None for others."""
+    """The minimum of data that are down to rounding, which needs no black box; None for others, and
+    where starts are ``counted`` for all that local noise does not show to be such.
+    """
     energy, (near,) = scout.energy, straight.values()
-    if near is None and 0 < floor() <= _QUIET * energy:
+    if (near is None or counted) and not 0 < floor() <= _QUIET * energy:
+        return None
+    if near is None:
         start = cast(GreyStructure, scout.structure).start
         with contextlib.suppress(InputError):
             near = polish(scout, start, limit=_DIRECT)

@@ -220,3 +220,18 @@ def test_a_clock_of_whole_milliseconds_may_lack_many(tmp_path):
     columns = [f"{k:d}" for k in there], [str(k % 7) for k in there]
     path = table(tmp_path / "a.csv", "t [ms],u,y", *columns, columns[1], sep=",")
     assert set(fq.channels(path)["missing"]) == {int(np.ptp(there)) + 1 - len(there)}
+
+
+def test_what_is_called_after_the_time_and_is_none(tmp_path):
+    words = [f"{t:g}" for t in TIMES], ["UTC"] * N, [str(k) for k in range(N)]
+    record = fq.read(table(tmp_path / "a.csv", "time,time_zone,u,y", *words, words[2], sep=","),
+                     inputs="u", outputs="y")  # fmt: skip
+    assert record.dt == pytest.approx(1e-3)
+
+
+def test_numbers_of_rows_are_no_time_where_some_are_lost(tmp_path):
+    rows = [str(k) for k in range(N) if not 20 <= k < 23]
+    path = table(tmp_path / "a.csv", "row,u,y", rows, *[[f"{v:g}" for v in x[3:]] for x in (U, U)],
+                 sep=",")  # fmt: skip
+    with pytest.raises(ValueError, match="give dt in s"):
+        fq.read(path)

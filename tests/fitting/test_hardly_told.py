@@ -165,3 +165,28 @@ def test_a_motion_is_gone_with_what_brings_it_back():
     assert gone_with(fast, fast.poles, start.parameters, DT) == ["J1"]
     assert gone_with(slow, slow.poles, start.parameters, DT) == []
     assert gone_with(fast, fast.poles, fast.parameters, DT) == []
+
+
+def two_lags(gain, slow, fast):
+    return [[-1 / slow, 0], [1 / fast, -1 / fast]], [[gain / slow], [0]], [[0, 1.0]], None
+
+
+def test_a_lag_below_nothing_is_no_plant_for_a_controller():
+    """-0.01 ± 0.02 s allows a lag that is physical, and is a plant that runs away."""
+    begun = {"gain": 1.5, "slow": 1.3, "fast": 0.03}
+    plant = fq.GreyBox(two_lags, [fq.Parameter(n, v) for n, v in begun.items()])
+    A, B, C = (np.array(M, float) for M in two_lags(2.0, 1.0, 0.01)[:3])
+    step = scipy.signal.cont2discrete((A, B, C, np.zeros((1, 1))), 0.1)[:4]
+    below = 0
+    for seed in (2, 9, 10):
+        rng = np.random.default_rng(seed)
+        u = np.repeat(rng.choice([-1.0, 1.0], 60), 10)
+        y = scipy.signal.dlsim((*step, 0.1), u)[1][:, 0] + 0.6 * rng.standard_normal(len(u))
+        est = fq.fit(plant, fq.Record(u, y, 0.1))
+        std = est.parameters["std"]["fast"]
+        assert abs(est["fast"] - 0.01) < 3 * std
+        if est["fast"] < 0:
+            below += 1
+            assert not est.verdict.trusted
+            assert "with that value the plant is unstable" in est.verdict.reasons[0]
+    assert below == 2

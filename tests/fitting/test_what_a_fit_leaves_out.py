@@ -91,3 +91,7 @@ def test_findings_are_read_once():
     assert found[1:] == [found[1]]
     assert calls == [1]
     assert pickle.loads(pickle.dumps(found)) == list(found)
+
+
+def test_starts_that_are_asked_for_are_made_without_noise_too():
+    assert fq.fit(PLANT, chirp(4), band=(10, 50), start=OFF, n_starts=3).n_starts == 3

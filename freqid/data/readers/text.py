@@ -44,6 +44,8 @@ _DOUBLE = re.compile(r"(?<![\w.])([+-]?(?:\d+[.,]\d*|\.\d+))[Dd]([+-]\d{1,3})(?!
 # characters in which names stand, and of one of them
 _HEAD, _NAME = 4000, 100
 _TWICE = 4
+# cells that are looked at first
+_SOME = 5
 # what zipfile raises for archives that are damaged, locked or of a kind of its own
 _NO_ARCHIVE = zipfile.BadZipFile, NotImplementedError, RuntimeError, KeyError
 _OPENERS = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open, ".zip": unzipped}
@@ -181,7 +183,11 @@ def _without_thousands(frame: pd.DataFrame, layout: Layout) -> Layout | None:
         column = frame.iloc[:, i]
         if column.dtype.kind in "fiubc":
             continue
-        cells = column.dropna().astype(str).str.strip()
+        some, whole = column.iloc[:_SOME].dropna(), column.dropna()
+        # dates and words say so at once
+        if not some.astype(str).str.strip().str.fullmatch(group).all():
+            continue
+        cells = whole.astype(str).str.strip()
         marked = cells[cells.str.contains(sign, regex=False)]
         if not len(marked) or not cells.str.fullmatch(group).all() or not _has_decimals(frame):
             continue
