@@ -54,7 +54,8 @@ def on_a_grid(
                      f"{gaps.max():g} s")  # fmt: skip
     jitter = float(np.abs(times - begin - step * clock.number).max())
     if jitter > 1e-6 * step:
-        notes.append(f"jitter of up to {jitter:g} s was taken off by straight lines")
+        how = "outputs by straight lines, inputs as they were held" if held else "by straight lines"
+        notes.append(f"jitter of up to {jitter:g} s was taken off, {how}")
     new = {"time": grid}
     sparse = bool(outputs) and rows_apart(np.column_stack([columns[n] for n in outputs])) > 1
     # rows that are lost would have others stand for their outputs
