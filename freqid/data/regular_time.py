@@ -95,9 +95,9 @@ def missing_of(gaps: FloatArray) -> int:
     """Samples that lack between stamps, of which those that come late are nearer to the next, and
     those of few digits have steps of two sizes.
     """
-    if len(gaps) > 1 and (gaps > 0).all():
-        return Clock.of("time", np.concatenate([[0.0], np.cumsum(gaps)])).missing
     period = float(np.median(gaps))
+    if len(gaps) > 1 and (gaps > 0).all() and gaps.max() < EMPTY * len(gaps) * period:
+        return Clock.of("time", np.concatenate([[0.0], np.cumsum(gaps)])).missing
     return max(int((np.rint(gaps / period) - 1).sum()), 0) if period > 0 else 0
 
 

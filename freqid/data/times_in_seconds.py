@@ -149,8 +149,8 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
         if times is None:
             row = _first_that_is_none(column)
             raise InputError(
-                f"column {name!r} holds {column.iloc[row]!r} in row {row}, which is neither a "
-                "number nor a time"
+                f"column {name!r} holds {column.iloc[row]!r}, which is neither a number nor a "
+                f"time, in row {row}; mend or leave out the row"
             )
         return in_seconds(name, times, unit)
     values = of_this_world(name, _less_the_first(column.to_numpy()))

@@ -82,8 +82,7 @@ def plot_fleet(
             shown = np.unique(np.linspace(0, len(labels) - 1, min(len(labels), 8)).astype(int))
             axis.set_xticks(shown, [labels[i] for i in shown])
         axis.set_title(
-            f"{parameter} of {int(kept.sum())} fits"
-            + (f", {lost} without a value or an error bar" if lost else "")
+            f"{parameter} of {int(kept.sum())} fits" + (f", {lost} failed" if lost else "")
         )
         if axis.get_legend_handles_labels()[0]:
             axis.legend(frameon=False)

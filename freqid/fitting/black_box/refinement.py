@@ -33,8 +33,6 @@ from freqid.lti import StateSpace
 # a minimum that was found without a detour and leaves less than this part of the data's energy is
 # believed; in more noise than that there may be a better one a little below
 _BELIEVED = 0.03
-# costs of one minimum agree to this
-_ALIKE = 1e-8
 # lines that are enough to come next to the minimum
 LINES = 20000
 # poles of larger models beyond those that are wanted
@@ -129,20 +127,13 @@ def with_a_pair(
 def best_of(
     lines: RationalLines, begun: Iterable[ComplexArray], every: bool = False
 ) -> Fitted | None:
-    """The best minimum from several sets of poles: from ``every`` one, or until one is believed, or
-    one of few poles was met twice.
-    """
+    """The best minimum from several sets of poles: from ``every`` one, or until one is believed."""
     best: Fitted | None = None
     for poles in begun:
         found = lines.minimum(poles)
-        if found is None:
-            continue
-        before = np.nan if best is None else best.cost
-        if best is None or found.cost < best.cost:
+        if found is not None and (best is None or found.cost < best.cost):
             best = found
-        twice = len(poles) <= FEW and abs(found.cost - before) <= _ALIKE * best.cost
-        told = twice and best.cost <= _BELIEVED * lines.energy
-        if not every and (told or (found is best and _believed(lines, best))):
+        if not every and found is not None and found is best and _believed(lines, best):
             break
     return best
 
