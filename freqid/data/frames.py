@@ -129,7 +129,8 @@ def _with_its_time(
     if dt is None and index.name is None and even:
         # a time that nobody named
         return frame.rename_axis("time"), ["the index was taken for the time, in s"]
-    return frame, []
+    # a first column that runs as a time does, whatever it is called
+    return with_time(frame, None, dict(units or {}), dt) if dt is None else (frame, [])
 
 
 def _is_time(name: object) -> bool:

@@ -235,3 +235,32 @@ def test_numbers_of_rows_are_no_time_where_some_are_lost(tmp_path):
                  sep=",")  # fmt: skip
     with pytest.raises(ValueError, match="give dt in s"):
         fq.read(path)
+
+
+@pytest.mark.parametrize("name", ["when", "_time", "LocalTime"])
+def test_a_table_in_memory_is_looked_at_as_a_file_is(tmp_path, name):
+    """Dates in a column of any name were found in files alone."""
+    stamps = pd.to_datetime("2026-03-05") + pd.to_timedelta(TIMES, unit="s")
+    frame = pd.DataFrame({name: stamps, "u": U, "y": LEVELS})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    for record in (fq.Record.from_frame(frame), fq.read(tmp_path / "a.csv")):
+        assert record.dt == pytest.approx(1e-3)
+        assert np.array_equal(record.u, U)
+    even = pd.DataFrame({"stamp": TIMES + 5.0, "u": U, "y": LEVELS})
+    assert fq.Record.from_frame(even).dt == pytest.approx(1e-3)
+    # who gives the sample time means that of the rows
+    assert fq.Record.from_frame(even[["u", "y"]], dt=2e-3).dt == 2e-3
+
+
+def test_which_sheet_was_read_is_said(tmp_path):
+    pytest.importorskip("openpyxl")
+    frame = pd.DataFrame({"time": TIMES, "u": U, "y": LEVELS})
+    with pd.ExcelWriter(tmp_path / "a.xlsx") as book:
+        pd.DataFrame({"note": ["x"]}).to_excel(book, sheet_name="info", index=False)
+        frame.to_excel(book, sheet_name="run", index=False)
+        frame.assign(u=2 * U).to_excel(book, sheet_name="again", index=False)
+    record = fq.read(tmp_path / "a.xlsx")
+    assert "sheet 'run' was read; sheet 'again' is there, too: group=" in record.notes
+    assert np.array_equal(fq.read(tmp_path / "a.xlsx", group="again").u, 2 * U)
+    with pytest.raises(ValueError, match="group='info': that sheet holds no columns of numbers"):
+        fq.read(tmp_path / "a.xlsx", group="info")

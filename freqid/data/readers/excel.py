@@ -67,12 +67,17 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
         frame.attrs.update(units=units, found=f"sheet {name!r}, columns {', '.join(names)}")
         found.append(frame)
     if not found:
+        if group is not None:
+            others = [name for name in book.sheet_names if name != group]
+            more = f"; the other sheets are {', '.join(others)}" if others else ""
+            raise InputError(f"group={group!r}: that sheet holds no columns of numbers{more}")
         raise InputError(
             f"holds no columns of numbers in its sheets ({', '.join(book.sheet_names)})"
         )
     if len(found) > 1:
-        others = ", ".join(f.attrs["found"].split(",")[0] for f in found[1:])
-        found[0].attrs["notes"] = [f"the first sheet was read; {others} are there, too: group="]
+        read, *others = (f.attrs["found"].split(",")[0] for f in found)
+        are = "are" if len(others) > 1 else "is"
+        found[0].attrs["notes"] = [f"{read} was read; {', '.join(others)} {are} there, too: group="]
     return found[0]
 
 
