@@ -130,7 +130,8 @@ def _with_its_time(
         # a time that nobody named
         return frame.rename_axis("time"), ["the index was taken for the time, in s"]
     # a first column that runs as a time does, whatever it is called
-    return with_time(frame, None, dict(units or {}), dt) if dt is None else (frame, [])
+    looked = dt is None and all(isinstance(c, str) for c in frame.columns)
+    return with_time(frame, None, dict(units or {}), dt) if looked else (frame, [])
 
 
 def _is_time(name: object) -> bool:

@@ -209,7 +209,7 @@ def same_clock(
         span = float(np.ptp(seconds[: len(x)]))
         unit = min(_RATIOS, key=lambda r: abs(np.log(np.ptp(x) / span / r)))
         apart = x / unit - seconds[: len(x)]
-        later = apart[0] if unit == 1 else _told_apart(frame, (name, other), units)
+        later = apart[0] if unit == 1 else _later(frame, (name, other), units)
         begins = abs(float(later)) if abs(later) < span else 0.0
         if max(float(np.ptp(apart)), begins) > _OFF * float(np.median(steps)):
             raise InputError(
@@ -244,13 +244,21 @@ def _counted(frame: pd.DataFrame, name: str, other: str) -> FloatArray | None:
     return np.asarray(x[: np.max(np.flatnonzero(np.isfinite(x)), initial=-1) + 1])
 
 
-def _told_apart(frame: pd.DataFrame, names: tuple[str, str], units: Mapping[str, str]) -> float:
-    """By how many seconds the second of two counts begins later, where both say their units."""
-    told = [UNITS.get((units.get(n) or unit_in_name_of_time(n)).casefold()) for n in names]
-    first, second = (frame[n].iloc[0] for n in names)
-    if told[0] is None or told[1] is None or frame[names[0]].dtype.kind not in "fiu":
+def _later(frame: pd.DataFrame, names: tuple[str, str], units: Mapping[str, str]) -> float:
+    """By how many seconds the second of two counts begins later, where both say their units or are
+    counts of one, as two since 1970 are.
+    """
+    if frame[names[0]].dtype.kind not in "fiu":
         return 0.0
-    return float(second) * told[1] - float(first) * told[0]
+    told = [(units.get(n) or unit_in_name_of_time(n)).casefold() for n in names]
+    scales = [UNITS.get(unit) for unit in told]
+    first, second = (frame[n] for n in names)
+    if told == ["", ""] and abs(np.median(np.diff(second)) / np.median(np.diff(first)) - 1) < _OFF:
+        seconds, _ = in_seconds(names[0], first, "")
+        scales = [float(np.median(np.diff(seconds)) / np.median(np.diff(first)))] * 2
+    if scales[0] is None or scales[1] is None:
+        return 0.0
+    return float(second.iloc[0]) * scales[1] - float(first.iloc[0]) * scales[0]
 
 
 def _may_be_time(unit: str) -> bool:

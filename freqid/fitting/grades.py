@@ -202,9 +202,10 @@ def _untold(est: Estimate, std: np.ndarray) -> list[str]:
     # of values that are off by so much error bars are no more than their order of magnitude
     most = bool(np.sum(relative > 2 * _VAGUE) >= max(len(relative) / 2, 2))
     most = most or len(vague) > max(len(relative) / 2, 1)
-    if outside and _runs_away(est):
+    within = [w for w in outside if w.severity == "minor"]
+    if within and _runs_away(est):
         return [
-            f"not told: {str(outside[0]).split(';')[0].split(': ')[-1]} by less than two standard "
+            f"not told: {str(within[0]).split(';')[0].split(': ')[-1]} by less than two standard "
             "errors, and with that value the plant is unstable; keep it where it is physical "
             "(with_bounds), give what is known of it (with_prior), or excite more"
         ]

@@ -104,6 +104,9 @@ def _search(
             begun[scout] = own.cost
         straight[structure.start.tobytes()] = straight_down(scout, structure.start)
         found = _without_noise(scout, straight, floor, options.n_starts is not None)
+        looked = Surveyed(structure, at_lines, floor, lines, share=1.0)
+        if found is not None and looked.gone(found.solution.x):
+            found = None
     if found is None and lines < every:
         wanted = _lines_wanted(spectral, floor())
         if wanted > _FEWER * lines:
@@ -171,6 +174,10 @@ class Surveyed:
         holds = [hold_that_changes(r.hold, r.data) for r in self.readings]
         return all(out_of_sight(poles, hold) for hold in holds)
 
+    def gone(self, x: FloatArray) -> bool:
+        """Whether one does that did not at the start: who begins with one out of sight means it."""
+        return self.hidden(x) and not self.hidden(self.structure.start)
+
 
 def _followed(
     data: Surveyed, wide: Objective, beside: Beside | BesidePlaces | None, found: Found
@@ -221,12 +228,8 @@ def _searched(
         beside = deeper
         return guide_of(beside, structure, few, data.share)
 
-    def aliased(x: FloatArray) -> bool:
-        # who begins with a mode out of sight means it
-        return data.hidden(x) and not data.hidden(start)
-
     guide = guide_of(beside, structure, few, data.share)
-    search = Search(scout, guide, data.floor, aliased, deepened, data.part, straight)
+    search = Search(scout, guide, data.floor, data.gone, deepened, data.part, straight)
     if beside is None and isinstance(structure, PlacedStructure):
         # nothing says when it is enough, and each start is a fit of everything
         search.most = _ALONE

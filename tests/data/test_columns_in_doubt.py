@@ -264,3 +264,18 @@ def test_which_sheet_was_read_is_said(tmp_path):
     assert np.array_equal(fq.read(tmp_path / "a.xlsx", group="again").u, 2 * U)
     with pytest.raises(ValueError, match="group='info': that sheet holds no columns of numbers"):
         fq.read(tmp_path / "a.xlsx", group="info")
+
+
+def test_columns_that_have_numbers_for_names_are_refused_in_words():
+    frame = pd.DataFrame(np.column_stack([TIMES, U, LEVELS]))
+    for given in ({}, {"units": {}}):
+        with pytest.raises(ValueError, match=r"columns are \[0, 1, 2\]"):
+            fq.Record.from_frame(frame, **given)
+
+
+def test_counts_since_1970_that_begin_apart_are_two_clocks(tmp_path):
+    count = 1_764_490_000_000 + np.arange(N)
+    columns = [str(k) for k in count], [f"{v:g}" for v in U], [str(k + 20) for k in count]
+    path = table(tmp_path / "a.csv", "time_cmd,u,time_meas,y", *columns, columns[1], sep=",")
+    with pytest.raises(ValueError, match="both times, and not of one clock"):
+        fq.read(path)

@@ -95,3 +95,26 @@ def test_findings_are_read_once():
 
 def test_starts_that_are_asked_for_are_made_without_noise_too():
     assert fq.fit(PLANT, chirp(4), band=(10, 50), start=OFF, n_starts=3).n_starts == 3
+
+
+def test_an_exact_answer_out_of_sight_gives_way(monkeypatch):
+    """With both residues free a mode above the Nyquist frequency explains each sample as well."""
+    dt, w = 0.025, 2 * np.pi * 5
+    plant = fq.GreyBox(
+        lambda w, a, b: ([[-1.0, w], [-w, -1.0]], [[a], [b]], [[1, 0]], None),
+        [fq.Parameter("w", w), fq.Parameter("a", 1.0), fq.Parameter("b", 2.0)],
+    )
+    record = fq.simulate(plant, fq.white_noise(400, seed=1), dt)
+    own = fq.fitting.grey_search.straight_down
+    alias = 2 * np.pi / dt + w
+
+    def astray(objective, x):
+        # on its way from the start to the mirror image
+        there = x.copy()
+        there[0] *= alias / (1.1 * w)
+        return fq.fitting.search.descent.polish(objective, there)
+
+    monkeypatch.setattr(fq.fitting.grey_search, "straight_down", astray)
+    est = fq.fit(plant, record, start={"w": 1.1 * w})
+    monkeypatch.setattr(fq.fitting.grey_search, "straight_down", own)
+    assert est["w"] == pytest.approx(w, rel=1e-6)

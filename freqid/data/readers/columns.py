@@ -20,7 +20,7 @@ _STEPS, _RATES = ("dt", "Ts", "ts", "Dt", "h"), ("Fs", "fs", "FS", "sampling_rat
 CLOCKS = (*_STEPS, *_RATES)
 _RATE_UNITS = {
     "hz": 1.0, "1/s": 1.0, "s^-1": 1.0, "samples/s": 1.0, "s/s": 1.0, "sps": 1.0,
-    "khz": 1e3, "ks/s": 1e3, "mhz": 1e6, "ms/s": 1e6,
+    "khz": 1e3, "ks/s": 1e3, "MHz": 1e6, "MS/s": 1e6, "mHz": 1e-3,
 }  # fmt: skip
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
@@ -79,7 +79,7 @@ def clock_number(name: str, value: float, unit: str) -> float | None:
     these: h may be a height.
     """
     factors = _RATE_UNITS if name in _RATES else UNITS
-    factor = factors.get(unit.casefold()) if unit else 1.0
+    factor = factors.get(unit, factors.get(unit.casefold())) if unit else 1.0
     return None if factor is None else value * factor
 
 
