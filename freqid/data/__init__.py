@@ -26,9 +26,9 @@ from freqid.data.misread import misread
 from freqid.data.periodic_response import PeriodicResponse
 from freqid.data.progress import Bar
 from freqid.data.quality import check_record
+from freqid.data.readers.headings import named_with
 from freqid.data.readers.kinds import ResponseFile
 from freqid.data.readers.npz import check_arrays
-from freqid.data.readers.table import named_with
 from freqid.data.record import Record
 from freqid.data.record_sets import Reference, as_records, references_of
 from freqid.data.replacing import check_replacing

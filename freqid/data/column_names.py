@@ -6,26 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, overload
 
 from freqid.checks import listed
-from freqid.data.readers.table import is_a_unit, named
-from freqid.data.units import coherent, is_count
+from freqid.data.readers.headings import is_a_unit, named
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-def is_unit(text: str) -> bool:
-    """Whether what stands in brackets behind a name is a unit, and no part of the name."""
-    return is_a_unit(text) or coherent(text) is not None or is_count(text)
-
-
 def without_units(
-    frame: pd.DataFrame, units: Mapping[str, str], are_units: Callable[[str], bool] = is_unit
+    frame: pd.DataFrame, units: Mapping[str, str], are_units: Callable[[str], bool] = is_a_unit
 ) -> tuple[pd.DataFrame, dict[str, str]]:
     """Columns without the units in brackets behind their names, and these."""
     told = []
     for column in map(str, frame.columns):
         name, unit = named(column)
-        bare = not column.rstrip().endswith(("]", ")")) and are_units is is_unit
+        bare = not column.rstrip().endswith(("]", ")")) and are_units is is_a_unit
         told.append((column, "") if bare or (unit and not are_units(unit)) else (name, unit))
     if len({name for name, _ in told}) < len(told) or not any(unit for _, unit in told):
         return frame, dict(units)

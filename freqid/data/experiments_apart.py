@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from freqid.data.readers.table import named
+from freqid.data.readers.headings import named
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,8 +21,8 @@ from freqid.data.clocks import begins_anew
 from freqid.data.column_names import known
 from freqid.data.experiments_apart import of_experiment
 from freqid.data.logged import kind_of, logged_record
+from freqid.data.readers.headings import named_with
 from freqid.data.readers.kinds import LOGS, WRITERS, ResponseFile
-from freqid.data.readers.table import named_with
 from freqid.data.record import Record
 from freqid.data.remembered import is_kept, kept_in_files
 from freqid.data.replacing import check_replacing, has_written

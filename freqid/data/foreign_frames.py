@@ -37,6 +37,11 @@ def as_pandas(frame: object) -> Table:
     import pandas as pd
 
     if isinstance(frame, pd.DataFrame):
+        if frame.columns.nlevels > 1:
+            raise InputError(
+                f"frame has columns of {frame.columns.nlevels} levels, as {frame.columns[0]!r}; "
+                "give each one name: frame.columns = [...]"
+            )
         told = frame.attrs.get("units")
         return Table(_with_dates(frame), dict(told) if isinstance(told, dict) else {})
     # no library is imported for the question whether an object is one of its own

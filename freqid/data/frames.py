@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError, listed, positive, real, unknown
+from freqid.checks import FloatArray, InputError, listed, real, unknown
 from freqid.data.cells import no_number
-from freqid.data.clocks import out_of_order
 from freqid.data.column_names import known, without_units
 from freqid.data.foreign_frames import as_pandas
-from freqid.data.printed_times import printed_period
-from freqid.data.readers.table import named
-from freqid.data.regular_time import on_a_grid, rows_apart, uneven
+from freqid.data.frame_times import sample_time, times_of, with_its_time
+from freqid.data.regular_time import on_a_grid, rows_apart
 from freqid.data.remembered import (
-    as_printed,
     is_kept,
     kept_aliased,
     kept_apart,
@@ -26,10 +23,7 @@ from freqid.data.remembered import (
     kept_hold,
     kept_notes,
     kept_reference,
-    kept_step,
 )
-from freqid.data.time_column import no_time, time_named, with_time
-from freqid.data.times_in_seconds import EPOCHS, of_this_world
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -59,14 +53,15 @@ def record_of(
     chosen = [c for own in (inputs, outputs) if own is not None for c in np.atleast_1d(own)]
     if reference is None and isinstance(loop, str) and loop in frame and loop not in chosen:
         reference = loop
-    if units is None:
-        frame, units = without_units(frame, own_units)
+    if units is None or (units and not set(units) & {str(c) for c in frame.columns}):
+        # who names the units of channels need not name those of the others
+        frame, units = without_units(frame, {**own_units, **(units or {})})
         inputs, outputs = known(inputs, frame, "inputs"), known(outputs, frame, "outputs")
         reference = known(reference, frame)
     dt = own_step if dt is None else dt
     if own_inputs is not None and inputs is None and outputs is None:
         inputs, outputs = own_inputs, [c for c in frame.columns if c not in own_inputs]
-    frame, said = _with_its_time(frame, units, dt)
+    frame, said = with_its_time(frame, units, dt, chosen)
     if len(frame) < 2:
         raise InputError(f"frame has {len(frame)} rows; a record needs two or more")
     signals = [c for c in frame.columns if c != "time" and not is_kept(c)]
@@ -80,7 +75,7 @@ def record_of(
         held = set(u_names) if between is None or between == "zoh" else set()
         frame, more = _resampled(frame, signals, held, y_names)
         notes += more
-    step = _sample_time(frame, dt, notes)
+    step = sample_time(frame, dt, notes)
     u, y = (_numbers(frame, names) for names in (u_names, y_names))
     commanded = None if reference is None else _numbers(frame, [reference])[:, 0]
 
@@ -102,52 +97,6 @@ def record_of(
         conditions=kept_conditions(frame),
         clocks_apart=kept_apart(frame),
     )
-
-
-def _with_its_time(
-    frame: pd.DataFrame, units: Mapping[str, str] | None, dt: float | None
-) -> tuple[pd.DataFrame, list[str]]:
-    """The frame with a time called so, found as in a file where there is none yet."""
-    if not frame.columns.is_unique:
-        twice = str(frame.columns[frame.columns.duplicated()][0])
-        raise InputError(f"column {twice!r} is there twice; rename one of them")
-    if "time" not in frame.columns:
-        if frame.index.name is not None and _is_time(frame.index.name):
-            frame = frame.reset_index()
-        elif _times(frame) is not None:
-            return frame, []
-    elif (units or {}).get("time") is None and not _counts(frame) and not _is_text(frame):
-        return frame, []
-    plain = {str(c): named(str(c)) for c in frame.columns}
-    own = time_named(list(plain))
-    if own is not None and own in plain:
-        told = {plain[own][0]: plain[own][1]} if plain[own][1] else {}
-        frame = frame.rename(columns={own: plain[own][0]})
-        return with_time(frame, plain[own][0], {**told, **(units or {})}, dt)
-    index = frame.index
-    even = index.dtype.kind == "f" and len(index) > 2 and index.is_monotonic_increasing
-    if dt is None and index.name is None and even:
-        # a time that nobody named
-        return frame.rename_axis("time"), ["the index was taken for the time, in s"]
-    # a first column that runs as a time does, whatever it is called
-    looked = dt is None and all(isinstance(c, str) for c in frame.columns)
-    return with_time(frame, None, dict(units or {}), dt) if looked else (frame, [])
-
-
-def _is_time(name: object) -> bool:
-    return str(name) != "time" and time_named([str(name)]) is not None
-
-
-def _is_text(frame: pd.DataFrame) -> bool:
-    """Whether the times are words."""
-    column = frame["time"]
-    return column.dtype.kind not in "fiubcmM" and isinstance(next(iter(column), None), str)
-
-
-def _counts(frame: pd.DataFrame) -> bool:
-    """Whether a column of times may be a count since 1970."""
-    x = frame["time"]
-    return x.dtype.kind in "iuf" and bool((x.abs() > EPOCHS[-1][0]).any())
 
 
 def samples_frame(record: Record) -> pd.DataFrame:
@@ -185,66 +134,13 @@ def _resampled(
     """The frame on a regular time, and what was done to it, in words."""
     import pandas as pd
 
-    times = _times(frame)
+    times = times_of(frame)
     if times is None:
         raise InputError("resample=True needs a column or index called 'time'")
     columns = {s: _numbers(frame, [s])[:, 0] for s in signals}
     new, notes = on_a_grid(times, columns, held, outputs)
     kept = {str(c): frame[c].iloc[0] for c in frame.columns if is_kept(c)}
     return pd.DataFrame(new).assign(**kept), notes
-
-
-def _sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> float:
-    times = _times(frame)
-    if times is None:
-        if dt is None:
-            raise no_time(frame)
-        return positive("dt", dt, "s")
-    # times that are no numbers are refused below
-    with np.errstate(all="ignore"):
-        gaps = np.diff(times)
-        step = float(times[-1] - times[0]) / (len(times) - 1)
-    printed = printed_period(times)
-    if printed is not None:
-        period, digit = printed
-        notes.append(f"the times are rounded to {digit:g} s: taken as even, every {period:.9g} s")
-        if dt is None:
-            return period
-        if abs(positive("dt", dt, "s") / period - 1) < 1e-3:
-            return float(dt)
-    if not np.isfinite(times).all() or (gaps <= 0).any():
-        raise out_of_order("column 'time'", times, int(np.argmax(~(gaps > 0))) + 1)
-    if np.abs(gaps - step).max() > 0.01 * step:
-        raise InputError(uneven(times))
-    if dt is not None and abs(positive("dt", dt, "s") - step) > 1e-3 * step:
-        raise InputError(
-            f"dt={dt:g} s, but the column of times steps by {step:g} s; drop one of them"
-        )
-    kept = kept_step(frame)
-    if kept is not None and abs(kept - step) > 1e-3 * step:
-        kept = None
-    told = kept or as_printed(step, float(np.abs(times).max()), len(times) - 1)
-    return told if dt is None else float(dt)
-
-
-def _times(frame: pd.DataFrame) -> FloatArray | None:
-    import pandas as pd
-
-    if "time" in frame.columns:
-        column: Any = frame["time"]
-    elif frame.index.name == "time" or isinstance(
-        frame.index, (pd.DatetimeIndex, pd.TimedeltaIndex)
-    ):
-        column = frame.index.to_series()
-    else:
-        return None
-    if pd.api.types.is_datetime64_any_dtype(column) or pd.api.types.is_timedelta64_dtype(column):
-        column = (column - column.iloc[0]) / pd.Timedelta(seconds=1)
-    try:
-        times = np.asarray(column, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError("column 'time' holds values that are not numbers of seconds") from None
-    return of_this_world("time", times)
 
 
 def _channels(

@@ -116,7 +116,8 @@ def uneven(times: FloatArray) -> str:
             f"{said}{lost}; resample=True puts them on a regular grid by straight lines, "
             "Record.from_logs(time, u, time, y) leaves them where they are"
         )
-    before, after = times[row - 1] - times[0], times[row] - times[0]
+    # up to a time is before it
+    before, after = times[row - 1] + usual - times[0], times[row] - times[0]
     return (
         f"{said}; {missing} samples are missing, and lines through a long gap are no data: "
         f"fit what lies before and after it as two records, read(stop={before:.9g}) and "

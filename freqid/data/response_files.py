@@ -38,7 +38,7 @@ from freqid.data.empirical_response import PHASE, EmpiricalResponse
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import NOISE, LineNoise, LocalResponse
-from freqid.data.readers.table import named
+from freqid.data.readers.headings import named
 from freqid.data.remembered import kept_of_response
 from freqid.data.sources import that_reads
 from freqid.data.tables import frame_of

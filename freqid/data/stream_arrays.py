@@ -17,6 +17,7 @@ from freqid.data.readers.columns import CLOCKS, clock_number, step_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
+from freqid.data.readers.packed import Packing
 from freqid.data.stream_found import Asked, Clock, Found, Source, agreed, even, of_array, places
 from freqid.data.time_column import time_named
 
@@ -33,6 +34,7 @@ class _Arrays:
     numbers: dict[str, dict[str, float]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     hollow: dict[str, str] = field(default_factory=dict)
+    packings: dict[str, Packing] = field(default_factory=dict)
 
     def add(self, name: str, array: Source) -> None:
         """Note an array: one of samples, or a number."""
@@ -49,6 +51,7 @@ class _Arrays:
         if array.ndim in (1, 2) and array.shape[0] > 1 and array.size:
             self.shapes[name] = tuple(int(size) for size in array.shape)
             self.units[name] = unit_of(array.attrs)
+            self.packings[name] = Packing.of(array.attrs)
             # zarr leaves out chunks that hold nothing but the fill value, and so does a copy that
             # was cut off
             there, whole = getattr(array, "nchunks_initialized", 0), getattr(array, "nchunks", 0)
@@ -92,7 +95,8 @@ class _Arrays:
         at = places(count)
         with self.opened() as file:
             stored = file[time]
-            return at, np.array([stored[i] for i in at]), unit_of(stored.attrs)
+            stamps = self.packings[time].values(np.array([stored[i] for i in at]))
+            return at, stamps, unit_of(stored.attrs)
 
     def _agreed(self, wanted: Sequence[str], times: Sequence[str], count: int, dt: float) -> None:
         """ValueError where the times beside the arrays say another sample time than ``dt`` (s): of
@@ -163,7 +167,10 @@ class _Arrays:
             full = dict.fromkeys(name for name, _ in wanted)
             with self.opened() as file:
                 for at in range(first, count, asked.block):
-                    read = {name: file[name][at : at + asked.block] for name in full}
+                    read = {
+                        name: self.packings[name].values(file[name][at : at + asked.block])
+                        for name in full
+                    }
                     flat = {name: rows.reshape(len(rows), -1) for name, rows in read.items()}
                     yield np.column_stack([flat[name][:, i] for name, i in wanted])
 
@@ -260,7 +267,9 @@ def of_zarr(path: Path, asked: Asked) -> Found:
             arrays.add_clocks("", root.attrs)
             found = of_array(root, asked.columns, asked.block, str(path))
             hollow = {n: told for told in arrays.hollow.values() for n in found.names}
-            return dataclasses.replace(found, dt=arrays.step([path.name]), hollow=hollow)
+            blocks = Packing.of(root.attrs).of_blocks(found.blocks)
+            step = arrays.step([path.name])
+            return dataclasses.replace(found, blocks=blocks, dt=step, hollow=hollow)
         arrays.add_clocks("", root.attrs)
         for name, item in root.members(max_depth=None):
             is_array = isinstance(item, zarr.Array)

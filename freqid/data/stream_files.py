@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, unknown
+from freqid.data.readers.headings import named
 from freqid.data.readers.kinds import damaged, existing, missing, refusing
 from freqid.data.readers.parquet import field_units
 from freqid.data.readers.parquet_structure import check_pages
-from freqid.data.readers.table import named
 from freqid.data.remembered import is_kept, kept_aliased, kept_conditions, kept_hold, kept_of_record
 from freqid.data.stream_arrays import of_hdf5, of_zarr
 from freqid.data.stream_found import Asked, Found, Source, agreed, even, of_array, places

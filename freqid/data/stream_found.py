@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import Array, InputError, channel_names
-from freqid.data.readers.table import named
+from freqid.data.readers.headings import named
 from freqid.data.remembered import as_printed
 from freqid.data.times_in_seconds import UNITS, in_seconds, unit_in_name_of_time
 from freqid.lti import Hold

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from freqid.checks import InputError, listed
+from freqid.data.readers.headings import named
 from freqid.data.readers.kinds import READERS, Reader, ResponseFile, existing
-from freqid.data.readers.table import named
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, unknown
-from freqid.data.readers.table import named
+from freqid.data.readers.headings import named
+from freqid.data.times_in_parts import joined
 from freqid.data.times_in_seconds import (
-    DATE,
     LONG,
     SUFFIX,
     UNITS,
     converted,
     in_seconds,
+    in_words,
     unit_in_name_of_time,
 )
 
@@ -32,11 +33,16 @@ _NAMES = {
     "t_ms", "time_us", "t_us", "time_ns", "timestamp_ms", "timestamp_us", "timestamp_ns", "clock",
     "x_value", "tout", "ms", "us", "µs", "ns", "datum", "uhrzeit", "zeitstempel", "fecha", "heure",
 }  # fmt: skip
+# an attribute of frames whose time has been found, so that nobody asks again
+LOOKED_AT = "time_looked_at"
 # steps that differ by no more than this part make an unnamed column a time, of at least so many
 # rows, if nearly all are such
 _EVEN, _FEWEST, _NEARLY_ALL = 1e-3, 3, 0.9
 # steps in s that nobody samples a machine with
 _SLOW = 0.2
+# and those of the number of a row, in whichever steps
+_COUNTERS = {"nr", "no", "num", "number", "nummer", "lfd nr", "index", "idx", "sample", "samples",
+             "sample no", "row", "count", "counter", "point", "scan", "n", "k", "i"}  # fmt: skip
 # names of the time with a unit behind them, which may be something else behind another name
 _STEMS = {"time", "elapsed", "elapsed time", "zeit", "temps", "timestamp"}
 # steps that tell a clock, the part of one by which two are not the same, and the ratios that counts
@@ -45,8 +51,6 @@ _FEW, _OFF = 8, 0.02
 _RATIOS = sorted({a / b for a in UNITS.values() for b in UNITS.values()})
 # units of a count by its steps in them, and what they are called
 _LIKELY = ((2e5, "ns", "nanoseconds"), (200.0, "µs", "microseconds"), (0.0, "ms", "milliseconds"))
-# a time of day in a column of its own
-_CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?")
 
 
 def with_time(
@@ -62,20 +66,28 @@ def with_time(
     Raises ValueError for a column that is not there or holds no time, and where rows that are to be
     of ``one_clock`` hold another one's times beside it, which ``signals`` are not.
     """
-    frame = _joined(frame) if time is None else frame
-    name = _found(frame, time, units, dt)
+    frame = joined(frame) if time is None else frame
+    name = _found(frame, time, units, dt, signals)
     if name is None:
         return frame, []
     if "time" in units and "time" not in frame.columns:
         # who tells the unit of the time means it, whatever its column is called
         units = {name: units["time"], **units}
     seconds, said = in_seconds(name, frame[name], units.get(name, ""))
+    beside: list[str] = []
+    if said == "s" and not (units.get(name) or unit_in_name_of_time(name)):
+        unit, beside = _beside_dates(frame, name, seconds)
+        if unit:
+            units = {**units, name: unit}
+            seconds, said = in_seconds(name, frame[name], unit)
     others = frame.drop(columns=[*signals], errors="ignore")
     same = same_clock(others, name, seconds, units) if one_clock and time is None else []
+    same = [*dict.fromkeys([*same, *beside])]
     rest = frame.drop(columns=[name, *same])
     if "time" in rest.columns:
         raise InputError(f"time={name!r}: the column 'time' is another; rename it")
     rest.insert(0, "time", seconds)
+    rest.attrs[LOOKED_AT] = True
     plain = name == "time" and said == "s"
     notes = [] if plain else [f"column {name!r} was taken for the time, in {said}"]
     notes += [f"column {other!r} is of the same clock, and left out" for other in same]
@@ -96,35 +108,21 @@ def time_named(columns: Sequence[str]) -> str | None:
     if "time" in columns:
         return "time"
     for column in columns:
-        plain = named(column)[0].strip().casefold()
+        plain = in_words(named(column)[0])
         if re.sub(r"[\s_]+", " ", plain) in _NAMES or plain in _NAMES:
             return column
     # a unit behind the name, of the first column alone: T_h may be a temperature
-    first = named(columns[0])[0].strip().casefold() if columns else ""
+    first = in_words(named(columns[0])[0]) if columns else ""
     stem = re.sub(SUFFIX, "", first)
     return columns[0] if (stem != first and stem in _STEMS) or LONG.fullmatch(first) else None
 
 
-def _joined(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with a column of dates and one of times of day, side by side, made one."""
-    for day, clock in zip(frame.columns[:-1], frame.columns[1:], strict=True):
-        texts = [frame[c].iloc[:5] for c in (day, clock)]
-        if any(t.dtype.kind in "fiubmM" for t in texts):
-            continue
-        if not all(DATE.fullmatch(str(x)) for x in texts[0]):
-            continue
-        if not all(_CLOCK.fullmatch(str(x)) for x in texts[1]):
-            continue
-        both = frame[day].astype(str) + " " + frame[clock].astype(str)
-        rest = frame.drop(columns=[day, clock])
-        rest.insert(0, "date time", both.str.replace(",", "."))
-        rest.attrs = frame.attrs
-        return rest
-    return frame
-
-
 def _found(
-    frame: pd.DataFrame, time: str | None, units: Mapping[str, str], dt: float | None
+    frame: pd.DataFrame,
+    time: str | None,
+    units: Mapping[str, str],
+    dt: float | None,
+    signals: Sequence[str],
 ) -> str | None:
     if time is not None:
         # as the file's header has it, its unit in brackets, or without that
@@ -133,7 +131,8 @@ def _found(
             raise InputError(unknown("time", time, [str(c) for c in frame.columns]))
         return plain
     # what has another unit is no time: T in °C
-    told = time_named([str(c) for c in frame.columns if _may_be_time(units.get(c, ""))])
+    others = [str(c) for c in frame.columns if c not in signals]
+    told = time_named([c for c in others if _may_be_time(units.get(c, ""))])
     if told is not None:
         return told
     if dt is not None or len(frame.columns) < 3 or len(frame) < 3:
@@ -143,13 +142,31 @@ def _found(
     x = frame[frame.columns[0]]
     if x.dtype.kind not in "fiu":
         return first if _is_stamp(x) else None
-    if not runs_as_a_time(x):
+    if not runs_as_a_time(x) or (first.strip(" .").casefold() in _COUNTERS and first not in units):
         return None
     values = x.to_numpy(dtype=float)
     gaps = np.diff(values)
     # what counts rows tells nothing of their time, unless somebody says its unit
     rows = (np.rint(gaps) == gaps).all() and np.median(gaps) == 1 and values[0] in (0, 1)
     return None if rows and first not in units else first
+
+
+def _beside_dates(frame: pd.DataFrame, name: str, seconds: FloatArray) -> tuple[str, list[str]]:
+    """The unit other than s in which a count runs beside a column of dates, and that column."""
+    for other in map(str, frame.columns):
+        column = frame[other]
+        if other == name or column.dtype.kind in "fiubcm" or time_named([other]) is None:
+            continue
+        try:
+            dates, _ = in_seconds(other, column, "")
+        except InputError:
+            continue
+        with np.errstate(all="ignore"):
+            ratio = float(np.ptp(dates) / np.ptp(seconds)) if len(seconds) > _FEW else np.nan
+        for unit in ("ms", "us", "ns", "min", "h"):
+            if abs(ratio / UNITS[unit] - 1) <= _OFF:
+                return unit, [other]
+    return "", []
 
 
 def runs_as_a_time(column: Column) -> bool:

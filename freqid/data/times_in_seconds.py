@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from freqid.checks import Array, FloatArray, InputError
+from freqid.data.time_texts import as_known
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +38,12 @@ EPOCHS = (
 # to which numbers so large are no seconds: 2 s as days, 43 kHz as seconds since half a day ago
 _DAYS, _DAY_STEP = ((36_892, 73_051, "1900"), (730_852, 767_011, "year 0")), 2.4e-5
 # a name that ends in a unit, and one of the time with a longer unit behind it
-SUFFIX = r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos)\.*$"
+SUFFIX = (
+    r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos|seconds|milliseconds"
+    r"|microseconds|nanoseconds)\.*$"
+)
+# timeMs
+_CAMEL = re.compile(r"(?<=[a-z])(Sec|Ms|Us|Ns)$")
 LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
 # a date, and one that a time of day follows; seconds of a day
 DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
@@ -53,9 +59,14 @@ _BEYOND = 1e300
 _NUMERAL = r"[+-]?\d[\d.,' ]*([eEdD][+-]?\d+)?"
 
 
+def in_words(name: str) -> str:
+    """A name in small letters, with a mark before the unit that it may end in: time_ms."""
+    return _CAMEL.sub(r"_\1", name.strip()).casefold()
+
+
 def unit_in_name_of_time(name: str) -> str:
     """The unit in which a name ends; empty where it is none of time."""
-    plain = name.strip().casefold()
+    plain = in_words(name)
     long, short = LONG.fullmatch(plain), re.search(SUFFIX, plain)
     return long[2] if long else short[1] if short else ""
 
@@ -64,6 +75,7 @@ def converted(column: Column) -> Column | None:
     """Texts as dates or durations; None where they are neither."""
     import pandas as pd
 
+    column = as_known(column)
     # what pandas takes for a count of nanoseconds is a number that it could not read
     texts = column.astype(str).str
     numbers = texts.fullmatch(_NUMERAL) & ~texts.fullmatch(DATE)
@@ -122,6 +134,7 @@ def _first_that_is_none(column: Column) -> int:
     """The first row of a column of times that holds none; 0 where most are none."""
     import pandas as pd
 
+    column = as_known(column)
     there, wrong = column.notna(), []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +22,8 @@ _RATE_UNITS = {
     "hz": 1.0, "1/s": 1.0, "s^-1": 1.0, "samples/s": 1.0, "s/s": 1.0, "sps": 1.0,
     "khz": 1e3, "ks/s": 1e3, "MHz": 1e6, "MS/s": 1e6, "mHz": 1e-3,
 }  # fmt: skip
+# attributes that tell the unit of an array, in any case
+_UNIT_NAMES = ("units", "unit", "unit_label", "unit_string", "time_unit", "time_units")
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
@@ -46,8 +48,9 @@ def in_numbers(values: object) -> object:
 
 def unit_of(attributes: Mapping[str, object]) -> str:
     """The unit that an array's attributes name, ``ms since 2020-01-01`` without its beginning."""
-    for name in ("units", "unit", "Units", "Unit"):
-        told = attributes.get(name)
+    plain = {name.casefold(): name for name in attributes}
+    for name in _UNIT_NAMES:
+        told = attributes.get(plain.get(name, name))
         text = text_of(told) if isinstance(told, (str, bytes)) else ""
         if text.strip():
             return text.split(" since ")[0].strip()
@@ -93,15 +96,15 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
 
     The longest arrays are the samples; shorter ones whose length divides it are slow outputs, with
     blanks between, unless a time of their own says that they are another experiment, a frame for
-    itself in ``attrs["apart"]``. A scalar ``dt`` and no time makes one. Raises ValueError where
-    nothing fits.
+    itself in ``attrs["apart"]``. A scalar ``dt`` makes a time, unless an array of times says
+    otherwise. Raises ValueError where nothing fits.
     """
     import pandas as pd
 
     columns: dict[str, Array] = {}
     left_out: list[str] = []
     scalars: dict[str, float] = {}
-    for name, value in arrays.items():
+    for name, value in _fields(arrays):
         try:
             x = np.squeeze(np.asarray(in_numbers(value)))
             if x.dtype.kind in "SU" and x.itemsize > _LONGEST:
@@ -143,7 +146,11 @@ def columns_of(arrays: Mapping[str, object]) -> pd.DataFrame:
             raise InputError(f"array {name!r} has {len(x)} samples beside {N}; lengths must agree")
     step = step_of(scalars)
     if "time" not in full and step is not None:
-        full["time"] = step * np.arange(N)
+        own = _time_of(full, N, fewest=1)
+        said = "" if own is None else _against(step, *own)
+        if own is None or not said:
+            full["time"] = step * np.arange(N)
+        left_out += [said] if said else []
     frame = pd.DataFrame(full)
     frame.attrs["notes"] = left_out
     if others:
@@ -181,11 +188,37 @@ def _alike(short: Array, long: Array) -> bool:
     return counts or any(abs(s * u - 1) <= _OFF for s in spans for u in _UNITS)
 
 
-def _time_of(columns: Mapping[str, Array], length: int) -> tuple[str, Array] | None:
+def _fields(arrays: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    """Arrays by name, those of compound numbers field by field, as tables are kept in HDF5."""
+    for name, value in arrays.items():
+        fields = getattr(getattr(value, "dtype", None), "names", None)
+        if fields is None:
+            yield name, value
+        else:
+            yield from ((field, np.asarray(value)[field]) for field in fields)
+
+
+def _against(step: float, name: str, times: Array) -> str:
+    """What is to be said of a file's sample time in s where an array of times has gaps or other
+    steps, in whichever unit; empty where the two agree.
+    """
+    steps, own = np.diff(times), _mean(times)
+    even = bool(np.abs(steps / own - 1).max() <= _OFF)
+    if even and any(abs(own * u / step - 1) <= _OFF for u in _UNITS):
+        return ""
+    return (
+        f"the file tells a sample time of {step:g} s and {name!r} steps of {own:g}: {name!r} was "
+        "taken for the time"
+    )
+
+
+def _time_of(
+    columns: Mapping[str, Array], length: int, fewest: int = _FEW
+) -> tuple[str, Array] | None:
     """The array of a length that is a time by its name, and rises; T is a temperature."""
     for name, x in columns.items():
         words = {w if len(w) == 1 else w.casefold() for w in re.split(r"[\W_\d]+", name)}
-        named = len(x) == length > _FEW and bool(words & _TIMES) and x.dtype.kind != "c"
+        named = len(x) == length > fewest and bool(words & _TIMES) and x.dtype.kind != "c"
         # what is no number is no time
         if named and np.isfinite(x).all() and np.abs(x).max() < _HUGE:
             times = x.astype(float)

@@ -6,17 +6,19 @@ import datetime
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from freqid.checks import InputError, unknown
 from freqid.data.readers.apart import needs, read_apart
+from freqid.data.readers.headings import heading
 from freqid.data.readers.kinds import existing, reads
 from freqid.data.readers.limits import check_size
-from freqid.data.readers.table import heading
 
 if TYPE_CHECKING:
     import pandas as pd
 
+# part of the rows that remarks stand in at the most
+_REMARKS = 0.05
 # cells that are times
 _TIMES = (datetime.date, datetime.time, datetime.timedelta)
 
@@ -45,11 +47,12 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
     found: list[pd.DataFrame] = []
     for name in book.sheet_names if group is None else [group]:
         # a sheet at a time, and a column: a million rows are a hundred times that in lists
-        rows = [
-            r
+        rows: list[list[object]] = [
+            [*r]
             for r in book.get_sheet_by_name(name).to_python()
             if any(c not in ("", None) for c in r)
         ]
+        rows = _in_numbers(_without_blanks(rows))
         body = (i for i, r in enumerate(rows) if _is_row(r))
         first, second = next(body, None), next(body, None)
         if first is None or second is None:
@@ -81,7 +84,32 @@ def sheet_of(path: Path, group: str | None) -> pd.DataFrame:
     return found[0]
 
 
-def _are_samples(row: list[Any]) -> bool:
+def _without_blanks(rows: list[list[object]]) -> list[list[object]]:
+    """The rows without columns that hold nothing, or remarks in a few rows."""
+    kept = []
+    for i in range(min(map(len, rows), default=0)):
+        cells = [r[i] for r in rows if r[i] not in ("", None)]
+        words = all(isinstance(c, str) for c in cells)
+        if cells and not (words and len(cells) <= _REMARKS * len(rows)):
+            kept.append(i)
+    return [[r[i] for i in kept] for r in rows]
+
+
+def _in_numbers(rows: list[list[object]]) -> list[list[object]]:
+    """The rows with numbers that were kept as texts, where hardly any is one."""
+    if any(_is_row(r) for r in rows):
+        return rows
+    return [[_as_number(c) for c in r] for r in rows]
+
+
+def _as_number(cell: object) -> object:
+    try:
+        return float(cell) if isinstance(cell, str) else cell
+    except ValueError:
+        return cell
+
+
+def _are_samples(row: Sequence[object]) -> bool:
     return all(c in ("", None) or _is_number(c) or isinstance(c, _TIMES) for c in row)
 
 
@@ -91,5 +119,5 @@ def _is_row(row: Sequence[object]) -> bool:
     return words <= 1 < len(row) or words == 0 or 3 * words <= len(row)
 
 
-def _is_number(cell: Any) -> bool:
+def _is_number(cell: object) -> bool:
     return isinstance(cell, (int, float)) and not isinstance(cell, bool)

@@ -12,6 +12,7 @@ from freqid.data.readers.columns import CLOCKS, clock_number, columns_of, unit_o
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
 from freqid.data.readers.limits import check_size
+from freqid.data.readers.packed import Packing, not_applied
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,22 +32,24 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
     found: dict[str, dict[str, Array]] = {}
     units: dict[str, dict[str, str]] = {}
     taken = 0.0
+    notes: list[str] = []
 
     def keep(name: str, item: object) -> None:
         nonlocal taken
         if not isinstance(item, h5py.Dataset) or name.startswith("#"):
             return
-        if item.dtype.kind in "fiub":
+        if item.dtype.kind in "fiub" or item.dtype.names:
             if item.shape is None:
                 # an empty data set, which has no shape
                 return
             # samples that lie in another file, which the file's maker chose, are not fetched
             if item.external or item.is_virtual:
                 raise InputError(f"{name!r} refers to another file, which is not read; copy it in")
-            taken += 8.0 * item.size
+            taken += float(max(item.dtype.itemsize, 8)) * item.size
             check_size(path, taken)
             parent, _, leaf = name.rpartition("/")
-            value, unit = item[()], unit_of(item.attrs)
+            value, unit = Packing.of(item.attrs).values(item[()]), unit_of(item.attrs)
+            notes.extend(said for said in [not_applied(leaf, item.attrs)] if said)
             if leaf in CLOCKS and item.size == 1:
                 told = clock_number(leaf, float(np.ravel(value)[0]), unit)
                 if told is None:
@@ -70,6 +73,7 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
     asked = units.values() if group is None else [units[group.strip("/")]]
     told = {n: unit for each in asked for n, unit in each.items() if unit}
     frame.attrs["units"] = {n: unit for n, unit in told.items() if n in frame.columns}
+    frame.attrs["notes"] += notes
     # which one was first when they were written nobody knows
     frame.attrs["by_name"] = True
     return frame

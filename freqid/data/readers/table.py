@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from freqid.checks import InputError
+from freqid.data.readers.headings import are_names, heading
 
 # lines that are looked at before the columns are read
 LOOK = 400
@@ -30,13 +31,8 @@ _WHOLE = {
 }
 # so much less a column leaps that is read right
 _SMOOTHER = 1 / 3
-_UNIT = (
-    r"(s|ms|us|µs|ns|min|h|V|mV|A|mA|N|kN|N ?m|Nm|m|mm|rad|deg|°|rad/s|deg/s|rpm|m/s|m/s2|m/s\^2"
-    r"|m/s²|g|Hz|Pa|kPa|MPa|hPa|mbar|bar|psi|K|°C|degC|°F|degF|%|counts?|kg|kg/s|kg/h|t/h|L/min"
-    r"|l/min|L/h|l/h|L/s|l/s|m³/h|m3/h|m³/s|m3/s|gpm|kW)"
-)
-# as oscilloscopes write units below the names of their channels, and settings above these
-_SPOKEN, _SETTINGS = r"(?i:seconds?|volts?|amps?|amperes?|hertz|watts?)", 60
+# lines of settings that oscilloscopes write above the names of their channels
+_SETTINGS = 60
 _BLANK = {"true", "false", "", "nan", "na", "n/a", "null", "none", "-nan", "inf", "-inf"}
 _STAMP = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d{1,4}([T ]?\d{0,2}:?\d{0,2}:?\d{0,2}[.,]?\d*)?.*")
 
@@ -123,82 +119,6 @@ def parted(line: str, separator: str) -> list[str]:
     return [c.strip().strip('"').strip("'") for c in cells]
 
 
-def heading(rows: Sequence[Sequence[str]], width: int) -> tuple[list[str], dict[str, str], bool]:
-    """Names and units from the rows above the samples, the last of as many cells as there are.
-
-    ``x [mm]``, ``x (mm)`` and a row of units below that of names are understood. A name may be
-    there twice.
-    """
-    full = [list(r) for r in rows if len(r) >= width and any(r)]
-    full = [r[:width] for r in full if not any(r[width:])]
-    near = range(2, width), range(width + 1, width + 3)
-    if not full and rows and _are_names(rows[-1]) and any(len(rows[-1]) in r for r in near):
-        raise InputError(
-            f"the samples have {width} cells and the line of names {len(rows[-1])}: "
-            f"{', '.join(rows[-1])}; mend that line"
-        )
-    if not full:
-        return [f"column{i + 1}" for i in range(width)], {}, False
-    given, below = (
-        (full[-2], full[-1]) if len(full) > 1 and _are_units(full[-1], full[-2]) else (full[-1], [])
-    )
-    names, units = [], {}
-    for i, text in enumerate(given):
-        name, unit = named(text or f"column{i + 1}")
-        unit = below[i].strip("[]() ") if below and below[i].strip("[]()- ") else unit
-        names.append(name)
-        if unit:
-            units[name] = unit
-    for name in {n for n in names if names.count(n) > 1}:
-        # V(in) and V(out) are names, and no volts
-        units.pop(name, None)
-        names = [t.strip() if n == name else n for n, t in zip(names, given, strict=True)]
-    return names, units, True
-
-
-def named(text: str) -> tuple[str, str]:
-    """A name and the unit in brackets behind it."""
-    plain = text.strip()
-    found = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", plain)
-    if found and found[1] and not re.fullmatch(r"\d+", found[2]):
-        # DIN 1338 and ISO 80000 write "v/(m/s)"
-        return found[1].rstrip(" /"), found[2].strip() if found[2].strip() != "-" else ""
-    spoken = re.fullmatch(rf"(.+?)\s+in\s+{_UNIT}", plain)
-    if spoken:
-        return spoken[1], spoken[2]
-    quotient = re.fullmatch(rf"(.+?)\s*[/,]\s*{_UNIT}", plain)
-    if quotient and not re.fullmatch(_UNIT, plain):
-        return quotient[1], quotient[2]
-    return plain, ""
-
-
-def is_a_unit(text: str) -> bool:
-    """Whether a text is one of the units that loggers print."""
-    return re.fullmatch(_UNIT, text) is not None
-
-
-def named_with(text: str, unit: str) -> str:
-    """A name with its unit behind it, as ``named`` tells them apart."""
-    return f"{text} [{unit or '-'}]" if unit or named(text) != (text, "") else text
-
-
-def _are_names(cells: Sequence[str]) -> bool:
-    """Whether cells could be names of columns: words that begin with a letter."""
-    return all(re.match(r"[^\W\d]", c) for c in cells)
-
-
-def _are_units(cells: Sequence[str], above: Sequence[str]) -> bool:
-    """Whether a row is one of units: brackets, or short words of which several are known, or one
-    of them where nothing stands below the first name, as that of a time.
-    """
-    words = [c.strip() for c in cells if c.strip()]
-    if all(re.fullmatch(r"[\[(].*[\])]", w) or w == "-" for w in words):
-        return True
-    known = sum(w == "-" or bool(re.fullmatch(rf"{_UNIT}|{_SPOKEN}", w)) for w in words)
-    enough = 1 if all(above) and not cells[0].strip() else 0.6 * len(words)
-    return bool(words) and known >= enough
-
-
 def _uncommented(line: str) -> str:
     text = line.strip("\ufeff").rstrip("\r\n")
     for mark in _COMMENT:
@@ -212,7 +132,8 @@ def _is_number(cell: str, sign: str, mark: str, sure: bool = False) -> bool:
 
 
 def _in_thousands(cell: str, sign: str, mark: str, sure: bool) -> bool:
-    if mark == OTHER[sign]:
+    # a cell that holds the separator itself was in quotes
+    if mark == OTHER[sign] and mark not in cell:
         return False
     return bool(_THOUSANDS[sign].fullmatch(cell) or (sure and _WHOLE[sign].fullmatch(cell)))
 
@@ -263,7 +184,7 @@ def _below_settings(
     """
     for at in range(first, min(first + _SETTINGS, len(rows) - 1)):
         cells = rows[at]
-        headed = len(cells) == width and _are_names(cells) and good[at + 1]
+        headed = len(cells) == width and are_names(cells) and good[at + 1]
         if headed and not any(c.lower() in _BLANK for c in cells):
             return at + 1
         if not any(cells) or not good[at]:

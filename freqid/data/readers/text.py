@@ -19,6 +19,7 @@ from freqid.checks import InputError
 from freqid.data.cells import no_number
 from freqid.data.readers.kinds import damaged, reads, writes
 from freqid.data.readers.limits import check_size, limit_of
+from freqid.data.readers.plain_texts import plain_text, without_remarks
 from freqid.data.readers.preambles import body_of
 from freqid.data.readers.table import LOOK, OTHER, Layout, layout_of
 
@@ -39,10 +40,6 @@ def unzipped(path: Path, mode: str) -> IO[bytes]:
 
 # part of a text that may be no plain characters
 _ODD = 0.2
-# 1.5D-03
-_DOUBLE = re.compile(r"(?<![\w.])([+-]?(?:\d+[.,]\d*|\.\d+))[Dd]([+-]\d{1,3})(?!\w)")
-# characters in which names stand, and of one of them
-_HEAD, _NAME = 4000, 100
 _TWICE = 4
 # cells that are looked at first
 _SOME = 5
@@ -62,8 +59,9 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     if "\r" in text:
         # line ends of other machines, and of old ones
         text = text.replace("\r\n", "\n").replace("\r", "\n")
-    text = _plain(text)
+    text, taken_off = plain_text(text)
     text, clock, said = body_of(text)
+    said = (*said, *taken_off)
     # lines as pandas counts them: splitlines() ends some at form feeds, too
     lines = [line for line in text[: 400 * LOOK].split("\n")[:LOOK] if line.strip()]
     if not lines:
@@ -72,7 +70,7 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     begin = _begin(text, layout.first)
     rows = (len(text) - begin) * len(lines) / max(sum(map(len, lines)) + len(lines), 1)
     check_size(path, 8 * rows * len(layout.names), "its columns")
-    body = text[begin:].encode()
+    body = without_remarks(text[begin:]).encode()
     del text
     # before version 3 the last digit of numbers was lost unless asked for
     exact: Any = {} if int(pd.__version__.split(".")[0]) > 2 else {"float_precision": "round_trip"}
@@ -80,11 +78,12 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
         frame = pd.read_csv(
             io.BytesIO(body),
             sep=r"\s+" if layout.separator == " " else layout.separator,
-            decimal=layout.decimal, thousands=layout.thousands, header=None, comment="#",
+            decimal=layout.decimal, thousands=layout.thousands, header=None,
             skipinitialspace=True, index_col=False, **exact,
         )  # fmt: skip
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
-        raise damaged("CSV", error) from None
+        raise _ragged(str(error)) or damaged("CSV", error) from None
+    frame = _without_blank_end(frame)
     grouped = _without_thousands(frame, layout)
     frame = _with_names(frame, layout if grouped is None else grouped)
     if clock is not None:
@@ -95,26 +94,6 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
         frame["time"] = clock[0] + clock[1] * count
     frame.attrs["notes"] = [*said, *frame.attrs.get("notes", [])]
     return frame
-
-
-def _plain(text: str) -> str:
-    """The text with names in one line, infinite or undefined numbers as words that are known, and
-    powers of ten as C writes them.
-
-    Excel breaks lines within quoted names; old programs of Microsoft's print ``-1.#IND``, whose
-    end would be a comment; Fortran has a D for the E of double precision.
-    """
-    head, rest = text[:_HEAD], text[_HEAD:]
-    parts = head.split('"')
-    if len(parts) % 2 and any("\n" in part for part in parts[1::2]):
-        parts[1::2] = [" ".join(p.split("\n")) if len(p) < _NAME else p for p in parts[1::2]]
-        text = '"'.join(parts) + rest
-    if re.search(r"1[.,]#", text):
-        text = re.sub(r"(?<![\w.])([+-]?)1[.,]#INF\w*(\+\d+)?", r"\1inf", text)
-        text = re.sub(r"(?<![\w.])[+-]?1[.,]#(IND|QNAN|SNAN)\w*(\+\d+)?", "nan", text)
-    if re.search(_DOUBLE, text[:_HEAD]):
-        text = re.sub(_DOUBLE, r"\1E\2", text)
-    return text
 
 
 def _begin(text: str, skipped: int) -> int:
@@ -201,6 +180,25 @@ def _without_thousands(frame: pd.DataFrame, layout: Layout) -> Layout | None:
         frame.isetitem(i, values.where(column.notna()).to_numpy(dtype=float))
         found = dataclasses.replace(layout, thousands=sign)
     return found
+
+
+def _ragged(error: str) -> InputError | None:
+    """The error of a row of more cells than the first, by its number among the samples."""
+    found = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", error)
+    if found is None:
+        return None
+    return InputError(
+        f"is not CSV or is damaged: row {int(found[2]) - 1} of the samples has {found[3]} cells "
+        f"and the first {found[1]}; mend or leave out the row"
+    )
+
+
+def _without_blank_end(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame without rows of separators alone below the samples, as spreadsheets leave them."""
+    if len(frame) == 0 or not frame.iloc[-1].isna().all():
+        return frame
+    full = np.flatnonzero(frame.notna().any(axis=1).to_numpy())
+    return frame.iloc[: full[-1] + 1] if len(full) else frame
 
 
 def _has_decimals(frame: pd.DataFrame) -> bool:

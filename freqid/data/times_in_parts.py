@@ -1,0 +1,68 @@
+"""Times that lie in two columns: a date and a time of day, seconds and what is beyond them."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from freqid.data.time_texts import as_known
+from freqid.data.times_in_seconds import DATE, UNITS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# a time of day in a column of its own
+_CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,:]\d+)?)?(\s?[AP]M)?", re.IGNORECASE)
+# whole seconds, and the names of what is beyond them, as ROS and POSIX have them
+_SECONDS = re.compile(r"(.*?)(sec|secs|s)", re.IGNORECASE)
+_BEYOND = r"(nanosec|nanosecs|nanoseconds|nsec|nsecs|usec|usecs|ns|us)"
+
+
+def joined(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame with a time in two columns side by side, if there is one, in one."""
+    for first, second in zip(frame.columns[:-1], frame.columns[1:], strict=True):
+        for way in (_of_day, _of_seconds):
+            times = way(frame, first, second)
+            if times is not None:
+                rest = frame.drop(columns=[first, second])
+                rest.insert(0, times.name, times)
+                rest.attrs = frame.attrs
+                return rest
+    return frame
+
+
+def _of_day(frame: pd.DataFrame, day: str, clock: str) -> pd.Series[str] | None:
+    texts = [frame[c].iloc[:5] for c in (day, clock)]
+    if any(t.dtype.kind in "fiubmM" for t in texts):
+        return None
+    if not all(DATE.fullmatch(str(x)) for x in texts[0]):
+        return None
+    if not all(_CLOCK.fullmatch(str(x)) for x in texts[1]):
+        return None
+    times = as_known(frame[clock]).astype(str).str.replace(",", ".")
+    # a day that stands still is that of the start: times of day go on past midnight
+    if frame[day].nunique() > 1 or times.iloc[0].upper().endswith("M"):
+        times = frame[day].astype(str) + " " + times
+    return times.rename("date time")
+
+
+def _of_seconds(frame: pd.DataFrame, whole: str, beyond: str) -> pd.Series[float] | None:
+    import pandas as pd
+
+    found = _SECONDS.fullmatch(str(whole))
+    parts = [frame[c] for c in (whole, beyond)]
+    if found is None or any(p.dtype.kind not in "iu" for p in parts):
+        return None
+    plain = str(beyond).removeprefix(found[1])
+    unit = re.fullmatch(_BEYOND, plain, re.IGNORECASE)
+    if unit is None:
+        return None
+    scale = UNITS["us" if plain.casefold().startswith("u") else "ns"]
+    seconds, rest = (p.to_numpy().astype(np.int64) for p in parts)
+    if rest.min() < 0 or rest.max() * scale >= 1:
+        return None
+    # from the first on, where a double still has the digits
+    times = (seconds - seconds[0]) + rest / round(1 / scale)
+    return pd.Series(times, index=frame.index, name="t")
