@@ -272,7 +272,10 @@ def _fitted(
 
     if loss == "linear":
         return work(readings, None)
-    return robust_fit(work, readings)
+    begin = None
+    if isinstance(model, GreyBox) and not (options.separate or options.estimated_hold):
+        begin = model.with_values(**(options.start or {}))
+    return robust_fit(work, readings, begin)
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.uncertainty.evenness import evenly_spread
-from freqid.fitting.witness import Testimony, groups_of
+from freqid.fitting.witness import Testimony, as_begun, groups_of
 from freqid.lti import PeriodicHold
 from freqid.models import GreyBox
 
@@ -58,21 +58,7 @@ def noise_weighted(
             first, est, seen = other
     if known and est.message != INTERRUPTED:
         est, seen = fitted(model, seen, again(est, options))
-    testimony, problem = est.testimony, est.problem
-    if problem is not None and first.problem is not None and first.problem.others:
-        # later rounds walk from the minimum that the first has chosen
-        problem = dataclasses.replace(problem, others=first.problem.others)
-    if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
-        testimony = testimony.after(first.testimony)
-    found = dataclasses.replace(
-        est,
-        nominal=first.nominal,
-        n_starts=first.n_starts,
-        n_agreed=first.n_agreed,
-        testimony=testimony,
-        problem=problem,
-    )
-    return found, seen
+    return as_begun(est, first), seen
 
 
 def _in_turn(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.uncertainty.minimum import Spread
+from freqid.fitting.witness import as_begun
+from freqid.models import Model
 
 # errors are cut at so many standard deviations; samples beyond three are named
 _CUT, _FAR = 1.5, 3.0
@@ -27,14 +30,23 @@ _CUT, _FAR = 1.5, 3.0
 _STEPS, _STANDS = 30, 0.01
 # the median of |e| in standard deviations of a normal variable
 _MEDIAN = 0.6744897501960817
+# a size that no error has, and logarithms of the scatter within which two estimates are alike
+_NONE, _ALIKE = 1e-300, 1e-3
+# what a search may end in that begins at a model whose errors say nothing
+_LOST = (InputError, np.linalg.LinAlgError, ArithmeticError)
 
 Work = Callable[[Sequence[Reading], Estimate | None], tuple[Estimate, Sequence[Reading]]]
 
 
-def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Sequence[Reading]]:
+def robust_fit(
+    work: Work, readings: Sequence[Reading], begin: Model | None = None
+) -> tuple[Estimate, Sequence[Reading]]:
     """The estimate under Huber's loss, and the readings with their outlying samples cut.
 
-    ``work`` fits readings: anew, or from an estimate. Raises InputError for what has no samples.
+    ``work`` fits readings: anew, or from an estimate. Where spikes have led the fit of all samples
+    astray, its errors cut the wrong ones: unless its witness is complete, a search of what is cut
+    and one of what the model ``begin`` leaves are made as well, and the one that leaves the least
+    scatter is taken. Raises InputError for what has no samples.
     """
     if any(not isinstance(r.data, Record) or r.in_time for r in readings):
         raise InputError(
@@ -43,45 +55,100 @@ def robust_fit(work: Work, readings: Sequence[Reading]) -> tuple[Estimate, Seque
     if any(r.band is not None for r in readings):
         raise InputError("loss='huber' needs all lines: a band spreads a spike over the record")
     est, seen = work(readings, None)
-    cut, inside, count = list(seen), 1.0, 0
+    best = _settled(work, readings, est, seen)
+    for again in (lambda seen: work(seen, None), lambda _: _from(work, readings, begin)):
+        if best.complete or best.noiseless:
+            break
+        try:
+            found = again(best.seen)
+        except _LOST:
+            continue
+        if found is not None:
+            other = _settled(work, readings, *found)
+            # of two that end alike the later one has made the starts that were asked for
+            best = other if other.scatter <= best.scatter + _ALIKE else best
+    samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
+    note = (
+        f"Huber's loss: {best.count} of {samples} samples are off by more than {_FAR:g} standard "
+        "deviations and count less"
+    )
+    est = best.est
+    minimum = dataclasses.replace(est.minimum, inflation=1 / best.inside**2)
+    spread = Spread(est.scatter.change, minimum)
+    robust = with_scatter(dataclasses.replace(est, notes=[*est.notes, note]), minimum, spread)
+    return robust, best.seen
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """An estimate with the readings that it is of, whose errors are cut where they are far off.
+
+    ``inside`` is the part that is not cut, ``count`` samples are far off, and ``scatter`` is the
+    logarithm of the errors' median size, in the mean over outputs.
+    """
+
+    est: Estimate
+    seen: Sequence[Reading]
+    inside: float = 1.0
+    count: int = 0
+    scatter: float = -np.inf
+
+    @property
+    def noiseless(self) -> bool:
+        return self.est.minimum.objective.noiseless(self.est.minimum.cost)
+
+    @property
+    def complete(self) -> bool:
+        return self.est.witness is not None and self.est.witness.verdict == "complete"
+
+
+def _settled(
+    work: Work, readings: Sequence[Reading], est: Estimate, seen: Sequence[Reading]
+) -> _Settled:
+    """Where cutting errors and fitting what is cut, in turn, comes to rest."""
+    first, found = est, _Settled(est, seen)
     for _ in range(_STEPS):
         # what integrates without noise leaves out the line at zero
         readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
-        cut = [r.with_(skip_zero=s.skip_zero) for r, s in zip(cut, seen, strict=True)]
-        if est.minimum.objective.noiseless(est.minimum.cost):
+        cut = [r.with_(skip_zero=s.skip_zero) for r, s in zip(found.seen, seen, strict=True)]
+        if found.noiseless:
             # of what is but rounding no sample is off
             break
-        cut, inside, count = _cut(est, readings, cut)
+        cut, inside, count, scatter = _cut(est, readings, cut)
         before, (est, seen) = est, work(cut, est)
+        found = _Settled(est, cut, inside, count, scatter)
         std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break
-    samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
-    note = (
-        f"Huber's loss: {count} of {samples} samples are off by more than {_FAR:g} standard "
-        "deviations and count less"
-    )
-    minimum = dataclasses.replace(est.minimum, inflation=1 / inside**2)
-    spread = Spread(est.scatter.change, minimum)
-    return with_scatter(dataclasses.replace(est, notes=[*est.notes, note]), minimum, spread), cut
+    return dataclasses.replace(found, est=as_begun(found.est, first))
+
+
+def _from(
+    work: Work, readings: Sequence[Reading], begin: Model | None
+) -> tuple[Estimate, Sequence[Reading]] | None:
+    """The fit of what is left once the errors of a model are cut; None without one."""
+    return None if begin is None else work(_cut(begin, readings, readings)[0], None)
 
 
 def _cut(
-    est: Estimate, readings: Sequence[Reading], fitted: Sequence[Reading]
-) -> tuple[list[Reading], float, int]:
-    """The readings with their errors cut, the part that is not, and how many are far off.
+    found: Estimate | Model, readings: Sequence[Reading], fitted: Sequence[Reading]
+) -> tuple[list[Reading], float, int, float]:
+    """The readings with their errors cut, the part that is not, how many are far off, and the
+    logarithm of the errors' median size.
 
     ``fitted`` are those that the estimate is of: what is cut from them has no part in the initial
     states, either.
     """
-    cut, inside, every, far = [], 0, 0, 0
+    cut, inside, every, far, sizes = [], 0, 0, 0, []
     for r, own in zip(readings, fitted, strict=True):
         record, seen = r.data, own.data
         assert isinstance(record, Record)
         assert isinstance(seen, Record)
-        error = errors_of(met_by(est, own), own).in_time()
+        model = met_by(found, own) if isinstance(found, Estimate) else found
+        error = errors_of(model, own).in_time()
         error = error + (seen.outputs - record.outputs)[: len(error)]
         scale = np.median(np.abs(error), axis=0) / _MEDIAN
+        sizes.append(np.log(np.maximum(scale, _NONE)).mean())
         limit = _CUT * np.where(scale > 0, scale, np.inf)
         held = np.clip(error, -limit, limit)
         inside += int((np.abs(error) <= limit).sum())
@@ -90,4 +157,4 @@ def _cut(
         y: FloatArray = np.array(record.outputs)
         y[: len(error)] += error - held
         cut.append(r.with_(data=dataclasses.replace(record, y=y.reshape(record.y.shape))))
-    return cut, inside / every, far
+    return cut, inside / every, far, float(np.mean(sizes))

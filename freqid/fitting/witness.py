@@ -26,6 +26,7 @@ from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
+from freqid.fitting.estimate import Estimate
 from freqid.fitting.noise_left import weighted_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution, polish
@@ -195,6 +196,26 @@ class Testimony:
             return self.minimum.solution
         begin = structure.start if late else self.minimum.x
         return polish(Objective(structure, [r.experiment() for r in readings]), begin)
+
+
+def as_begun(est: Estimate, first: Estimate) -> Estimate:
+    """An estimate that rounds have walked to, with the starts of the first of them, its other
+    minima and its black boxes.
+    """
+    testimony, problem = est.testimony, est.problem
+    if problem is not None and first.problem is not None and first.problem.others:
+        # later rounds walk from the minimum that the first has chosen
+        problem = dataclasses.replace(problem, others=first.problem.others)
+    if isinstance(testimony, Testimony) and isinstance(first.testimony, Testimony):
+        testimony = testimony.after(first.testimony)
+    return dataclasses.replace(
+        est,
+        nominal=first.nominal,
+        n_starts=first.n_starts,
+        n_agreed=first.n_agreed,
+        testimony=testimony,
+        problem=problem,
+    )
 
 
 def groups_of(structure: GreyStructure, readings: Sequence[Reading]) -> list[list[int]]:
