@@ -69,7 +69,8 @@ def select_order(
     has its reason in ``error``. ``attrs["best"]`` is the order with the least ``criterion``:
     ``"aic"``, ``"mdl"`` or ``"cross_validation"``; ``attrs["feedthrough"]`` and ``attrs["delay"]``
     go with it. Models whose motions certainly grow are not chosen where others explain the data
-    about as well; ``attrs["growing"]`` are their rows. ``n_jobs`` is a number of processes, None
+    about as well; ``attrs["growing"]`` are their rows. Where the largest order of several is chosen
+    ``attrs["note"]`` says what cross-validation takes. ``n_jobs`` is a number of processes, None
     this one, as in ``bootstrap``; with ``progress`` the screen shows how many orders are done.
     Other arguments as in ``fit``. Raises ValueError for no orders, or one that is not a whole
     number, or where none can be fitted.
@@ -121,7 +122,27 @@ def select_order(
     table.attrs["feedthrough"], table.attrs["delay"] = bool(best["feedthrough"]), int(best["delay"])
     table.attrs["criterion"] = criterion
     table.attrs["growing"] = np.flatnonzero(growing).tolist()
+    if note := _at_the_end(table, growing):
+        table.attrs["note"] = note
     return table
+
+
+def _at_the_end(table: pd.DataFrame, growing: BoolArray) -> str:
+    """What is to be said where the largest order of several is chosen; else empty."""
+    best, most = table.attrs["best"], int(table["order"].max())
+    if best < most or most == table["order"].min():
+        return ""
+    said = f"order {best} is the largest of those tried: offer more"
+    held_out = table["cross_validation"].to_numpy()
+    if table.attrs["criterion"] == "cross_validation" or np.isnan(held_out).all():
+        return said
+    other = int(table["order"].iloc[_chosen(held_out, table["mdl"].to_numpy(), growing)])
+    if other == best:
+        return said
+    return (
+        f"{said}, or take order {other} of cross-validation: noise that is far from white asks for "
+        f"more orders than the plant has by {table.attrs['criterion'].upper()}"
+    )
 
 
 def _chosen(scores: FloatArray, mdl: FloatArray, growing: BoolArray) -> int:

@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 
 from freqid.checks import InputError, an, flag, processes, whole
 from freqid.data import Bar, DataSet, Record, as_data_sets, in_turn
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# repeats from which on resamples scatter about as they should
+_ENOUGH = 10
 # what goes to ``fit``
 Options = Mapping[str, Any]
 
@@ -149,8 +152,9 @@ def bootstrap(
     processes (extra ``parallel``), None this one, or what ``joblib.parallel_config`` says
     (``backend="dask"`` for a cluster), with the same numbers; with ``progress`` the screen shows
     how many are done. Returns a DataFrame (n, parameters) whose ``describe`` and ``quantile`` give
-    error bars; NaN where all that were drawn know a parameter by their conditions. Raises
-    ValueError for fewer than three records.
+    error bars; NaN where all that were drawn know a parameter by their conditions. Few repeats
+    scatter less than they say: ``attrs["note"]`` of fewer than ten tells by how much their
+    intervals are too narrow. Raises ValueError for fewer than three records.
 
     Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6.
     """
@@ -175,7 +179,23 @@ def bootstrap(
         values = in_turn(work, each, n_jobs, lambda i: advance(times[each[i]]))
     known = dict(zip(each, values, strict=True))
     columns = list(_values(whole_fit))
-    return pd.DataFrame([known[d] for d in drawn], columns=columns)
+    table = pd.DataFrame([known[d] for d in drawn], columns=columns)
+    if len(sets) < _ENOUGH:
+        table.attrs["note"] = _narrow(len(sets))
+    return table
+
+
+def _narrow(repeats: int) -> str:
+    """By how much intervals from resamples of few repeats are too narrow, in words: a mean's own
+    scatter is √((n − 1)/n) of what its resamples have, and follows Student's t.
+    """
+    degrees = repeats - 1
+    times = np.sqrt(repeats / degrees) * scipy.stats.t.ppf(0.975, degrees) / 1.96
+    return (
+        f"{repeats} repeats: intervals of 95 % from these resamples are about {times:.2g} times "
+        "too narrow (the square root of n/(n - 1), and Student's t); take more repeats, or the "
+        "error bars of fit"
+    )
 
 
 def _drawn_again(
