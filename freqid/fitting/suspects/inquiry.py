@@ -16,6 +16,7 @@ from freqid.fitting.suspects.all_suspects import SUSPECTS
 from freqid.fitting.suspects.asking import Lone
 from freqid.fitting.suspects.between_periods import beyond_noise
 from freqid.fitting.suspects.beyond import looped, midway, unlike
+from freqid.fitting.suspects.by_boxes import weighed_by_boxes
 from freqid.fitting.suspects.coarse import coarse
 from freqid.fitting.suspects.free_motion import still_moving
 from freqid.fitting.suspects.ghosts import in_noise
@@ -68,6 +69,9 @@ LEVEL = 0.0065
 @dataclass(frozen=True, eq=False)
 class Inquiry(Lone):
     """What a fit could lack, asked when it is wanted."""
+
+    # whether its noise is already that of black boxes
+    by_boxes: bool = False
 
     @cached_property
     def _apart(self) -> dict[str, list[Estimate | None]]:
@@ -188,9 +192,17 @@ class Inquiry(Lone):
         loop = looped(self, scene, limit)
         return ranked if loop is None else [loop, *(a for a in ranked if a.name != "feedback")]
 
+    @cached_property
+    def _anew(self) -> Inquiry | None:
+        """The same with the noise of black boxes, if the fit has learnt its faults as noise."""
+        found = None if self.by_boxes else weighed_by_boxes(self)
+        return None if found is None else Inquiry(*vars(found).values(), by_boxes=True)
+
     @tuned
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects, or that there has to be one."""
+        if self._anew is not None and (told := self._anew.findings()):
+            return told
         first = no_values(self.minimum, self.readings) or leakage(self.scene, self._leak)
         if any(f.severity == "serious" for f in first):
             return first
@@ -272,6 +284,8 @@ class Inquiry(Lone):
     @tuned
     def table(self) -> pd.DataFrame:
         """The suspects by name, first what is said first; see ``Estimate.suspects``."""
+        if self._anew is not None:
+            return self._anew.table()
         said = [HOLDS if a.name == "hold rejected" else (a.name,) for a in self.named[:1]]
         first = [a for a in self.asked if said and a.name in said[0]]
         return suspects_table({

@@ -95,7 +95,8 @@ class _Shifted:
     ) -> None:
         self.readings, self.which = inquiry.readings, which
         start = dict(zip(found.physical_names, found.values, strict=False))
-        self.structure = GreyStructure(found.model.with_values(**start))
+        # where the user began, which rounds of noise have left
+        self.structure = GreyStructure(found.model.with_values(**(start | found.meant)))
         # where each number of samples has led, and what it left
         self.ends = {0: inquiry.minimum.x * found.scale / self.structure.scale}
         self.known = {0: now}

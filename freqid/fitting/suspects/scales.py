@@ -137,7 +137,8 @@ def _tried(inquiry: Asking) -> tuple[GreyBox, list[tuple[Estimate, _Channel]]]:
     if not isinstance(model, GreyBox) or not plain(structure):
         return cast(GreyBox, model), []
     start = dict(zip(structure.physical_names, structure.values, strict=False))
-    begun = model.with_values(**start)
+    # where the user began, which rounds of noise have left
+    begun = model.with_values(**(start | structure.meant))
     fits = [(_fitted(begun, c, inquiry.readings), c) for c in _channels(inquiry, model)]
     found = [(f, c) for f, c in fits if f is not None]
     return begun, sorted(found, key=lambda each: each[0].minimum.cost)

@@ -79,7 +79,8 @@ def turned_and_complete(
         bad = quiet or shares(inquiry.minimum, scene).max() > _LEFT
         lone = next(at_places(inquiry), None) if bad else None
         return ([], False) if lone is None else turned_and_complete(*lone, quiet)
-    start = dict(zip(structure.physical_names, structure.values, strict=False))
+    # where the user began, which rounds of noise have left
+    start = dict(zip(structure.physical_names, structure.values, strict=False)) | structure.meant
     begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
     asked = _Asked(inquiry, shares(inquiry.minimum, scene), quiet)
     # the mirror image of a mode explains as much with another sign
