@@ -196,7 +196,9 @@ class Inquiry(Lone):
     def _anew(self) -> Inquiry | None:
         """The same with the noise of black boxes, if the fit has learnt its faults as noise."""
         found = None if self.by_boxes else weighed_by_boxes(self)
-        return None if found is None else Inquiry(*vars(found).values(), by_boxes=True)
+        if found is None:
+            return None
+        return Inquiry(found.minimum, found.model, found.readings, found.share, by_boxes=True)
 
     @tuned
     def findings(self) -> list[Finding]:
