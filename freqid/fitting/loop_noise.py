@@ -27,7 +27,7 @@ from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution
 from freqid.fitting.uncertainty.at_rest import score_at_rest
-from freqid.fitting.uncertainty.gradient_noise import leverage
+from freqid.fitting.uncertainty.leverage import leverage
 from freqid.fitting.uncertainty.shared_noise import Chance
 from freqid.lti import Plane, Realisation
 from freqid.models import DiscreteModel, Model

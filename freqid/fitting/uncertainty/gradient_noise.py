@@ -14,8 +14,10 @@ from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.periodic_experiments import PeriodicExperiment
 from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.cost.time_experiments import TimeExperiment
-from freqid.fitting.uncertainty.noise_of_series import MOST_LEVERAGE, of_series
-from freqid.fitting.uncertainty.noise_spectrum import local_mean, of_outputs
+from freqid.fitting.uncertainty.leverage import leverage
+from freqid.fitting.uncertainty.noise_of_series import of_series
+from freqid.fitting.uncertainty.noise_spectrum import local_mean
+from freqid.fitting.uncertainty.outputs_together import of_outputs
 from freqid.lti import Realisation, tuned
 
 # means for each unknown from which they tell their own noise
@@ -73,8 +75,7 @@ def score_covariance(
             size = e.lines.scale.reshape(*e.n_channels, -1)
             total += _of_response(J, left, size, e.reach, e.line_noise)
         else:
-            left = left / np.sqrt(1 - leverage(J, Q))
-            total += of_outputs(J, left, e)
+            total += of_outputs(J, Q, left, e)
         rows += e.n_rows
         unknown += 0 if delta is None else len(delta)
         H, cost = H + J @ J.T, cost + float(r @ r)
@@ -182,18 +183,6 @@ def _around(each: FloatArray, e: PeriodicExperiment, p: int) -> FloatArray:
     lines = each.reshape(count, -1).mean(axis=0)
     width = min(-(-_VALUES // (count * p)) | 1, len(lines))
     return np.tile(scipy.ndimage.uniform_filter1d(lines, width, mode="reflect"), count)
-
-
-def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
-    """Part of each complex error that parameters and initial state take on themselves, twice each,
-    (rows,): the few lines that tell a parameter leave less than their noise (MacKinnon and White,
-    J. Econometrics 29, 1985).
-    """
-    gram = J @ J.T
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    half = np.linalg.pinv(gram / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    own = np.einsum("ak,ak->k", J, half @ J) + np.einsum("qk,qk->k", Q, Q)
-    return np.repeat(np.minimum(own.reshape(-1, 2).mean(axis=1), MOST_LEVERAGE), 2)
 
 
 def _of_stamps(

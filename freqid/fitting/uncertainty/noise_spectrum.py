@@ -7,7 +7,7 @@ import scipy
 
 from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.cost.experiments import SpectralExperiment
-from freqid.fitting.uncertainty.evenness import err_together, evenly_spread
+from freqid.fitting.uncertainty.evenness import evenly_spread
 
 # median step of the logarithm of variances from line to line above which they are those of a few
 # averages (of ten 0.3), and by how much one is above its neighbours that is none of theirs
@@ -27,7 +27,7 @@ def smoothed_power(error: ComplexArray) -> FloatArray:
     """
     power = np.abs(error) ** 2
     K = power.shape[-1]
-    shape = _autoregressive(power.reshape(-1, K)).reshape(power.shape)
+    shape = autoregressive(power.reshape(-1, K)).reshape(power.shape)
     return shape * local_mean(power / shape)
 
 
@@ -60,7 +60,7 @@ def _spectrum(error: ComplexArray, n_samples: int = 0) -> FloatArray:
     may have few.
     """
     power = np.abs(error) ** 2
-    shape = _autoregressive(power, n_samples)
+    shape = autoregressive(power, n_samples)
     whitened = power / shape
     local = local_mean(whitened)
     for row, each in enumerate(whitened):
@@ -78,7 +78,7 @@ def local_mean(power: FloatArray) -> FloatArray:
     return np.maximum(smooth, 0.0)
 
 
-def _autoregressive(power: FloatArray, n_samples: int = 0) -> FloatArray:
+def autoregressive(power: FloatArray, n_samples: int = 0) -> FloatArray:
     """Spectra of autoregressions for periodograms (channels, K), ones where none is needed.
 
     Lines of a band count as all there are. The whole DFT of ``n_samples`` has each at its own
@@ -168,19 +168,3 @@ def local_power(residual: FloatArray, e: SpectralExperiment) -> FloatArray:
     # half of a complex error's power is in each of its parts
     power: FloatArray = np.repeat(local.ravel() / 2, 2)
     return power
-
-
-def of_outputs(J: FloatArray, left: FloatArray, e: SpectralExperiment) -> FloatArray:
-    """J C Jᵀ (P, P), what the noise of a record's outputs makes of the gradient of rows J (P, rows)
-    that leave these (rows,): each output's own colour, and where they share noise what they share.
-    """
-    power = local_power(left, e)
-    if not err_together(left, e):
-        return (J * power) @ J.T
-    size = np.sqrt(power)
-    each = (J * size).view(complex).reshape(len(J), -1, e.n_lines)
-    unit = (left / np.where(size > 0, size, np.inf)).view(complex).reshape(-1, e.n_lines)
-    between = unit @ unit.conj().T
-    own = np.sqrt(np.diag(between).real)
-    between /= np.where(own > 0, np.outer(own, own), 1)
-    return np.einsum("aik,ij,bjk->ab", each.conj(), between, each, optimize=True).real
