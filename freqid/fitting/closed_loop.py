@@ -22,7 +22,8 @@ from freqid.fitting.black_box.output_error import with_scatter
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.heard_back import related
 from freqid.fitting.loop_box import LoopBox
-from freqid.fitting.loop_noise import Loop, LoopShare, loop_scores
+from freqid.fitting.loop_lines import Loop
+from freqid.fitting.loop_noise import LoopShare, loop_scores
 from freqid.fitting.noise_models import NoiseModel, as_noise_model
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of

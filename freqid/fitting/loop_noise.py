@@ -10,114 +10,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy
 
-from freqid.checks import ComplexArray, FloatArray, IntArray
-from freqid.data import Record
+from freqid.checks import ComplexArray, FloatArray
 from freqid.fitting.black_box.reference import Reference
-from freqid.fitting.cost.charts import Chart
-from freqid.fitting.cost.evaluation import projected
-from freqid.fitting.cost.experiments import Experiment, SpectralExperiment
+from freqid.fitting.cost.experiments import SpectralExperiment
 from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.estimate import Estimate
+from freqid.fitting.loop_lines import Fitted, Loop, Stage, inner, late_response, scores_of
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import Solution
 from freqid.fitting.uncertainty.at_rest import score_at_rest
-from freqid.fitting.uncertainty.leverage import leverage
 from freqid.fitting.uncertainty.shared_noise import Chance
-from freqid.lti import Plane, Realisation
 from freqid.models import DiscreteModel, Model
 
 # directions of the unknowns below this part of the strongest, in JᵀJ and in J, are not told
 _LOOSE, _SAME = 1e-14, 1e-7
-
-
-@dataclass(frozen=True, eq=False)
-class Loop:
-    """A black box of a loop, at ``x`` of its chart, and the records from reference to input and
-    output, in units of ``size``, that it was fitted to; ``places`` are their numbers in the fit.
-    """
-
-    chart: Chart
-    x: FloatArray
-    readings: Sequence[Reading]
-    size: FloatArray
-    places: Sequence[int]
-
-    @property
-    def lasted(self) -> list[float]:
-        """Duration of each record in s."""
-        records = [r.data for r in self.readings]
-        return [d.n_samples * d.dt for d in records if isinstance(d, Record)]
-
-    @cached_property
-    def stages(self) -> list[_Stage]:
-        """The black box at the lines of each record, computed once for all that is asked."""
-        at = self.chart.realise(self.x)
-        seen = [r.lines(Plane()).in_plane(self.chart.plane) for r in self.readings]
-        pairs = zip(seen, self.lasted, strict=True)
-        return [_Stage.of(lines, lines.at(at), duration) for lines, duration in pairs]
-
-
-@dataclass(frozen=True)
-class _Stage:
-    """Jacobian (P, channels, K), residual (channels, K) and what scales them, at lines (K,)."""
-
-    number: IntArray
-    jacobian: ComplexArray
-    residual: ComplexArray
-    scale: FloatArray
-
-    @classmethod
-    def of(
-        cls, e: SpectralExperiment, evaluation: object, duration: float, moving: bool = True
-    ) -> _Stage:
-        r, Q, delta = projected(evaluation)  # type: ignore[arg-type]
-        started = delta if moving or delta is None else np.zeros_like(delta)
-        J = evaluation.jacobian(started)  # type: ignore[attr-defined]
-        J = np.ascontiguousarray(J - (J @ Q.T) @ Q)
-        # few lines that tell a parameter leave less than their noise
-        return cls.along(e, J, r / np.sqrt(1 - leverage(J, Q)), duration)
-
-    @classmethod
-    def along(cls, e: SpectralExperiment, J: FloatArray, r: FloatArray, duration: float) -> _Stage:
-        """Of rows J (P, rows) and what is left (rows,), of a record of ``duration`` (s)."""
-        number = np.round(e.lines.omega * duration / (2 * np.pi)).astype(int)
-        shape = -1, e.n_lines
-        return cls(
-            number, J.view(complex).reshape(len(J), *shape), r.view(complex).reshape(shape),
-            e.lines.scale[:, 0],
-        )  # fmt: skip
-
-    @property
-    def scores(self) -> FloatArray:
-        """What each line adds to the gradient, (P, K)."""
-        return np.einsum("ack,ck->ak", self.jacobian, self.residual.conj()).real
-
-
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """What was fitted to one record: derivatives and what is left, and its response there."""
-
-    stage: _Stage
-    response: ComplexArray
-
-    @classmethod
-    def of(
-        cls, e: Experiment, at: Realisation, model: Model, reading: Reading, moving: bool = True
-    ) -> _Fitted | None:
-        """None where the data are no lines of a record; ``moving`` counts what the free motion from
-        its start tells of the plant.
-        """
-        record = reading.data
-        if not isinstance(e, SpectralExperiment) or not isinstance(record, Record):
-            return None
-        G = model.responses_at(e.lines.omega, None if model.dt else reading.hold)
-        return cls(_Stage.of(e, e.at(at), record.n_samples * record.dt, moving), G)
 
 
 def loop_scores(
@@ -130,16 +41,16 @@ def loop_scores(
     plant = minimum.structure.realise(minimum.x)
     fitted, still = (
         [
-            _Fitted.of(e, plant, met_by(est, r), r, moving)
+            Fitted.of(e, plant, met_by(est, r), r, moving)
             for e, r in zip(minimum.experiments, readings, strict=True)
         ]
         for moving in (True, False)
     )
-    found = _scores(dict(enumerate(fitted)), loops)
+    found = scores_of(dict(enumerate(fitted)), loops)
     share = LoopShare(loops, [f.response for f in fitted if f is not None])
     if found is None:
         return None, share
-    return score_at_rest(found, _scores(dict(enumerate(still)), loops)), share
+    return score_at_rest(found, scores_of(dict(enumerate(still)), loops)), share
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +60,19 @@ class LoopShare:
     """
 
     loops: Sequence[Loop]
-    # of the plant that was fitted, at the lines of each record
+    # of the plant that was fitted, at the lines of each record, and the samples by which inputs
+    # come late that the data have been put in step by
     responses: Sequence[ComplexArray] = ()
+    shifts: Sequence[int] = ()
+
+    def in_step(
+        self, shifts: Sequence[int], model: Model, readings: Sequence[Reading]
+    ) -> LoopShare:
+        """The same for the plant without so many samples of delay, and data in step with it."""
+        if not any(shifts):
+            return self
+        responses = [late_response(model, r.lines(), r, shifts) for r in readings]
+        return LoopShare([loop.in_step(shifts) for loop in self.loops], responses, shifts)
 
     def along(
         self,
@@ -161,7 +83,7 @@ class LoopShare:
         """What noise tells along ``ways`` (q, rows of an experiment) at each line (q, lines) where
         these are ``left`` (rows,); None where it is not known.
         """
-        fitted: dict[int, _Fitted | None] = {}
+        fitted: dict[int, Fitted | None] = {}
         if len(self.responses) != len(experiments):
             return None
         lasted = {
@@ -170,8 +92,8 @@ class LoopShare:
         for i, (e, V, r, G) in enumerate(zip(experiments, ways, left, self.responses, strict=True)):
             if G.shape[-1] != e.n_lines or i not in lasted:
                 return None
-            fitted[i] = _Fitted(_Stage.along(e, V, r, lasted[i]), G)
-        found = _scores(fitted, self.loops)
+            fitted[i] = Fitted(Stage.along(e, V, r, lasted[i]), G)
+        found = scores_of(fitted, self.loops)
         return None if found is None else found[0]
 
     def __call__(
@@ -191,11 +113,11 @@ class LoopShare:
             place, hold = box.chart.realise(box.solution.x), readings[group[0]].hold
             model = DiscreteModel(box.chart.in_z(box.solution.x), box.chart.dt, hold, (), ())
             plant = {
-                i: _Fitted.of(r.lines(), at, structure.at(grey.x, r.place), r)
+                i: Fitted.of(r.lines(), at, structure.at(grey.x, r.place), r, shifts=self.shifts)
                 for i, r in ((i, readings[i]) for i in group)
             }
             parts = {
-                i: _Fitted.of(e, place, model, readings[i])
+                i: Fitted.of(e, place, model, readings[i], shifts=self.shifts)
                 for i, e in zip(group, box.objective.experiments, strict=True)
             }
             told.append(_along_box(plant, parts, self.loops))
@@ -214,14 +136,14 @@ class LoopShare:
 
 
 def _along_box(
-    plant: Mapping[int, _Fitted | None],
-    box: Mapping[int, _Fitted | None],
+    plant: Mapping[int, Fitted | None],
+    box: Mapping[int, Fitted | None],
     loops: Sequence[Loop],
 ) -> tuple[FloatArray, FloatArray] | None:
     """What noise tells in the directions of a black box at each line (q, lines), and derivatives of
     the plant (P, q) there; None where that is not known, or they stand at other lines.
     """
-    found = _scores(box, loops)
+    found = scores_of(box, loops)
     pairs = [
         (a.stage.jacobian, b.stage.jacobian)
         for a, b in zip(plant.values(), box.values(), strict=True)
@@ -232,8 +154,8 @@ def _along_box(
         return None
     scores, H = found
     ways = _ways(H)
-    own: FloatArray = np.sum([_inner(a, b) for a, b in pairs], axis=0) @ ways
-    size = np.sum([np.diag(_inner(a, a)) for a, _ in pairs], axis=0)
+    own: FloatArray = np.sum([inner(a, b) for a, b in pairs], axis=0) @ ways
+    size = np.sum([np.diag(inner(a, a)) for a, _ in pairs], axis=0)
     return ways.T @ scores, own / np.sqrt(np.maximum(size, 1e-300))[:, None]
 
 
@@ -244,43 +166,3 @@ def _ways(H: FloatArray) -> FloatArray:
     told = s > _LOOSE * s.max()
     ways: FloatArray = V[:, told] / np.sqrt(s[told]) / size[:, None]
     return ways
-
-
-def _inner(a: ComplexArray, b: ComplexArray) -> FloatArray:
-    """Products (P, Q) of rows of Jacobians, (P, channels, K) and (Q, channels, K)."""
-    return np.einsum("ack,bck->ab", a, b.conj()).real
-
-
-def _scores(
-    fitted: Mapping[int, _Fitted | None], loops: Sequence[Loop]
-) -> tuple[FloatArray, FloatArray] | None:
-    """Scores at each line (P, lines), and JᵀJ; None unless all records went through a loop."""
-    loops = [one for one in loops if all(place in fitted for place in one.places)]
-    if sorted(p for one in loops for p in one.places) != sorted(fitted):
-        return None
-    every, square = [], []
-    for loop in loops:
-        boxes, own, effects = [], [], []
-        for i, place in enumerate(loop.places):
-            part = fitted[place]
-            if part is None:
-                return None
-            stage = part.stage
-            box = loop.stages[i]
-            # the input's error at the lines of the plant's fit, through the plant
-            at = np.searchsorted(box.number, stage.number)
-            m = part.response.shape[1]
-            moved = box.jacobian[:, :m, at] / box.scale[:m, at] * loop.size[:m, None]
-            seen = np.einsum("pmk,amk->apk", part.response, moved) * stage.scale
-            effects.append(_inner(stage.jacobian, seen))
-            boxes.append(box)
-            own.append((stage, at))
-        H = np.sum([_inner(b.jacobian, b.jacobian) for b in boxes], axis=0)
-        back = np.sum(effects, axis=0) @ np.linalg.pinv(H, hermitian=True)
-        for box, (stage, at) in zip(boxes, own, strict=True):
-            both = -back @ box.scores
-            both[:, at] += stage.scores
-            every.append(both)
-            square.append(_inner(stage.jacobian, stage.jacobian))
-    scores = np.concatenate(every, axis=1) if every else np.array([np.nan])
-    return (scores, np.sum(square, axis=0)) if np.isfinite(scores).all() else None

@@ -21,7 +21,7 @@ import scipy
 
 from freqid.checks import InputError
 from freqid.data import StampedRecord
-from freqid.fitting.black_box.late import plant_in_step
+from freqid.fitting.black_box.late import plant_in_step, whole_samples
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import MOST_UNKNOWNS, PlacedStructure
@@ -35,7 +35,7 @@ from freqid.fitting.uncertainty.minimum import Minimum, Spread
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
 from freqid.fitting.uncertainty.shared_noise import Chance, InputNoise, chance_of, noise_freedom
 from freqid.lti import tuned
-from freqid.models import observed_order
+from freqid.models import Model, observed_order
 
 # level below which the black box explains the data so much better that it is no chance
 _LEVEL = 0.01
@@ -70,6 +70,10 @@ class Share(InputNoise, Protocol):
         """What chance explains; None where it is not known."""
         ...
 
+    def in_step(self, shifts: Sequence[int], model: Model, readings: Sequence[Reading]) -> Share:
+        """The same for data put in step with a plant whose inputs come so many samples late."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Testimony:
@@ -99,15 +103,25 @@ class Testimony:
         if any(r.initial_state == "zero" for r in self.readings):
             return Witness("absent", "an initial state at rest is none of a black box's lines")
         try:
-            if structure.model.delay_sources:
-                structure, readings = plant_in_step(structure, self.minimum.x, self.readings)
-            else:
-                readings = [r.beside() for r in self.readings]
-            return self._heard(structure, readings)
+            if not structure.model.delay_sources:
+                return self._heard(structure, [r.beside() for r in self.readings], self.share)
+            structure, readings = plant_in_step(structure, self.minimum.x, self.readings)
+            return self._heard(structure, readings, self._share_in_step(structure, readings))
         except (InputError, np.linalg.LinAlgError) as error:
             return Witness("absent", str(error))
 
-    def _heard(self, structure: GreyStructure, readings: Sequence[Reading]) -> Witness:
+    def _share_in_step(self, near: GreyStructure, readings: Sequence[Reading]) -> Share | None:
+        """What the inputs' errors add beside the plant in step; None where that is not known."""
+        structure = self.minimum.structure
+        assert isinstance(structure, GreyStructure)
+        if self.share is None or isinstance(structure, PlacedStructure):
+            return None
+        shifts = whole_samples(structure.at(self.minimum.x), self.readings[0])
+        return self.share.in_step(shifts, near.at(near.start), readings)
+
+    def _heard(
+        self, structure: GreyStructure, readings: Sequence[Reading], share: Share | None
+    ) -> Witness:
         grey = self._grey(structure, readings)
         placed = isinstance(structure, PlacedStructure)
         order = structure.order if placed else observed_order(structure.model)  # type: ignore[attr-defined]
@@ -134,8 +148,8 @@ class Testimony:
         if top < 1:
             return self._alike(order, cost, grey.cost / cost - 1)
         chance = None
-        if self.share is not None and structure is self.minimum.structure:
-            chance = self.share(structure, grey, boxes, groups_of(structure, readings), readings)
+        if share is not None:
+            chance = share(structure, grey, boxes, groups_of(structure, readings), readings)
         if chance is None:
             chance = chance_of([(b.objective, b.solution.x) for b in boxes], top)
         f = excess(structure, readings, boxes, grey) * bottom / top / chance.times

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from freqid.fitting.black_box.late import plant_in_step
+from freqid.fitting.black_box.late import plant_in_step, whole_samples
 from freqid.fitting.cost.objective import Objective
 from freqid.fitting.cost.placed_structure import PlacedStructure
 from freqid.fitting.cost.structures import GreyStructure
@@ -29,5 +29,8 @@ def without_delay(inquiry: Asking) -> tuple[InStep, Scene] | None:
     near, readings = plant_in_step(structure, inquiry.minimum.x, inquiry.readings)
     objective = Objective(near, [r.lines() for r in readings])
     minimum = Minimum(objective, polish(objective, near.start))
-    step = InStep(minimum, near.at(minimum.x), readings)
-    return step, Scene.of(minimum, readings)
+    share, model = inquiry.share, near.at(minimum.x)
+    if share is not None:
+        shifts = whole_samples(structure.at(inquiry.minimum.x), inquiry.readings[0])
+        share = share.in_step(shifts, model, readings)
+    return InStep(minimum, model, readings, share), Scene.of(minimum, readings, share)
