@@ -39,8 +39,8 @@ def flown(seed: int) -> fq.Record:
 @pytest.mark.study
 @pytest.mark.parametrize("seeds", [range(2), range(2, 16)])
 def test_the_witness_knows_the_loops_noise_behind_a_delay(seeds: range) -> None:
-    """It took what the explained input's own errors leave for noise of the output alone: a black box
-    explained right fits "better", p down to 1e-50, in 5 of 8 records.
+    """It took what errors of the explained input leave for noise of the output alone: a black box
+    explained the data of right fits "better", p down to 1e-50, in 5 of 8 records.
     """
     free = [fq.Parameter(n, v) for n, v in TRUE.items()]
     model = fq.GreyBox(matrices, [*free, fq.Parameter("Td", 0.01)], input_delay="Td")
