@@ -158,6 +158,14 @@ def test_oscilloscopes_settings_hide_no_names(tmp_path: Path) -> None:
     assert record.input_names == ("cmd",)
 
 
+def test_settings_tell_units_above_the_names(tmp_path: Path) -> None:
+    """As TwinCAT's scope and Tektronix write them."""
+    head = "Name,drive\nSampleTime[ms],10,10\nUnit,Nm,deg\n\nTime [ms],torque,angle\n"
+    record = fq.read(table(tmp_path / "a.csv", head, 1e3 * T))
+    same(record)
+    assert record.units == {"torque": "Nm", "angle": "deg"}
+
+
 TIMES = {
     "IEC": [f"T#{10 * k}ms" for k in K],
     "colons": [f"10:00:00:{10 * k:03d}" for k in K],

@@ -63,7 +63,8 @@ def _names_and_units(full: Sequence[list[str]]) -> tuple[list[str], list[str]]:
         if at == last or (is_a_unit(units[0].strip("[]() ")) and _are_distinct(above)):
             return above, units
     if last > 0 and _are_units(full[last - 1], full[last]) and _are_distinct(full[last]):
-        return full[last], full[last - 1]
+        # in front of those of settings stands what they are: "Unit"
+        return full[last], [u if is_a_unit(u.strip("[]() ")) else "" for u in full[last - 1]]
     return full[last], []
 
 
