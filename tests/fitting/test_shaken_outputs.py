@@ -34,7 +34,8 @@ def shaken(seed: int) -> fq.Record:
 @pytest.mark.parametrize("weights", ["noise", None])
 def test_error_bars_know_that_outputs_are_shaken_together(weights: str | None) -> None:
     """They took what outputs share for the same at all lines, sensors' noise and mode alike: errors
-    of an aircraft's yaw derivatives were 2 to 2.5 of their bars, rms.
+    were 2.5 of their bars, rms, where the mode tells a parameter, and 0.35 where it does not. Of a
+    mode a few lines wide no more is told than that they are 1.6 to 1.85.
     """
     both = (-np.inf, np.inf)
     model = fq.GreyBox(matrices, [fq.Parameter(n, v, physical=both) for n, v in TRUE.items()])
@@ -44,5 +45,5 @@ def test_error_bars_know_that_outputs_are_shaken_together(weights: str | None) -
         std = est.parameters["std"]
         z.append([(est[n] - v) / std[n] for n, v in TRUE.items()])
     rms = np.sqrt(np.mean(np.square(z), axis=0))
-    assert rms.max() < 1.6
-    assert rms.min() > 0.7
+    assert rms.max() < 1.9
+    assert rms.min() > 0.8

@@ -25,11 +25,11 @@ def leverage(J: FloatArray, Q: FloatArray) -> FloatArray:
 
 
 def before_the_fit(J: FloatArray, Q: FloatArray, left: FloatArray, n_lines: int) -> FloatArray:
-    """What a fit without each line would leave there (rows,): (I − H)⁻¹ times what is left of its
-    outputs, H being their own part of the matrix that projects rows on the unknowns.
+    """What is left (rows,) as large as the noise before unknowns followed it: at each line the
+    inverse root of I − H times what is left of its outputs, H being their own part of the matrix
+    that projects rows on the unknowns.
 
-    Source: the jackknife of clusters: Bell and McCaffrey, Survey Methodology 28, 2002, and for
-    single lines MacKinnon and White, J. Econometrics 29, 1985 (HC3).
+    Source: clusters of linear regressions: Bell and McCaffrey, Survey Methodology 28, 2002.
     """
     J = J / np.maximum(np.linalg.norm(J, axis=1, keepdims=True), 1e-300)
     s, V = np.linalg.eigh(J @ J.T)
@@ -46,6 +46,6 @@ def before_the_fit(J: FloatArray, Q: FloatArray, left: FloatArray, n_lines: int)
     kept, turn = np.linalg.eigh(np.eye(here.shape[1]) - here @ here.swapaxes(1, 2))
     found = left.reshape(shape).copy()
     values = found[:, some].swapaxes(0, 1).reshape(len(some), -1, 1)
-    along = turn.swapaxes(1, 2) @ values / np.maximum(kept, _LEAST)[..., None]
+    along = turn.swapaxes(1, 2) @ values / np.sqrt(np.maximum(kept, _LEAST))[..., None]
     found[:, some] = (turn @ along).reshape(len(some), -1, 2).swapaxes(0, 1)
     return found.reshape(-1)
