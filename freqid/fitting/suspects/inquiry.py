@@ -195,16 +195,18 @@ class Inquiry(Lone):
     @cached_property
     def _anew(self) -> Inquiry | None:
         """The same with the noise of black boxes, if the fit has learnt its faults as noise."""
-        found = None if self.by_boxes else weighed_by_boxes(self)
-        if found is None:
+        if self.by_boxes or (f := weighed_by_boxes(self)) is None:
             return None
-        return Inquiry(found.minimum, found.model, found.readings, found.share, by_boxes=True)
+        anew = Inquiry(f.minimum, f.model, f.readings, f.share, by_boxes=True)
+        return anew if anew._said else None
 
     @tuned
     def findings(self) -> list[Finding]:
         """Sentences on the strongest suspects, or that there has to be one."""
-        if self._anew is not None and (told := self._anew.findings()):
-            return told
+        return (self._anew or self)._said
+
+    @cached_property
+    def _said(self) -> list[Finding]:
         first = no_values(self.minimum, self.readings) or leakage(self.scene, self._leak)
         if any(f.severity == "serious" for f in first):
             return first
@@ -233,8 +235,7 @@ class Inquiry(Lone):
         turn, complete = turned_and_complete(self, scene)
         if turn and (complete or not outdone(turn[0].number or 0.0, self.named, scene)):
             return instead_of_swapped(self, turn) or turn
-        named = self.named
-        if named and (other := instead(self, scene, named)):
+        if (named := self.named) and (other := instead(self, scene, named)):
             return other
         if held := held_elsewhere(self, scene, named, self._against):
             return held
@@ -286,7 +287,7 @@ class Inquiry(Lone):
     @tuned
     def table(self) -> pd.DataFrame:
         """The suspects by name, first what is said first; see ``Estimate.suspects``."""
-        if self._anew is not None:
+        if self._anew:
             return self._anew.table()
         said = [HOLDS if a.name == "hold rejected" else (a.name,) for a in self.named[:1]]
         first = [a for a in self.asked if said and a.name in said[0]]
