@@ -45,12 +45,7 @@ class Loop:
         for r in self.readings:
             d = r.data
             assert isinstance(d, Record)
-            kept = slice(first, d.n_samples + behind)
-            part = Record(
-                d.inputs[kept], d.outputs[kept], d.dt, d.hold, input_names=d.input_names,
-                output_names=d.output_names,
-            )  # fmt: skip
-            readings.append(r.of_part(part))
+            readings.append(r.of_part(d.slice(first * d.dt, (d.n_samples + behind) * d.dt)))
         return dataclasses.replace(self, readings=readings)
 
     @cached_property

@@ -20,9 +20,10 @@ from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.uncertainty.minimum import Spread
 from freqid.fitting.witness import as_begun
-from freqid.models import Model
+from freqid.models import GreyBox, Model
 
 # errors are cut at so many standard deviations; samples beyond three are named
 _CUT, _FAR = 1.5, 3.0
@@ -57,16 +58,16 @@ def robust_fit(
     est, seen = work(readings, None)
     best = _settled(work, readings, est, seen)
     for again in (lambda seen: work(seen, None), lambda _: _from(work, readings, begin)):
-        if best.complete or best.noiseless:
+        if best.at_rest:
             break
         try:
             found = again(best.seen)
+            other = None if found is None else _settled(work, readings, *found)
         except _LOST:
             continue
-        if found is not None:
-            other = _settled(work, readings, *found)
-            # of two that end alike the later one has made the starts that were asked for
-            best = other if other.scatter <= best.scatter + _ALIKE else best
+        # of two that end alike the later one has made the starts that were asked for
+        if other is not None and other.scatter <= best.scatter + _ALIKE:
+            best = other
     samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
     note = (
         f"Huber's loss: {best.count} of {samples} samples are off by more than {_FAR:g} standard "
@@ -98,8 +99,11 @@ class _Settled:
         return self.est.minimum.objective.noiseless(self.est.minimum.cost)
 
     @property
-    def complete(self) -> bool:
-        return self.est.witness is not None and self.est.witness.verdict == "complete"
+    def at_rest(self) -> bool:
+        """Whether nothing else is worth a search: a black box begins by itself in each round."""
+        if self.noiseless or self.est.message == INTERRUPTED:
+            return True
+        return not isinstance(self.est.model, GreyBox) or self.est.witness.verdict == "complete"
 
 
 def _settled(
@@ -111,7 +115,7 @@ def _settled(
         # what integrates without noise leaves out the line at zero
         readings = [r.with_(skip_zero=s.skip_zero) for r, s in zip(readings, seen, strict=True)]
         cut = [r.with_(skip_zero=s.skip_zero) for r, s in zip(found.seen, seen, strict=True)]
-        if found.noiseless:
+        if found.noiseless or est.message == INTERRUPTED:
             # of what is but rounding no sample is off
             break
         cut, inside, count, scatter = _cut(est, readings, cut)

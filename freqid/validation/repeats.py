@@ -186,8 +186,8 @@ def bootstrap(
 
 
 def _narrow(repeats: int) -> str:
-    """By how much intervals from resamples of few repeats are too narrow, in words: a mean's own
-    scatter is √((n − 1)/n) of what its resamples have, and follows Student's t.
+    """By how much intervals from resamples of few repeats are too narrow, in words: their
+    scatter is √((n − 1)/n) of the mean's own, which follows Student's t.
     """
     degrees = repeats - 1
     times = np.sqrt(repeats / degrees) * scipy.stats.t.ppf(0.975, degrees) / 1.96

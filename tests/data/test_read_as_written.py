@@ -1,7 +1,6 @@
 """What a file says of its own numbers: times beside a rate, scales, rows of units, marks in cells.
 
-Each file holds a plant that is known, as a logger writes it; what is wrong in one of them would
-be wrong, and silent, in every fit.
+Each file holds a plant that is known; what is read wrong would be silent in every fit.
 """
 
 from __future__ import annotations
@@ -48,7 +47,6 @@ def test_times_are_heeded_before_a_rate_that_says_otherwise(tmp_path: Path, name
     record = fq.read(path, inputs="u", outputs="y")
     same(record)
     assert any("0.001" in note and name in note for note in record.notes)
-    # a height is no sample time
     np.savez(tmp_path / "h.npz", u=U, y=Y, h=0.05, **{name: T})
     same(fq.read(tmp_path / "h.npz", inputs="u", outputs="y"))
 
@@ -91,6 +89,9 @@ def test_compound_numbers_are_columns(tmp_path: Path) -> None:
     same(fq.read(tmp_path / "a.h5"))
     np.savez(tmp_path / "a.npz", log=rows)
     same(fq.read(tmp_path / "a.npz"))
+    np.savez(tmp_path / "a.npz", log=rows, later=rows)
+    with pytest.raises(ValueError, match="'time' twice, in 'log' and in 'later'"):
+        fq.read(tmp_path / "a.npz")
 
 
 @pytest.mark.parametrize("mark", ["#N/A", "#DIV/0!", "#3"])
@@ -103,6 +104,16 @@ def test_a_mark_in_a_cell_is_no_remark(tmp_path: Path, mark: str) -> None:
     remarks = [f"{y} # row {k}" for k, y in enumerate(Y)]
     (tmp_path / "b.csv").write_text("t,u,y\n" + rows_of(T, U, remarks))
     same(fq.read(tmp_path / "b.csv"))
+
+
+def test_marks_behind_tabs_and_in_quotes(tmp_path: Path) -> None:
+    cells = ["#3" if k == 20 else "0" for k in K]
+    path = tmp_path / "a.tsv"
+    path.write_text("t\tstatus\tu\ty\n" + rows_of(T, cells, U, Y, sep="\t"))
+    same(fq.read(path, "u", "y"))
+    cells = [f'"state #{k}, late"' for k in K]
+    (tmp_path / "b.csv").write_text("t,status,u,y\n" + rows_of(T, cells, U, Y))
+    same(fq.read(tmp_path / "b.csv", "u", "y"))
 
 
 HEADS = {
@@ -194,8 +205,7 @@ def test_times_in_two_columns(tmp_path: Path) -> None:
 
 
 def test_times_of_day_of_any_table(tmp_path: Path) -> None:
-    start = datetime.datetime(2024, 3, 5, 10)
-    times = [(start + datetime.timedelta(milliseconds=10 * int(k))).time() for k in K]
+    times = [datetime.time(10, 0, 0, 10_000 * int(k)) for k in K]
     frame = pd.DataFrame({"time": times, "u": U, "y": Y})
     same(fq.Record.from_frame(frame))
     pytest.importorskip("pyarrow")
@@ -252,7 +262,6 @@ def test_two_clocks_in_a_frame_are_refused_as_in_a_file(tmp_path: Path) -> None:
     frame = pd.DataFrame({"time": T, "time2": T + 0.003, "u": U, "y": Y})
     with pytest.raises(ValueError, match="not of one clock"):
         fq.Record.from_frame(frame, "u", "y")
-    # who says which one is meant is believed
     frame.to_csv(tmp_path / "a.csv", index=False)
     same(fq.read(tmp_path / "a.csv", "u", "y", time="time"))
 

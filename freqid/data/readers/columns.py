@@ -190,12 +190,17 @@ def _alike(short: Array, long: Array) -> bool:
 
 def _fields(arrays: Mapping[str, object]) -> Iterator[tuple[str, object]]:
     """Arrays by name, those of compound numbers field by field, as tables are kept in HDF5."""
+    seen: dict[str, str] = {}
     for name, value in arrays.items():
         fields = getattr(getattr(value, "dtype", None), "names", None)
-        if fields is None:
-            yield name, value
-        else:
-            yield from ((field, np.asarray(value)[field]) for field in fields)
+        for field in fields or [name]:
+            if field in seen:
+                raise InputError(
+                    f"holds {field!r} twice, in {seen[field]!r} and in {name!r}; keep one of these "
+                    "tables in a file or a group"
+                )
+            seen[field] = name
+            yield field, value if fields is None else np.asarray(value)[field]
 
 
 def _against(step: float, name: str, times: Array) -> str:

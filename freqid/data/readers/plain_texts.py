@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 
+from freqid.data.readers.table import parted
+
 # characters in which names stand, and of one of them
 _HEAD, _NAME = 4000, 100
 # 1.5D-03
 _DOUBLE = re.compile(r"(?<![\w.])([+-]?(?:\d+[.,]\d*|\.\d+))[Dd]([+-]\d{1,3})(?!\w)")
 # what spreadsheets print for no value
 _NO_VALUE = re.compile(r"#(?:N/?A|DIV/0!|VALUE!|REF!|NAME\?|NUM!|NULL!|NV|WERT!|BEZUG!|ZAHL!)")
-# a line that is a remark, and one behind samples: T#10ms is neither
-_REMARK = re.compile(r"^[ \t]*#[^\n]*\n?|[ \t]+#[^\n]*", re.MULTILINE)
+# a line that is a remark, and one that may have one behind its samples: T#10ms has none
+_REMARK = re.compile(r"^[ \t]*#[^\n]*\n?", re.MULTILINE)
+_BEHIND = re.compile(r"^[^\n]*[ \t]#[^\n]*", re.MULTILINE)
 # 1 234,5 with a space that does not break, and 1'234.5, as in France and Switzerland
 _APART = re.compile(r"(?<=\d)[\u00a0\u202f\u2009'\u2019](?=\d{3}(?!\d))")
 # a sign that is a letter of mathematics
@@ -46,6 +49,17 @@ def plain_text(text: str) -> tuple[str, tuple[str, ...]]:
     return text, tuple(notes)
 
 
-def without_remarks(text: str) -> str:
-    """The text of samples without remarks, and with errors of spreadsheets as no values."""
-    return _REMARK.sub("", _NO_VALUE.sub("nan", text)) if "#" in text else text
+def without_remarks(text: str, separator: str, width: int) -> str:
+    """The text of samples in so many columns without remarks, and with errors of spreadsheets as no
+    values.
+    """
+    if "#" not in text:
+        return text
+
+    def without(line: re.Match[str]) -> str:
+        # what stands behind a whole row is none of its cells
+        ends = (m.start() for m in re.finditer(r"[ \t]+#", line[0]))
+        whole = (at for at in ends if len(parted(line[0][:at], separator)) >= width)
+        return line[0][: next(whole, None)]
+
+    return _BEHIND.sub(without, _REMARK.sub("", _NO_VALUE.sub("nan", text)))

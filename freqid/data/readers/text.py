@@ -70,7 +70,7 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     begin = _begin(text, layout.first)
     rows = (len(text) - begin) * len(lines) / max(sum(map(len, lines)) + len(lines), 1)
     check_size(path, 8 * rows * len(layout.names), "its columns")
-    body = without_remarks(text[begin:]).encode()
+    body = without_remarks(text[begin:], layout.separator, len(layout.names)).encode()
     del text
     # before version 3 the last digit of numbers was lost unless asked for
     exact: Any = {} if int(pd.__version__.split(".")[0]) > 2 else {"float_precision": "round_trip"}

@@ -42,10 +42,9 @@ def weighed_by_boxes(inquiry: Asking) -> Lone | None:
         return None
     readings = [r.with_(noise=MeasuredNoise()) for r in inquiry.readings]
     try:
-        box: Reference | None = None
-        for _ in range(_ROUNDS):
-            own = [r.beside() for r in readings]
-            box = Reference.of(model, own, _LINES) if box is None else box.on(own, count=_LINES)
+        box = Reference.of(model, [r.beside() for r in readings], _LINES)
+        for again in range(_ROUNDS):
+            box = box.on([r.beside() for r in readings], count=_LINES) if again else box
             for i, r in enumerate(readings):
                 left = errors_of(box.model(model, r.hold), r)
                 readings[i] = r.with_(noise=r.noise.learnt(left.error, left.n_samples))
@@ -53,7 +52,8 @@ def weighed_by_boxes(inquiry: Asking) -> Lone | None:
         minimum = Minimum(objective, polish(objective, inquiry.minimum.x, limit=_LIMIT))
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return None
-    # each real value of what a black box leaves adds a half
-    if minimum.cost < _MORE * objective.n_rows / 2:
+    # each real value of what a black box leaves adds a half, and its unknowns have left less
+    rows, taken = objective.n_rows, box.unknowns + box.solution.point.n_initial
+    if minimum.cost < _MORE * rows / 2 * rows / max(rows - taken, 1):
         return None
     return Lone(minimum, structure.at(minimum.x), readings, inquiry.share)

@@ -30,9 +30,14 @@ def of_outputs(J: FloatArray, Q: FloatArray, left: FloatArray, e: SpectralExperi
         return np.asarray((J * power) @ J.T)
     each = before_the_fit(J, Q, left, e.n_lines).view(complex).reshape(-1, e.n_lines)
     # made flat, so that means over lines do not cut its peaks
-    size = np.sqrt(autoregressive(np.abs(each) ** 2))
+    counted = (e.lines.scale > 0).reshape(each.shape).astype(complex)
+    whole = bool(counted.all())
+    size = np.sqrt(autoregressive(np.abs(each) ** 2)) if whole else np.ones(each.shape)
     ways = J.view(complex).reshape(len(J), *each.shape) * size
     power = _smooth(each[:, None] * each[None].conj() / (size[:, None] * size[None]))
+    if not whole:
+        # lines that do not count leave nothing, which is no lack of noise
+        power = power / np.maximum(_smooth(counted[:, None] * counted[None]).real, 1e-9)
     # a complex error has half of its power in each of its parts
     return np.einsum("aik,ijk,bjk->ab", ways.conj(), power, ways, optimize=True).real / 2
 
