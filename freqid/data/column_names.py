@@ -27,6 +27,14 @@ def without_units(
     return frame.set_axis([name for name, _ in told], axis=1), {**own, **units}
 
 
+def listed_by_name(first: str) -> str:
+    """What is said where the first channel of a file that sorts them was taken for the input."""
+    return (
+        "HDF5 lists channels by their names, not as they were written: "
+        f"{first!r} was taken for the input, name inputs= and outputs="
+    )
+
+
 @overload
 def known(names: str | None, frame: pd.DataFrame, argument: str = ...) -> str | None: ...
 

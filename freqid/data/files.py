@@ -18,7 +18,7 @@ from freqid.checks import InputError, an, finite, flag, path_of, unknown
 from freqid.data.analyser_columns import looks_like_response
 from freqid.data.argument_order import read_in_either_order
 from freqid.data.clocks import begins_anew
-from freqid.data.column_names import known
+from freqid.data.column_names import known, listed_by_name
 from freqid.data.experiments_apart import of_experiment
 from freqid.data.logged import kind_of, logged_record
 from freqid.data.readers.headings import named_with
@@ -144,10 +144,7 @@ def read(
             start = None if start is None else max(start - gone, 0.0)
             stop = None if stop is None else stop - gone
         if by_name and not asked and record.input_names != ("u",):
-            said.append(
-                "HDF5 lists channels by their names, not as they were written: "
-                f"{record.input_names[0]!r} was taken for the input, name inputs= and outputs="
-            )
+            said.append(listed_by_name(record.input_names[0]))
         notes = dict.fromkeys((*frame.attrs.get("notes", ()), *said, *record.notes))
         return _cut(dataclasses.replace(record, notes=tuple(notes)), start, stop, detrend)
     except ResponseFile:

@@ -14,7 +14,9 @@ from freqid.data.printed_times import printed_period
 from freqid.data.readers.headings import named
 from freqid.data.regular_time import uneven
 from freqid.data.remembered import as_printed, kept_step
-from freqid.data.time_column import LOOKED_AT, no_time, same_clock, time_named, with_time
+from freqid.data.same_clock import same_clock
+from freqid.data.time_column import LOOKED_AT, no_time, with_time
+from freqid.data.time_names import time_named
 from freqid.data.times_in_seconds import EPOCHS, of_this_world
 
 if TYPE_CHECKING:

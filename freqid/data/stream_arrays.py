@@ -1,11 +1,10 @@
-"""Arrays by name in HDF5 and zarr files, read block by block."""
+"""Arrays by name, as HDF5 and zarr files keep them, read block by block."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,16 +13,16 @@ import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
 from freqid.data.readers.columns import CLOCKS, clock_number, step_of, unit_of
-from freqid.data.readers.hdf5_structure import check_structure
-from freqid.data.readers.kinds import damaged, missing
 from freqid.data.readers.limits import limit_of
 from freqid.data.readers.packed import Packing
-from freqid.data.stream_found import Asked, Clock, Found, Source, agreed, even, of_array, places
-from freqid.data.time_column import time_named
+from freqid.data.stream_found import Asked, Found, Source
+from freqid.data.stream_times import FIRST, Clock, agreed, at_places, even, places, told_by
+from freqid.data.time_column import Told
+from freqid.data.time_names import is_called_a_time, time_named
 
 
 @dataclass
-class _Arrays:
+class Arrays:
     """Arrays of samples by their full name with their shapes, numbers by their folders, and what
     opens them.
     """
@@ -58,7 +57,7 @@ class _Arrays:
             if there < whole:
                 self.hollow[name] = f"{there} of {whole} chunks, the rest is {array.fill_value:g}"
         elif array.size == 1:
-            folder = self.numbers.setdefault(_folder(name), {})
+            folder = self.numbers.setdefault(folder_of(name), {})
             leaf, value = _leaf(name), float(np.ravel(array[()])[0])
             told = clock_number(leaf, value, unit_of(array.attrs)) if leaf in CLOCKS else value
             if told is not None:
@@ -71,13 +70,12 @@ class _Arrays:
             here = self.numbers.setdefault(folder, {})
             here |= {n: float(np.ravel(np.asarray(v))[0]) for n, v in told.items()}
 
-    def _clock(self, wanted: Sequence[str], times: Sequence[str], count: int) -> Clock | None:
-        """A time of as many samples, one beside the arrays if there is; None where none is.
-
-        Raises ValueError for arrays beside times that differ.
+    def _clock(self, told: Mapping[str, Told], count: int) -> Clock | None:
+        """A time of as many samples by those that are beside the arrays, and what their first rows
+        have ``told``; None where there is none, ValueError for times that differ.
         """
-        beside = _beside(wanted, times)
-        clocks = [self._read_clock(name, count) for name in beside]
+        beside = list(told)
+        clocks = [self._read_clock(name, count, told[name].unit) for name in beside]
         for name, other in zip(beside[1:], clocks[1:], strict=True):
             first = clocks[0]
             if (other.step, other.first, other.last) != (first.step, first.first, first.last):
@@ -87,15 +85,32 @@ class _Arrays:
                 )
         return clocks[0] if clocks else None
 
-    def _read_clock(self, time: str, count: int) -> Clock:
-        at, stamps, unit = self._stamps(time, count)
+    def _told_by(self, time: str, count: int, channels: Sequence[str] | None) -> Told:
+        """What the first rows of a time and of arrays beside it that are called so tell."""
+        beside = {
+            _leaf(n): n
+            for n, s in self.shapes.items()
+            if s == (count,) and folder_of(n) == folder_of(time)
+            and (n == time or time_named([_leaf(n)]) or is_called_a_time(_leaf(n)))
+        }  # fmt: skip
+        import pandas as pd
+
+        with self.opened() as file:
+            first = {
+                n: self.packings[full].values(file[full][:FIRST]) for n, full in beside.items()
+            }
+        units = {n: self.units[full] for n, full in beside.items()}
+        return told_by(pd.DataFrame(first), _leaf(time), units, channels)
+
+    def _read_clock(self, time: str, count: int, unit: str) -> Clock:
+        at, stamps, _ = self._stamps(time, count)
         return even(str(self.path), _leaf(time), at, stamps, unit)
 
     def _stamps(self, time: str, count: int) -> tuple[list[int], Array, str]:
         at = places(count)
         with self.opened() as file:
             stored = file[time]
-            stamps = self.packings[time].values(np.array([stored[i] for i in at]))
+            stamps = self.packings[time].values(at_places(stored, at))
             return at, stamps, unit_of(stored.attrs)
 
     def _agreed(self, wanted: Sequence[str], times: Sequence[str], count: int, dt: float) -> None:
@@ -131,7 +146,7 @@ class _Arrays:
         """What is said of the sample time nearest to an array, in its folder or one around it."""
         folder = name
         while folder:
-            folder = _folder(folder)
+            folder = folder_of(folder)
             if told := step_of(self.numbers.get(folder, {})):
                 return told
         return None
@@ -146,6 +161,15 @@ class _Arrays:
         named = dict(zip(shown, shapes, strict=True))
         named = self._alike(named, shapes, asked.channels)
         count = shapes[next(iter(named.values()))][0]
+        wanted = [named[n] for n in asked.channels or () if n in named] or list(named.values())
+        times = [n for n in times if self.shapes[n][0] == count]
+        told: dict[str, Told] = {}
+        if asked.dt is None:
+            told = {n: self._told_by(n, count, asked.channels) for n in _beside(wanted, times)}
+        if asked.columns is None:
+            # whoever names the columns has counted them
+            same = {_inside(folder_of(n), leaf) for n, t in told.items() for leaf in t.same}
+            named = {n: full for n, full in named.items() if full not in same}
         channels = [
             (shown_name if width == 1 else f"{shown_name}{i + 1}", name, i)
             for shown_name, name in named.items()
@@ -155,9 +179,7 @@ class _Arrays:
         names = [shown_name for shown_name, _, _ in channels]
         if asked.columns is not None:
             names = list(channel_names("columns", asked.columns, len(names), "channel"))
-        wanted = [named[n] for n in asked.channels or () if n in named] or list(named.values())
-        times = [n for n in times if self.shapes[n][0] == count]
-        clock = self._clock(wanted, times, count) if asked.dt is None else None
+        clock = self._clock(told, count)
         if asked.dt is not None and count > 1:
             self._agreed(wanted, times, count, asked.dt)
         dt = None if asked.dt is not None else clock.step if clock else self.step(wanted)
@@ -180,9 +202,12 @@ class _Arrays:
             for n, (_, full, _) in zip(names, channels, strict=True)
             if full in self.hollow
         }
+        notes = [note for t in told.values() for note in t.notes]
+        notes += [] if clock is None else clock.notes
         return Found(
-            blocks, names, count, dt, str(self.path), units=units, clock=clock, hollow=hollow
-        )
+            blocks, names, count, dt, str(self.path), units=units, clock=clock, hollow=hollow,
+            notes=tuple(dict.fromkeys(notes)), by_name=True,
+        )  # fmt: skip
 
     def _of_group(self, group: str | None) -> dict[str, tuple[int, ...]]:
         if group is None:
@@ -191,7 +216,7 @@ class _Arrays:
             inside = group.strip("/") + "/"
             shapes = {n: s for n, s in self.shapes.items() if n.startswith(inside)}
             if not shapes:
-                groups = sorted({_folder(n) for n in self.shapes} - {""})
+                groups = sorted({folder_of(n) for n in self.shapes} - {""})
                 raise InputError(f"{self.path}: {unknown('group', group, groups)}")
         if not shapes:
             raise InputError(f"{self.path}: holds no arrays of samples")
@@ -218,80 +243,18 @@ class _Arrays:
         return {name: full for name, full in named.items() if shapes[full][0] == count}
 
 
-def of_hdf5(path: Path, asked: Asked) -> Found:
-    """The data sets of an HDF5 file."""
-    try:
-        import h5py
-    except ImportError:
-        raise InputError(f"{path}: {missing('HDF5', 'h5py', 'hdf5')}") from None
-    arrays = _Arrays(path, lambda: h5py.File(path, "r"))
-
-    def look(name: str, item: Source) -> None:
-        if not isinstance(item, h5py.Dataset):
-            return
-        if item.external or item.is_virtual:
-            raise InputError(
-                f"{path}: {name!r} refers to another file, which is not read; copy it in"
-            )
-        arrays.add(name, item)
-        arrays.add_clocks(_folder(name), item.parent.attrs)
-
-    try:
-        check_structure(path)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    try:
-        with h5py.File(path, "r") as file:
-            file.visititems(look)
-        return arrays.found(asked)
-    except InputError:
-        raise
-    except Exception as error:
-        # h5py has errors of many kinds for a file that is not what it says
-        raise InputError(f"{path}: {damaged('HDF5', error)}") from None
-
-
-def of_zarr(path: Path, asked: Asked) -> Found:
-    """A zarr array (N, channels), or the arrays of a group."""
-    if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist")
-    try:
-        import zarr
-    except ImportError:
-        raise InputError(f"{path}: {missing('zarr', 'zarr', 'zarr')}") from None
-    try:
-        root = zarr.open(path, mode="r")
-        arrays = _Arrays(path, lambda: nullcontext(root))
-        if isinstance(root, zarr.Array):
-            arrays.add(path.name, root)
-            arrays.add_clocks("", root.attrs)
-            found = of_array(root, asked.columns, asked.block, str(path))
-            hollow = {n: told for told in arrays.hollow.values() for n in found.names}
-            blocks = Packing.of(root.attrs).of_blocks(found.blocks)
-            step = arrays.step([path.name])
-            return dataclasses.replace(found, blocks=blocks, dt=step, hollow=hollow)
-        arrays.add_clocks("", root.attrs)
-        for name, item in root.members(max_depth=None):
-            is_array = isinstance(item, zarr.Array)
-            arrays.add_clocks(_folder(name) if is_array else name, item.attrs)
-            if isinstance(item, zarr.Array):
-                arrays.add(name, item)
-        return arrays.found(asked)
-    except InputError:
-        raise
-    except Exception as error:
-        # zarr has errors of many kinds for a folder that is not what it says
-        raise InputError(f"{path}: {damaged('zarr', error)}") from None
-
-
 def _beside(wanted: Sequence[str], times: Sequence[str]) -> list[str]:
     """Times in the folders of the arrays that are ``wanted``, or the first of any."""
-    own = {_folder(n): n for n in reversed(times)}
-    return [own[f] for f in dict.fromkeys(map(_folder, wanted)) if f in own] or [*times[:1]]
+    own = {folder_of(n): n for n in reversed(times)}
+    return [own[f] for f in dict.fromkeys(map(folder_of, wanted)) if f in own] or [*times[:1]]
 
 
-def _folder(name: str) -> str:
+def folder_of(name: str) -> str:
     return name.rpartition("/")[0]
+
+
+def _inside(folder: str, leaf: str) -> str:
+    return f"{folder}/{leaf}" if folder else leaf
 
 
 def _leaf(name: str) -> str:

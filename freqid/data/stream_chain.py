@@ -9,7 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 
 from freqid.checks import Array, InputError, unknown
-from freqid.data.stream_found import Found, Source, seconds_between
+from freqid.data.stream_found import Found, Source
+from freqid.data.stream_times import seconds_between
 
 # part of a sample time that a file may begin too early or too late
 _SHIFT = 0.5
@@ -79,6 +80,8 @@ def chained(each: Sequence[Found], wanted: Sequence[str] | None, held: bool) -> 
         lost=next((found.lost for found in each if found.lost), ""),
         aliased=max(found.aliased for found in each),
         slow=frozenset().union(*(found.slow for found in each)),
+        notes=tuple(dict.fromkeys(note for found in each for note in found.notes)),
+        by_name=any(found.by_name for found in each),
         hollow={n: told for found in each for n, told in found.hollow.items()},
     )  # fmt: skip
 

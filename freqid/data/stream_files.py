@@ -1,10 +1,10 @@
-"""Files that are read block by block: NPY and Parquet; HDF5 and zarr are in ``stream_arrays``."""
+"""Files that are read block by block: NPY and Parquet; others are in ``stream_array_files``."""
 
 from __future__ import annotations
 
 import dataclasses
 import mmap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,10 +15,12 @@ from freqid.data.readers.kinds import damaged, existing, missing, refusing
 from freqid.data.readers.parquet import field_units
 from freqid.data.readers.parquet_structure import check_pages
 from freqid.data.remembered import is_kept, kept_aliased, kept_conditions, kept_hold, kept_of_record
-from freqid.data.stream_arrays import of_hdf5, of_zarr
-from freqid.data.stream_found import Asked, Found, Source, agreed, even, of_array, places
+from freqid.data.stream_array_files import of_hdf5, of_zarr
+from freqid.data.stream_found import Asked, Found, Source, of_array
+from freqid.data.stream_times import FIRST, agreed, even, places, told_by
 from freqid.data.stream_views import from_the_first
-from freqid.data.time_column import time_named
+from freqid.data.time_column import Told
+from freqid.data.time_names import is_called_a_time, time_named
 
 
 def of_file(path: Path, asked: Asked) -> Found:
@@ -36,7 +38,7 @@ def of_file(path: Path, asked: Asked) -> Found:
     if kind == ".parquet":
         if asked.columns is not None:
             raise InputError(f"columns={asked.columns!r}: {path} names its own; leave them out")
-        return _of_parquet(path, asked.block, asked.dt)
+        return _of_parquet(path, asked)
     known = [".npy", ".h5", ".hdf5", ".parquet", ".zarr"]
     raise InputError(f"{path}: {unknown('suffix', kind, known)}")
 
@@ -103,7 +105,7 @@ def _ended_early(path: Path) -> tuple[Array, int] | None:
     return np.memmap(path, dtype, "r", begin, (count, shape[1])), int(shape[0])
 
 
-def _of_parquet(path: Path, block: int, given: float | None) -> Found:
+def _of_parquet(path: Path, asked: Asked) -> Found:
     try:
         import pyarrow.parquet as pq
     except ImportError:
@@ -118,24 +120,29 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
         raise InputError(f"{path}: {damaged('Parquet', error)}") from None
     every = [str(n) for n in file.schema_arrow.names]
     time = time_named(every)
-    columns = [n for n in every if n != time and not is_kept(n)]
-    names = [named(n)[0] for n in columns]
     count, clock, told_units = file.metadata.num_rows, None, field_units(file.schema_arrow)
     kept = [n for n in every if n != time and is_kept(n)]
     told = None
+    same: list[str] = []
+    notes: list[str] = []
     with refusing(path, "Parquet"):
         if kept and count:
             told = next(file.iter_batches(batch_size=1, columns=kept)).to_pandas()
         if time is not None and count > 0:
             unit = told_units.get(time, "")
-            if given is None:
+            if asked.dt is None:
+                beside = _told_by(file, time, every, told_units, asked.channels)
+                same, notes, unit = beside.same, beside.notes, beside.unit
                 clock = even(str(path), time, *_stamps(file, time), unit)
+                notes += clock.notes
             elif count > 1:
-                agreed(str(path), time, lambda: (*_stamps(file, time), unit), given)
+                agreed(str(path), time, lambda: (*_stamps(file, time), unit), asked.dt)
+    columns = [n for n in every if n != time and not is_kept(n) and named(n)[0] not in same]
+    names = [named(n)[0] for n in columns]
 
     def blocks(first: int, which: Sequence[int]) -> Iterator[Array]:
         wanted = [columns[i] for i in which]
-        batches = pq.ParquetFile(path).iter_batches(batch_size=block, columns=wanted)
+        batches = pq.ParquetFile(path).iter_batches(batch_size=asked.block, columns=wanted)
         rows = (
             np.column_stack([batch[name].to_numpy(zero_copy_only=False) for name in wanted])
             for batch in batches
@@ -150,9 +157,24 @@ def _of_parquet(path: Path, block: int, given: float | None) -> Found:
     slow = frozenset(name for column, name in each if 2 * _blanks(file, column) >= count > 0)
     lost = kept_of_record(every)
     return Found(
-        blocks, names, count, dt, str(path), hold, conditions, units, clock, lost,
-        0.0 if told is None else kept_aliased(told), slow,
+        blocks, names, count, dt, str(path), hold, conditions, units, clock,
+        tuple(notes), lost, 0.0 if told is None else kept_aliased(told), slow,
     )  # fmt: skip
+
+
+def _told_by(
+    file: Source,
+    time: str,
+    every: Sequence[str],
+    units: Mapping[str, str],
+    channels: Sequence[str] | None,
+) -> Told:
+    """What the first rows of the time and of columns that are called so tell."""
+    called = [n for n in every if n == time or time_named([n]) or is_called_a_time(named(n)[0])]
+    first = next(file.iter_batches(batch_size=FIRST, columns=called)).to_pandas()
+    plain = {str(n): named(str(n))[0] for n in first.columns}
+    told = {plain[n]: units.get(n) or named(n)[1] for n in plain}
+    return told_by(first.rename(columns=plain), named(time)[0], told, channels)
 
 
 def _blanks(file: Source, name: str) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, FloatArray, InputError, finite, listed, positive, unknown, whole
+from freqid.data.column_names import listed_by_name
 from freqid.data.conditions import as_conditions
 from freqid.data.replacing import has_read
 from freqid.data.rows import as_rows
@@ -107,6 +108,9 @@ def open(
                 "is no signal; chunks that are that value say so with write_empty_chunks=True",
                 stacklevel=2,
             )
+    notes = [*found.notes]
+    if found.by_name and u is None and y is None and u_names != ["u"]:
+        notes.append(listed_by_name(u_names[0]))
     pick = [found.names.index(n) for n in (*u_names, *y_names)]
     factors = _factors(scale, [*u_names, *y_names])
 
@@ -120,7 +124,7 @@ def open(
         blocks, step, held, tuple(u_names), tuple(y_names), found.n_samples, found.origin,
         as_conditions(found.conditions),
         {n: found.units[n] for n in (*u_names, *y_names) if found.units.get(n)},
-        folded=found.aliased,
+        folded=found.aliased, notes=tuple(notes),
     )  # fmt: skip
 
 

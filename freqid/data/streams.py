@@ -40,7 +40,7 @@ class Stream(NotInMemory):
     taken where none is asked for. Of the source, it begins at sample ``begin`` and holds each
     ``step``-th; ``ahead`` are its last samples, which what follows in the source would change. The
     part ``folded`` of the input's power was there already, and the ``foldings`` measure what its
-    own decimations fold while samples pass.
+    own decimations fold while samples pass. ``notes`` say what was taken for what.
     """
 
     blocks: Blocks
@@ -58,6 +58,7 @@ class Stream(NotInMemory):
     ahead: int = 0
     folded: float = 0.0
     foldings: tuple[Folding, ...] = ()
+    notes: tuple[str, ...] = ()
 
     # what a record has, and a stream does not
     factor = 1
@@ -286,7 +287,7 @@ class Stream(NotInMemory):
         return Record(
             flat(every[:, : self.n_inputs]), flat(every[:, self.n_inputs :]), self.dt, self.hold,
             input_names=self.input_names, output_names=self.output_names,
-            conditions=self.conditions, units=self.units, aliased=self.aliased,
+            conditions=self.conditions, units=self.units, notes=self.notes, aliased=self.aliased,
         )  # fmt: skip
 
     def __repr__(self) -> str:

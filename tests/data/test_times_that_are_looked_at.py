@@ -44,11 +44,71 @@ def test_samples_that_are_missing_in_the_middle_are_told(tmp_path, kind, lost, a
 
 @KINDS
 def test_times_with_few_digits_are_even(tmp_path, kind):
-    path = written(tmp_path / f"t{kind}", np.round(0.0123 * np.arange(N), 3))
-    with pytest.raises(ValueError, match="not even: its first step"):
-        fq.open(path, "u", "y")
     path = written(tmp_path / f"other{kind}", np.round(0.0123 * np.arange(N), 5))
     assert fq.open(path, "u", "y").dt == pytest.approx(0.0123, rel=1e-6)
+
+
+@KINDS
+@pytest.mark.parametrize("rate", [81.3, 400.0, 640.0])
+def test_whole_milliseconds_of_another_rate_are_even(tmp_path, kind, rate):
+    """As for ``read``, with the same note; a sample that is missing is told all the same."""
+    time = np.round(np.arange(N) / rate, 3)
+    path = written(tmp_path / f"t{kind}", time)
+    stream, record = fq.open(path, "u", "y"), fq.read(path, inputs="u", outputs="y")
+    assert stream.dt == pytest.approx(1 / rate, rel=1e-6)
+    assert record.dt == pytest.approx(1 / rate, rel=1e-6)
+    assert stream.notes == record.notes
+    assert "rounded to 0.001 s" in stream.notes[0]
+    for at in (700, 9_777, N - 2):
+        keep = np.arange(N) != at
+        path = written(tmp_path / f"gap{at}{kind}", time[keep], U[keep])
+        with pytest.raises(ValueError, match="not even"):
+            fq.open(path, "u", "y")
+
+
+@KINDS
+def test_stamps_that_jitter_are_not_even(tmp_path, kind):
+    """As for ``read``; a look at places far apart took them for rounded ones."""
+    time = 0.01 * np.arange(N)
+    time[100:-100] += np.random.default_rng(1).uniform(-0.0024, 0.0024, N - 200)
+    path = written(tmp_path / f"t{kind}", time)
+    with pytest.raises(ValueError, match=r"not even: rows \d+ to \d+ take"):
+        fq.open(path, "u", "y")
+
+
+@KINDS
+def test_two_clocks_are_told_and_one_counts_once(tmp_path, kind):
+    def kept(**columns):
+        path = tmp_path / f"two{kind}"
+        frame = pd.DataFrame({**columns, "x": U[:, 0], "y": U[:, 1]})
+        if kind == ".parquet":
+            frame.to_parquet(path, index=False)
+            return path
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            for name in frame:
+                file[name] = frame[name].to_numpy()
+        return path
+
+    time = 0.01 * np.arange(N)
+    with pytest.raises(ValueError, match="both times, and not of one clock"):
+        fq.open(kept(time=time, time2=time + 0.003), "x", "y")
+    stream = fq.open(kept(time=time, time_ms=1e3 * time))
+    assert (stream.input_names, stream.output_names, stream.dt) == (("x",), ("y",), 0.01)
+    assert "'time_ms' is of the same clock, and left out" in stream.notes[0]
+    assert stream.load().notes == stream.notes
+    assert ("'x' was taken for the input" in stream.notes[-1]) == (kind == ".h5")
+
+
+def test_a_count_beside_dates_runs_in_their_unit(tmp_path):
+    pytest.importorskip("pyarrow")
+    dates = pd.date_range("2026-05-01", periods=N, freq="10ms")
+    frame = pd.DataFrame({"TimeStamp": 1e4 * np.arange(N), "Date": dates})
+    frame = frame.assign(u=U[:, 0], y=U[:, 1])
+    frame.to_parquet(tmp_path / "t.parquet", index=False)
+    stream = fq.open(tmp_path / "t.parquet")
+    assert stream.dt == pytest.approx(0.01, rel=1e-9)
+    assert stream.notes == fq.read(tmp_path / "t.parquet").notes
 
 
 @KINDS

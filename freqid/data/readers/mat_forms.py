@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from freqid.checks import Array, InputError
-from freqid.data.time_column import time_named
+from freqid.data.time_names import time_named
 
 # a structure's fields by name, whatever they hold
 Fields: TypeAlias = "dict[str, Any]"
