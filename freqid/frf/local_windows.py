@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from freqid.checks import BoolArray, ComplexArray, FloatArray, IntArray
 from freqid.data import LineNoise
@@ -22,6 +23,8 @@ _BLOCK = 256
 _LINES_A_WINDOW = 24
 # windows from which the noise that a width costs is judged
 _JUDGED = 24
+# part of a line's power below which an input is over
+_ENDED = 0.05
 # numbers that are kept of how the noise of lines gets into a response, at the most
 _KEPT = 4_000_000
 
@@ -80,13 +83,14 @@ def local_models(lines: Lines, form: Form, behind: int = 0) -> Local:
     served = max(form.width // _LINES_A_WINDOW, 1)
     own = centres[np.minimum(np.arange(0, len(centres), served) + served // 2, len(centres) - 1)]
     members = np.minimum(np.arange(len(own) * served), len(centres) - 1).reshape(-1, served)
+    first = _first(lines, own, form)
     shape = lines.Y.shape[1], lines.U.shape[1], len(lines.U)
     known = len(centres) * form.width * np.prod(shape) * (1 + behind) <= _KEPT
     parts = []
     for start in range(0, len(own), _BLOCK):
         run = slice(start, start + _BLOCK)
         near = (centres[members[run]] - own[run, None]) / (form.width / 2)
-        equations = _laid_out(lines, own[run], form)
+        equations = _laid_out(lines, own[run], first[run], form)
         each = [_evaluated(equations, output, near, form) for output in range(shape[0])]
         G, variance, share, rows, left = (np.stack(x, axis=1) for x in zip(*each, strict=True))
         block = Values(G, variance, share, rows, left @ left.conj().swapaxes(1, 2))
@@ -98,7 +102,7 @@ def local_models(lines: Lines, form: Form, behind: int = 0) -> Local:
     if not known:
         return Local(G, variance, share, None)
     K = len(lines.frequency)
-    first = _first(own, form, K).repeat(served)[: len(centres)]
+    first = first.repeat(served)[: len(centres)]
     nearest = np.searchsorted((own[1:] + own[:-1]) / 2, np.arange(K))
     rows = rows.reshape(*rows.shape[:-1], shape[2], form.width)
     noise = values.noise[nearest]
@@ -112,7 +116,7 @@ def inflation(lines: Lines, form: Form) -> float:
     """Ninth decile, over some windows, of what input and transient cost one another in noise."""
     centres = np.flatnonzero(lines.wanted)
     centres = centres[np.unique(np.linspace(0, len(centres) - 1, _JUDGED).astype(int))]
-    equations = _laid_out(lines, centres, form)
+    equations = _laid_out(lines, centres, _centred(centres, form, len(lines.frequency)), form)
     worst = np.zeros(len(centres))
     forced = slice(0, equations.forced.shape[-1], form.order + 1)
     for output in range(lines.Y.shape[1]):
@@ -121,14 +125,42 @@ def inflation(lines: Lines, form: Form) -> float:
     return float(np.quantile(worst * equations.outputs.shape[1], 0.9))
 
 
-def _first(centres: IntArray, form: Form, K: int) -> IntArray:
+def _centred(centres: IntArray, form: Form, K: int) -> IntArray:
     """First lines of windows around centres: at the ends of the data they are shifted inwards."""
     return np.clip(centres - form.width // 2, 0, K - form.width)
 
 
-def _laid_out(lines: Lines, centres: IntArray, form: Form) -> _Equations:
+def _first(lines: Lines, centres: IntArray, form: Form) -> IntArray:
+    """First lines of windows that are shifted inwards where the input ends, too, as a chirp does:
+    lines that it leaves to the transient and the noise bend a denominator, and tell no response.
+    """
+    K, width = len(lines.frequency), form.width
+    power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
+    # some lines of an input of noise are weak and their neighbours are not
+    power = scipy.ndimage.maximum_filter1d(power, 2 * form.order + 3, mode="nearest")
+    found = _centred(centres, form, K)
+    for start in range(0, len(centres), _BLOCK):
+        own = centres[start : start + _BLOCK, None]
+        reach = own + np.arange(-width, width + 1)
+        at = np.clip(reach, 0, K - 1)
+        strong = (power[at] > _ENDED * power[own]) & (reach == at)
+        first = found[start : start + _BLOCK]
+        # outermost lines that are driven: on the left within the window, or on the right
+        left = at[np.arange(len(at)), np.argmax(strong & (reach >= first[:, None]), axis=1)]
+        last = first + width - 1
+        inside = (strong & (reach <= last[:, None]))[:, ::-1]
+        right = at[:, ::-1][np.arange(len(at)), np.argmax(inside, axis=1)]
+        # and those that a shifted window would reach
+        moved = np.where(left > first, left, np.where(right < last, right - width + 1, first))
+        ends = np.clip(np.stack([moved, moved + width - 1]) - own.T + width, 0, 2 * width)
+        kept = strong[np.arange(len(at)), ends].all(axis=0) & ((left == first) | (right == last))
+        found[start : start + _BLOCK] = np.where(kept, moved, first)
+    return found
+
+
+def _laid_out(lines: Lines, centres: IntArray, first: IntArray, form: Form) -> _Equations:
     """Scale the signals of a window around each centre, and lay out its equations' columns."""
-    at = _first(centres, form, len(lines.frequency))[:, None] + np.arange(form.width)
+    at = first[:, None] + np.arange(form.width)
     offsets = (at - centres[:, None]) / (form.width / 2)
     U, u_size = _scaled(lines.U[..., at])  # (E, m, W, w)
     Y, y_size = _scaled(lines.Y[..., at])  # (E, p, W, w)
