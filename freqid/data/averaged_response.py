@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import FloatArray, State, numbers, positive
+from freqid.data.argument_order import formerly
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
 
@@ -62,10 +63,11 @@ class AveragedResponse(FrequencyResponse):
         """What it has beyond other responses, by name."""
         return {"memory": self.memory, "freedom": self.freedom}
 
+    @formerly(band="limits")
     @that_follows
-    def select(self, limits: tuple[float, float]) -> AveragedResponse:
-        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        return AveragedResponse(**{**super().select(limits).__dict__, **self.of_averages})
+    def select(self, band: tuple[float, float]) -> AveragedResponse:
+        """The lines inside ``band`` (Hz), ends included; ValueError if there are none."""
+        return AveragedResponse(**{**super().select(band).__dict__, **self.of_averages})
 
     def to_frame(self) -> pd.DataFrame:
         """As of any response, with columns of the memory from its first sample to its last."""

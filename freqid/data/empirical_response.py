@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError, numbers
+from freqid.data.argument_order import formerly
 from freqid.data.band import Band, chosen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
@@ -53,11 +54,12 @@ class EmpiricalResponse(FrequencyResponse):
         lines: ComplexArray = np.sqrt(self.input_spectrum[0]) * np.exp(1j * self.input_phase)
         return lines
 
+    @formerly(band="limits")
     @that_follows
-    def select(self, limits: tuple[float, float]) -> EmpiricalResponse:
-        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        kept = super().select(limits)
-        at = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
+    def select(self, band: tuple[float, float]) -> EmpiricalResponse:
+        """The lines inside ``band`` (Hz), ends included; ValueError if there are none."""
+        kept = super().select(band)
+        at = chosen(self.frequency, Band.of(band, name="band"), "band")
         phase = None if self.input_phase is None else self.input_phase[at]
         return EmpiricalResponse(**{**kept.__dict__, "input_phase": phase})
 

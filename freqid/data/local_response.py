@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from freqid.checks import Array, BoolArray, ComplexArray, FloatArray, InputError, IntArray, State
+from freqid.data.argument_order import formerly
 from freqid.data.averaged_response import FREEDOM
 from freqid.data.band import Band, chosen
 from freqid.data.frequency_response import FrequencyResponse
@@ -194,11 +195,12 @@ class LocalResponse(FrequencyResponse):
             "freedom": self.freedom,
         }
 
+    @formerly(band="limits")
     @that_follows
-    def select(self, limits: tuple[float, float]) -> LocalResponse:
-        """The lines inside ``limits`` (Hz), ends included; ValueError if there are none."""
-        kept = super().select(limits)
-        at = chosen(self.frequency, Band.of(limits, name="limits"), "limits")
+    def select(self, band: tuple[float, float]) -> LocalResponse:
+        """The lines inside ``band`` (Hz), ends included; ValueError if there are none."""
+        kept = super().select(band)
+        at = chosen(self.frequency, Band.of(band, name="band"), "band")
         noise = None if self.line_noise is None else self.line_noise.some(at)
         own = {"line_noise": noise, "freedom": self.freedom}
         return LocalResponse(**{**kept.__dict__, **own})

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from freqid.checks import ComplexArray, InputError, State, finite, numbers, whole
+from freqid.data.argument_order import formerly
 from freqid.data.entries import frozen
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
@@ -103,6 +104,7 @@ class PeriodicResponse(FrequencyResponse):
         """The same with what was set for it, by name."""
         return dataclasses.replace(self, conditions={**self.conditions, **conditions})
 
+    @formerly(band="limits")
     @that_follows
     def select(self, band: tuple[float, float]) -> PeriodicResponse:
         """The lines inside ``band`` (Hz), ends included; ValueError if there are none."""

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, InputError, channel_names, unknown
-from freqid.data.readers.columns import CLOCKS, clock_number, step_of, unit_of
+from freqid.data.readers.columns import CLOCKS, OFF, clock_number, clock_of, step_of, unit_of
 from freqid.data.readers.limits import limit_of
-from freqid.data.readers.packed import Packing
+from freqid.data.readers.packed import Packing, not_applied
 from freqid.data.stream_found import Asked, Found, Source
 from freqid.data.stream_times import FIRST, Clock, agreed, at_places, even, places, told_by
 from freqid.data.time_column import Told
@@ -34,6 +34,7 @@ class Arrays:
     units: dict[str, str] = field(default_factory=dict)
     hollow: dict[str, str] = field(default_factory=dict)
     packings: dict[str, Packing] = field(default_factory=dict)
+    unclear: dict[str, str] = field(default_factory=dict)
 
     def add(self, name: str, array: Source) -> None:
         """Note an array: one of samples, or a number."""
@@ -51,6 +52,7 @@ class Arrays:
             self.shapes[name] = tuple(int(size) for size in array.shape)
             self.units[name] = unit_of(array.attrs)
             self.packings[name] = Packing.of(array.attrs)
+            self.unclear[name] = not_applied(_leaf(name), array.attrs)
             # zarr leaves out chunks that hold nothing but the fill value, and so does a copy that
             # was cut off
             there, whole = getattr(array, "nchunks_initialized", 0), getattr(array, "nchunks", 0)
@@ -65,10 +67,9 @@ class Arrays:
 
     def add_clocks(self, folder: str, attributes: Mapping[str, Source]) -> None:
         """Note what the attributes of a folder, or of an array in it, say of the sample time."""
-        told = {n: v for n, v in attributes.items() if n in CLOCKS and np.size(v) == 1}
-        if told:
-            here = self.numbers.setdefault(folder, {})
-            here |= {n: float(np.ravel(np.asarray(v))[0]) for n, v in told.items()}
+        told = {n: clock_of(n, v) for n, v in attributes.items() if n in CLOCKS}
+        if known := {n: v for n, v in told.items() if v is not None}:
+            self.numbers.setdefault(folder, {}).update(known)
 
     def _clock(self, told: Mapping[str, Told], count: int) -> Clock | None:
         """A time of as many samples by those that are beside the arrays, and what their first rows
@@ -90,14 +91,16 @@ class Arrays:
         beside = {
             _leaf(n): n
             for n, s in self.shapes.items()
-            if s == (count,) and folder_of(n) == folder_of(time)
+            if s in ((count,), (count, 1))
+            and folder_of(n) == folder_of(time)
             and (n == time or time_named([_leaf(n)]) or is_called_a_time(_leaf(n)))
         }  # fmt: skip
         import pandas as pd
 
         with self.opened() as file:
             first = {
-                n: self.packings[full].values(file[full][:FIRST]) for n, full in beside.items()
+                n: self.packings[full].values(file[full][:FIRST]).ravel()
+                for n, full in beside.items()
             }
         units = {n: self.units[full] for n, full in beside.items()}
         return told_by(pd.DataFrame(first), _leaf(time), units, channels)
@@ -110,7 +113,7 @@ class Arrays:
         at = places(count)
         with self.opened() as file:
             stored = file[time]
-            stamps = self.packings[time].values(at_places(stored, at))
+            stamps = self.packings[time].values(at_places(stored, at)).ravel()
             return at, stamps, unit_of(stored.attrs)
 
     def _agreed(self, wanted: Sequence[str], times: Sequence[str], count: int, dt: float) -> None:
@@ -142,6 +145,19 @@ class Arrays:
             )
         return found.pop() if found else None
 
+    def _against(self, wanted: Sequence[str], clock: Clock) -> list[str]:
+        """What is to be said of a sample time beside a clock of other steps."""
+        try:
+            step = self.step(wanted)
+        except InputError:
+            return []
+        if step is None or clock.step is None or abs(step / clock.step - 1) <= OFF:
+            return []
+        return [
+            f"the file tells a sample time of {step:g} s and {clock.name!r} steps of "
+            f"{clock.step:g} s: {clock.name!r} was taken for the time"
+        ]
+
     def _nearest(self, name: str) -> float | None:
         """What is said of the sample time nearest to an array, in its folder or one around it."""
         folder = name
@@ -154,7 +170,7 @@ class Arrays:
     def found(self, asked: Asked) -> Found:
         """What a stream takes of them."""
         shapes = self._of_group(asked.group)
-        times = [n for n, s in shapes.items() if len(s) == 1 and time_named([_leaf(n)])]
+        times = [n for n, s in shapes.items() if s[1:] in ((), (1,)) and time_named([_leaf(n)])]
         shapes = {n: s for n, s in shapes.items() if n not in times}
         leaves = [_leaf(n) for n in shapes]
         shown = leaves if len(set(leaves)) == len(leaves) else list(shapes)
@@ -203,7 +219,8 @@ class Arrays:
             if full in self.hollow
         }
         notes = [note for t in told.values() for note in t.notes]
-        notes += [] if clock is None else clock.notes
+        notes += [] if clock is None else [*self._against(wanted, clock), *clock.notes]
+        notes += [said for full in named.values() if (said := self.unclear[full])]
         return Found(
             blocks, names, count, dt, str(self.path), units=units, clock=clock, hollow=hollow,
             notes=tuple(dict.fromkeys(notes)), by_name=True,

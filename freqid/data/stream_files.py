@@ -22,6 +22,9 @@ from freqid.data.stream_views import from_the_first
 from freqid.data.time_column import Told
 from freqid.data.time_names import is_called_a_time, time_named
 
+# what pandas calls an index without a name
+_INDEX = "__index_level_0__"
+
 
 def of_file(path: Path, asked: Asked) -> Found:
     """The blocks of a file."""
@@ -120,6 +123,8 @@ def _of_parquet(path: Path, asked: Asked) -> Found:
         raise InputError(f"{path}: {damaged('Parquet', error)}") from None
     every = [str(n) for n in file.schema_arrow.names]
     time = time_named(every)
+    if time is None and _is_stamps(file.schema_arrow, _INDEX):
+        time = _INDEX
     count, clock, told_units = file.metadata.num_rows, None, field_units(file.schema_arrow)
     kept = [n for n in every if n != time and is_kept(n)]
     told = None
@@ -132,6 +137,9 @@ def _of_parquet(path: Path, asked: Asked) -> Found:
             unit = told_units.get(time, "")
             if asked.dt is None:
                 beside = _told_by(file, time, every, told_units, asked.channels)
+                if time == _INDEX:
+                    # a time that nobody named is taken without a word, as from a frame
+                    beside.notes.clear()
                 same, notes, unit = beside.same, beside.notes, beside.unit
                 clock = even(str(path), time, *_stamps(file, time), unit)
                 notes += clock.notes
@@ -162,6 +170,16 @@ def _of_parquet(path: Path, asked: Asked) -> Found:
     )  # fmt: skip
 
 
+def _is_stamps(schema: Source, name: str) -> bool:
+    """Whether a schema has dates or durations by that name."""
+    import pyarrow as pa
+
+    if name not in schema.names:
+        return False
+    kind = schema.field(name).type
+    return bool(pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
+
+
 def _told_by(
     file: Source,
     time: str,
@@ -171,7 +189,9 @@ def _told_by(
 ) -> Told:
     """What the first rows of the time and of columns that are called so tell."""
     called = [n for n in every if n == time or time_named([n]) or is_called_a_time(named(n)[0])]
-    first = next(file.iter_batches(batch_size=FIRST, columns=called)).to_pandas()
+    first = next(file.iter_batches(batch_size=FIRST, columns=called)).to_pandas(
+        ignore_metadata=True
+    )
     plain = {str(n): named(str(n))[0] for n in first.columns}
     told = {plain[n]: units.get(n) or named(n)[1] for n in plain}
     return told_by(first.rename(columns=plain), named(time)[0], told, channels)

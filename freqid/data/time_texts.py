@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 # T#1s10ms of controllers, IEC 61131-3
 _DURATION = re.compile(r"^\s*(?:T|TIME|LT|LTIME)#(?=[\d-])", re.IGNORECASE)
-# 10:00:00:010, whose last part is of a second, and 58:00.01, which lacks its hours
-_FOUR = re.compile(r"(\d{1,2}:\d{2}:\d{2}):(\d{1,9})\s*$")
+# 10:00:00:010 and 10:00:00,010, whose last part is of a second, and 58:00.01, which lacks its hours
+_FOUR = re.compile(r"(\d{1,2}:\d{2}:\d{2})[:,](\d{1,9})(?=\s*$|\s*[AaPp]\.?[Mm]|\s*Z|\s*[+-]\d)")
 _TWO = re.compile(r"^\s*(\d{1,3}:\d{2})[.,](\d+)\s*$")
 
 

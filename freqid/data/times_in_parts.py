@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,12 +18,23 @@ if TYPE_CHECKING:
 _CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}([.,:]\d+)?)?(\s?[AP]M)?", re.IGNORECASE)
 # whole seconds, and the names of what is beyond them, as ROS and POSIX have them
 _SECONDS = re.compile(r"(.*?)(sec|secs|s)", re.IGNORECASE)
+_FRACTIONS = (
+    r"(ms|msec|msecs|millis|millisec|milliseconds?|us|µs|usec|microseconds?|ns|nsec|nanoseconds?)"
+)
+_WHOLE = r".*\d{1,2}:\d{2}:\d{2}\s*"
 _BEYOND = r"(nanosec|nanosecs|nanoseconds|nsec|nsecs|usec|usecs|ns|us)"
 
 
 def joined(frame: pd.DataFrame) -> pd.DataFrame:
     """The frame with a time in two columns side by side, if there is one, in one."""
-    for first, second in zip(frame.columns[:-1], frame.columns[1:], strict=True):
+    for at, (first, second) in enumerate(pairwise(frame.columns)):
+        stamps = _with_fractions(frame, first, second)
+        if stamps is not None:
+            rest = frame.drop(columns=[first, second])
+            rest.insert(at, first, stamps)
+            rest.attrs = frame.attrs
+            return joined(rest)
+    for first, second in pairwise(frame.columns):
         for way in (_of_day, _of_seconds):
             times = way(frame, first, second)
             if times is not None:
@@ -31,6 +43,28 @@ def joined(frame: pd.DataFrame) -> pd.DataFrame:
                 rest.attrs = frame.attrs
                 return rest
     return frame
+
+
+def _with_fractions(frame: pd.DataFrame, clock: str, beyond: str) -> pd.Series[str] | None:
+    """Stamps in whole seconds with the milliseconds, or finer, of the column behind them."""
+    stamps, rest = frame[clock], frame[beyond]
+    unit = re.fullmatch(_FRACTIONS, str(beyond).strip(), re.IGNORECASE)
+    if unit is None or stamps.dtype.kind in "fiubcmM" or rest.dtype.kind not in "iu":
+        return None
+    texts = stamps.astype(str)
+    digits = {"m": 3, "u": 6, "µ": 6, "n": 9}[str(beyond).strip()[0].casefold()]
+    values = rest.to_numpy()
+    within = (texts.to_numpy()[1:] == texts.to_numpy()[:-1]).nonzero()[0]
+    if not len(within) or (np.diff(values)[within] <= 0).any():
+        # another column of a table in which each second has a row
+        return None
+    if (
+        values.min() < 0
+        or values.max() >= 10**digits
+        or not texts.iloc[:5].str.fullmatch(_WHOLE).all()
+    ):
+        return None
+    return texts.str.strip() + "." + rest.astype(str).str.zfill(digits)
 
 
 def _of_day(frame: pd.DataFrame, day: str, clock: str) -> pd.Series[str] | None:

@@ -47,10 +47,13 @@ _CAMEL = re.compile(r"(?<=[a-z])(Sec|Ms|Us|Ns)$")
 LONG = re.compile(r"(time|elapsed|elapsed time|zeit)[_\s.-]+(min|h|minutes|hours)\.*")
 # a date, and one that a time of day follows; seconds of a day
 DATE = re.compile(r"\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}")
-_DATED = rf"\s*{DATE.pattern}\s"
+_DATED = rf"(?:^\s*{DATE.pattern}|\s{DATE.pattern}\s*$)"
 _DAY = 86_400.0
 # two numbers of a date, day and month, before its year
-_SLASHED, _MONTHS = re.compile(r"\s*(\d{1,2})[/-](\d{1,2})[/-]\d{4}"), 12
+_SLASHED = re.compile(r"\s*(\d{1,2})[/-](\d{1,2})(?:[/-]\d{4}|(?<=/\d\d)/\d{2}(?!\d))")
+_MONTHS = 12
+# a time of day of a clock that counts to twelve
+_HALF_DAYS = r"\s*\d{1,2}:\d{2}[\d:.,]*\s*[AaPp]\.?[Mm]\.?\s*"
 # the end of a stamp whose time of day says how far it is from universal time
 _OFFSET = r":\d{2}[\d.,]*\s*(?:Z|[+-]\d{2}:?\d{2})\s*$"
 # beyond it a difference may be more than a double holds
@@ -92,7 +95,7 @@ def converted(column: Column) -> Column | None:
         )
     # with dots the day comes first
     first = bool(texts.contains(r"\d\.\d+\.").any()) or _begins_with_the_day(column)
-    dated, apart = bool(texts.match(_DATED).any()), texts.contains(_OFFSET)[column.notna()]
+    dated, apart = bool(texts.contains(_DATED).any()), texts.contains(_OFFSET)[column.notna()]
     if apart.any() and not apart.all():
         return None  # which hour the others mean would be a guess
     ways: list[Callable[[], Any]] = [
@@ -165,6 +168,9 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
                 f"column {name!r} holds {column.iloc[row]!r}, which is neither a number nor a "
                 f"time, in row {row}; mend or leave out the row"
             )
+        if times.dtype.kind == "M" and column.dropna().astype(str).str.fullmatch(_HALF_DAYS).all():
+            # of a time of day with AM or PM pandas makes one of today
+            times = times - times.dt.normalize()
         return in_seconds(name, times, unit)
     values = of_this_world(name, _less_the_first(column.to_numpy()))
     wanted = unit or unit_in_name_of_time(name)

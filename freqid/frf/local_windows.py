@@ -23,8 +23,9 @@ _BLOCK = 256
 _LINES_A_WINDOW = 24
 # windows from which the noise that a width costs is judged
 _JUDGED = 24
-# part of a line's power below which an input is over
-_ENDED = 0.05
+# part of a line's power below which an input is over, and how many times as wide as what its lines
+# have in common a window is that may reach so far
+_ENDED, _WIDE = 0.05, 3
 # numbers that are kept of how the noise of lines gets into a response, at the most
 _KEPT = 4_000_000
 
@@ -136,9 +137,12 @@ def _first(lines: Lines, centres: IntArray, form: Form) -> IntArray:
     """
     K, width = len(lines.frequency), form.width
     power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
-    # some lines of an input of noise are weak and their neighbours are not
-    power = scipy.ndimage.maximum_filter1d(power, 2 * form.order + 3, mode="nearest")
     found = _centred(centres, form, K)
+    # some lines of an input of noise are weak and their neighbours are not
+    alike = 2 * form.order + 3
+    if width < _WIDE * alike:
+        return found
+    power = scipy.ndimage.maximum_filter1d(power, alike, mode="nearest")
     for start in range(0, len(centres), _BLOCK):
         own = centres[start : start + _BLOCK, None]
         reach = own + np.arange(-width, width + 1)
@@ -155,7 +159,8 @@ def _first(lines: Lines, centres: IntArray, form: Form) -> IntArray:
         ends = np.clip(np.stack([moved, moved + width - 1]) - own.T + width, 0, 2 * width)
         kept = strong[np.arange(len(at)), ends].all(axis=0) & ((left == first) | (right == last))
         found[start : start + _BLOCK] = np.where(kept, moved, first)
-    return found
+    # neither does a window begin before another one whose own line it follows
+    return np.maximum.accumulate(found)
 
 
 def _laid_out(lines: Lines, centres: IntArray, first: IntArray, form: Form) -> _Equations:

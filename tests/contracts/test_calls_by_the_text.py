@@ -124,3 +124,16 @@ def test_names_that_0_1_0_had():
     many = LAG.state_spaces(b=np.array([1.0, 2.0]), a=np.array([3.0, 4.0]))
     np.testing.assert_array_equal(many.A, [[[-3.0]], [[-4.0]]])
     np.testing.assert_array_equal(many.B, [[[1.0]], [[2.0]]])
+
+
+@pytest.mark.parametrize("estimated", [fq.etfe, lambda r: fq.h1(r, 500), fq.local_polynomial])
+def test_lines_are_selected_by_the_same_name_from_all_responses(record, estimated):
+    """``etfe(...).select(band=...)`` was a TypeError: there the band went by another name."""
+    seen = estimated(record)
+    within = seen.select(band=(20, 30))
+    np.testing.assert_array_equal(within.frequency, seen.select((20, 30)).frequency)
+    np.testing.assert_array_equal(within.frequency, seen.select(limits=(20, 30)).frequency)
+    assert 19.99 < within.frequency[0] < within.frequency[-1] < 30.01
+    assert len(within.frequency) < len(seen.frequency)
+    with pytest.raises(ValueError, match="band"):
+        seen.select(band=(30, 20))

@@ -271,7 +271,7 @@ CASES = {
     "Stream.with_hold": (STREAM, "hold: hold"),
     "Stream.with_band": (STREAM, "band: band"),
     "Stream.load": (STREAM, "stop: count"),
-    "FrequencyResponse.select": (FRF, "limits: band"),
+    "FrequencyResponse.select": (FRF, "band: band"),
     "GreyBox.frequency_response": (PLANT, "omega: samples"),
     "Estimate.save": (EST, "path: path"),
     "Estimate.report": (EST, "path: path"),

@@ -27,7 +27,7 @@ _UNIT_NAMES = ("units", "unit", "unit_label", "unit_string", "time_unit", "time_
 # numbers of an array that is beside the channels, and how much shorter than these it is
 _FEW = 16
 # words of names that mean the time, and the part of a step by which two are not the same
-_TIMES, _OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
+_TIMES, OFF = {"t", "time", "times", "timestamp", "zeit", "temps", "tijd", "tout"}, 0.02
 # part of a step by which steps of a time may jitter, and part of them that have to keep to that
 _JITTER, _MOSTLY = 0.5, 0.9
 # no time is so long
@@ -84,6 +84,23 @@ def clock_number(name: str, value: float, unit: str) -> float | None:
     factors = _RATE_UNITS if name in _RATES else UNITS
     factor = factors.get(unit, factors.get(unit.casefold())) if unit else 1.0
     return None if factor is None else value * factor
+
+
+def clock_of(name: str, told: object) -> float | None:
+    """What an attribute called as sample times and rates are tells in s or Hz, ``1000 Hz`` or a
+    number; None for what is neither.
+    """
+    value = np.ravel(np.asarray(told))
+    if value.size != 1:
+        return None
+    if value.dtype.kind not in "SUO":
+        return float(value[0])
+    text = text_of(value[0]) if isinstance(value[0], (str, bytes)) else ""
+    found = re.fullmatch(r"\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S*)\s*", text)
+    try:
+        return None if found is None else clock_number(name, float(found[1]), found[2])
+    except ValueError:
+        return None
 
 
 def _is_long(x: Array) -> bool:
@@ -181,11 +198,11 @@ def _alike(short: Array, long: Array) -> bool:
     one merely counts; those of one step are of two experiments.
     """
     own, step = _mean(short), _mean(long)
-    if abs(own / step - 1) <= _OFF:
+    if abs(own / step - 1) <= OFF:
         return False
     spans = own * len(short) / (step * len(long)), np.ptp(short) / np.ptp(long)
     counts = own == 1 and bool((np.diff(short) == 1).all())
-    return counts or any(abs(s * u - 1) <= _OFF for s in spans for u in _UNITS)
+    return counts or any(abs(s * u - 1) <= OFF for s in spans for u in _UNITS)
 
 
 def _fields(arrays: Mapping[str, object]) -> Iterator[tuple[str, object]]:
@@ -208,8 +225,8 @@ def _against(step: float, name: str, times: Array) -> str:
     steps, in whichever unit; empty where the two agree.
     """
     steps, own = np.diff(times), _mean(times)
-    even = bool(np.abs(steps / own - 1).max() <= _OFF)
-    if even and any(abs(own * u / step - 1) <= _OFF for u in _UNITS):
+    even = bool(np.abs(steps / own - 1).max() <= OFF)
+    if even and any(abs(own * u / step - 1) <= OFF for u in _UNITS):
         return ""
     return (
         f"the file tells a sample time of {step:g} s and {name!r} steps of {own:g}: {name!r} was "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from freqid.checks import Array, InputError
-from freqid.data.readers.columns import CLOCKS, clock_number, columns_of, unit_of
+from freqid.data.readers.columns import CLOCKS, clock_number, clock_of, columns_of, unit_of
 from freqid.data.readers.hdf5_structure import check_structure
 from freqid.data.readers.kinds import damaged, missing, of_one_group, reads
 from freqid.data.readers.limits import check_size
@@ -57,8 +57,8 @@ def read_hdf5(path: Path, group: str | None = None) -> pd.DataFrame:
                 value, unit = np.asarray(told), ""
             found.setdefault(parent, {})[leaf] = value
             units.setdefault(parent, {})[leaf] = unit
-            clocks = {n: v for n, v in item.parent.attrs.items() if n in CLOCKS and np.size(v) == 1}
-            found[parent] |= {n: np.asarray(v).reshape(()) for n, v in clocks.items()}
+            clocks = {n: clock_of(n, v) for n, v in item.parent.attrs.items() if n in CLOCKS}
+            found[parent] |= {n: np.asarray(v) for n, v in clocks.items() if v is not None}
 
     try:
         # visititems follows no external and no soft links

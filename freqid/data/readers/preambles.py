@@ -30,11 +30,19 @@ def body_of(text: str) -> Body:
         if parts > 1:
             raise InputError(f"holds {parts} segments of LabVIEW; keep one of them in each file")
         body = text[ends[-1] :]
+        said = ["the headers of LabVIEW were left out"]
         head, mark, rest = body.partition("\n")
         # a column of remarks, which rows without one leave out
         plain = re.sub(r"\tComment\s*$", "", head)
-        return Body(plain + mark + rest, notes=("the headers of LabVIEW were left out",))
-    return _counted(text) or Body(text)
+        above = text[: ends[-1]]
+        step = re.search(r"^Delta_X\t([\d.eE+-]+)", above, re.MULTILINE)
+        if step and re.search(r"^X_Columns\tNo\b", above, re.MULTILINE):
+            # a column of times is kept free and not written
+            plain = re.sub(r"^X_Value\b", "time", plain)
+            said.append(f"the time counts in steps of {float(step[1]):g} s")
+            return Body(plain + mark + rest, (0.0, float(step[1])), tuple(said))
+        return Body(plain + mark + rest, notes=tuple(said))
+    return _counted(text) or _stepped(text) or Body(text)
 
 
 def _counted(text: str) -> Body | None:
@@ -60,3 +68,19 @@ def _counted(text: str) -> Body | None:
         # seconds, which the step says once more
         return Body(f"{head}\n{rest}")
     return Body(f"{head}\n{rest}", (start, step), (f"the time counts in steps of {step:g} s",))
+
+
+def _stepped(text: str) -> Body | None:
+    """Rigol's newer ones: ``CH1V,CH2V,t0 =-1.0e-01, tInc = 1.0e-02`` above samples alone."""
+    head = text[:_LOOK].partition("\n")[0]
+    found = re.search(r",\s*t0\s*=\s*(\S+?)\s*,\s*tInc\s*=\s*([^\s,]+)[\s,]*$", head)
+    if found is None:
+        return None
+    try:
+        start, step = float(found[1]), float(found[2])
+    except ValueError:
+        return None
+    said = (f"the time counts in steps of {step:g} s",)
+    return (
+        Body(head[: found.start()] + text[len(head) :], (start, step), said) if step > 0 else None
+    )

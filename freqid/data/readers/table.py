@@ -54,7 +54,7 @@ def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) 
     """The layout of a text table; ValueError where no lines of numbers can be found."""
     shown = [_uncommented(line) for line in lines]
     quoted = any('"' in line for line in shown[-60:])
-    best: tuple[float, int, Layout] | None = None
+    best: tuple[float, int, Layout | InputError] | None = None
     # who says which sign is the decimal one says that the other is none
     sure = decimal is not None
     for mark in [separator] if separator else _SEPARATORS:
@@ -73,6 +73,8 @@ def layout_of(lines: Sequence[str], separator: str | None, decimal: str | None) 
             "and decimal="
         )
     layout = best[2]
+    if isinstance(layout, InputError):
+        raise layout
     if decimal is None:
         _check_thousands([parted(line, layout.separator) for line in shown[layout.first :]], layout)
     return layout
@@ -144,8 +146,10 @@ def _is_value(cell: str, sign: str, mark: str, sure: bool = False) -> bool:
 
 def _tried(
     lines: Sequence[str], mark: str, sign: str, sure: bool
-) -> tuple[float, int, Layout] | None:
-    """How well a separator and a decimal sign explain the lines: part of numbers, columns."""
+) -> tuple[float, int, Layout | InputError] | None:
+    """How well a separator and a decimal sign explain the lines: part of numbers, columns; with the
+    layout goes what is wrong with it where it has no names.
+    """
     rows = [parted(line, mark) for line in lines]
     last = [r for r in rows[-60:] if any(r)]
     if not last:
@@ -171,9 +175,13 @@ def _tried(
     cells = [c for r in rows[first : first + 60] for c in r if c]
     numbers = sum(_is_number(c, sign, mark, sure) for c in cells) / max(len(cells), 1)
     marked = any(_in_thousands(c, sign, mark, sure) for c in cells)
-    names, units, headed = heading([r for r in rows[:first] if any(r)], width)
-    layout = Layout(mark, sign, first, names, units, headed, OTHER[sign] if marked else None)
-    return round(share * numbers, 2), width, layout
+    score = round(share * numbers, 2)
+    try:
+        names, units, headed = heading([r for r in rows[:first] if any(r)], width)
+    except InputError as error:
+        return score, width, error
+    thousands = OTHER[sign] if marked else None
+    return score, width, Layout(mark, sign, first, names, units, headed, thousands)
 
 
 def _below_settings(

@@ -87,6 +87,10 @@ def read_text(path: Path, sep: str | None = None, decimal: str | None = None) ->
     grouped = _without_thousands(frame, layout)
     frame = _with_names(frame, layout if grouped is None else grouped)
     if clock is not None:
+        if "time" not in frame:
+            frame.insert(0, "time", np.arange(len(frame)))
+        if frame["time"].isna().all():
+            frame["time"] = np.arange(len(frame))
         try:
             count = frame["time"].to_numpy(dtype=float)
         except ValueError:
