@@ -17,14 +17,18 @@ from freqid.fitting.heard_back import heard_back
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
+from freqid.fitting.suspects.order import LACKING
 
 # said where the rest of the input did harm
 FED_BACK = (
     "what a fit to the input as it is leaves goes together with what the reference leaves of it: "
     "the noise comes back through a loop, or the input was measured with noise; it was not used"
 )
-# what an input that answers to the noise at once looks like
-_ALIKE = frozenset({"feedback", "delay", "lag", "feedthrough", "hold rejected", "high-pass"})
+# what an input that answers to the noise looks like: at once, or to a plant with a dead time, of
+# which a black box foretells the noise by its input
+_ALIKE = frozenset(
+    {"feedback", "delay", "lag", "feedthrough", "hold rejected", "high-pass", *LACKING}
+)
 # standard errors that it may have moved a parameter by: going through the reference costs as much
 _HARMLESS = 0.7
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -131,6 +131,26 @@ def errors_of(model: Model, reading: Reading) -> LineErrors:
     number = np.round(lines.omega * N * dt / (2 * np.pi))
     multiplicity = np.where((number == 0) | (2 * number == N), 1.0, 2.0)
     return LineErrors(lines.omega, error, multiplicity, N, dt, len(record.u) // record.factor)
+
+
+def free_motions(model: Model, reading: Reading) -> FloatArray:
+    """What initial states can add to the errors of a model, as signals (q, N, outputs), in any
+    size; none where these are known.
+    """
+    record = reading.data
+    assert isinstance(record, Record)
+    whole = errors_of(model, reading)
+    reading = reading.at_lines()
+    shape, plane = (model.n_outputs, model.n_inputs), Plane() if model.dt else None
+    (experiment,) = read_for(shape, [reading], plane)
+    assert isinstance(experiment, SpectralExperiment)
+    evaluation = experiment.at(model.still())
+    if evaluation.transient is None:
+        return np.zeros((0, whole.shown, model.n_outputs))
+    Q, _ = eliminate(evaluation.transient, evaluation.residual)
+    scale = experiment.lines.scale[:, 0]
+    each = [row.view(complex).reshape(scale.shape) / scale for row in Q]
+    return np.array([replace(whole, error=error).in_time() for error in each])
 
 
 def errors_of_response(model: Model, reading: Reading) -> tuple[ComplexArray, FloatArray]:

@@ -19,7 +19,7 @@ from freqid.fitting.black_box.output_error import with_scatter
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
 from freqid.fitting.reading import Reading
-from freqid.fitting.residuals import errors_of
+from freqid.fitting.residuals import errors_of, free_motions
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.uncertainty.minimum import Spread
 from freqid.fitting.witness import as_begun
@@ -29,6 +29,12 @@ from freqid.models import GreyBox, Model
 _CUT, _FAR = 1.5, 3.0
 # steps at the most, and the part of a standard error that ends them
 _STEPS, _STANDS = 30, 0.01
+# rounds of weights for initial states, and part of the samples that are far off where all is well
+_ROUNDS, _MANY = 50, 0.1
+# samples far off of one value that are no chance
+_REPEATED = 5
+# logarithm by which errors scatter less than outputs of which something is explained
+_SOME = 0.05
 # the median of |e| in standard deviations of a normal variable
 _MEDIAN = 0.6744897501960817
 # a size that no error has, and logarithms of the scatter within which two estimates are alike
@@ -57,26 +63,31 @@ def robust_fit(
         raise InputError("loss='huber' needs all lines: a band spreads a spike over the record")
     est, seen = work(readings, None)
     best = _settled(work, readings, est, seen)
-    for again in (lambda seen: work(seen, None), lambda _: _from(work, readings, begin)):
-        if best.at_rest:
+    samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
+    alone, nothing = _clipped(readings)
+    start, least = _begun(begin, readings) or (None, np.inf)
+    least = min(least, nothing - _SOME)
+    for cut in (lambda best: best.seen, lambda _: start, lambda _: alone):
+        if best.at_rest(least, _MANY * samples):
             break
         try:
-            found = again(best.seen)
-            other = None if found is None else _settled(work, readings, *found)
+            again = cut(best)
+            other = None if again is None else _settled(work, readings, *work(again, None))
         except _LOST:
             continue
         # of two that end alike the later one has made the starts that were asked for
         if other is not None and other.scatter <= best.scatter + _ALIKE:
             best = other
-    samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
     note = (
         f"Huber's loss: {best.count} of {samples} samples are off by more than {_FAR:g} standard "
         "deviations and count less"
     )
-    est = best.est
+    est, alike = best.est, _alike(best, readings)
     minimum = dataclasses.replace(est.minimum, inflation=1 / best.inside**2)
     spread = Spread(est.scatter.change, minimum)
-    robust = with_scatter(dataclasses.replace(est, notes=[*est.notes, note]), minimum, spread)
+    robust = with_scatter(
+        dataclasses.replace(est, notes=[*est.notes, note, *alike]), minimum, spread
+    )
     return robust, best.seen
 
 
@@ -98,12 +109,17 @@ class _Settled:
     def noiseless(self) -> bool:
         return self.est.minimum.objective.noiseless(self.est.minimum.cost)
 
-    @property
-    def at_rest(self) -> bool:
-        """Whether nothing else is worth a search: a black box begins by itself in each round."""
+    def at_rest(self, least: float, most: float) -> bool:
+        """Whether nothing else is worth a search: a black box begins by itself in each round. What
+        scatters more than the ``least`` that is known, or has so many samples far off that these
+        are ``most`` and more, is no minimum to rest in.
+        """
         if self.noiseless or self.est.message == INTERRUPTED:
             return True
-        return not isinstance(self.est.model, GreyBox) or self.est.witness.verdict == "complete"
+        if not isinstance(self.est.model, GreyBox):
+            return True
+        doubted = self.scatter > least or self.count > most
+        return not doubted and self.est.witness.verdict == "complete"
 
 
 def _settled(
@@ -127,11 +143,80 @@ def _settled(
     return dataclasses.replace(found, est=as_begun(found.est, first))
 
 
-def _from(
-    work: Work, readings: Sequence[Reading], begin: Model | None
-) -> tuple[Estimate, Sequence[Reading]] | None:
-    """The fit of what is left once the errors of a model are cut; None without one."""
-    return None if begin is None else work(_cut(begin, readings, readings)[0], None)
+def _clipped(readings: Sequence[Reading]) -> tuple[Sequence[Reading], float]:
+    """Readings whose outputs are cut themselves, as if no model explained any of them, and the
+    logarithm of their median size.
+    """
+    cut, sizes = [], []
+    for r in readings:
+        assert isinstance(r.data, Record)
+        y = r.data.outputs
+        middle = np.median(y, axis=0)
+        scale = np.median(np.abs(y - middle), axis=0) / _MEDIAN
+        sizes.append(np.log(np.maximum(scale, _NONE)).mean())
+        limit = _CUT * np.where(scale > 0, scale, np.inf)
+        y = np.clip(y, middle - limit, middle + limit).reshape(r.data.y.shape)
+        cut.append(r.with_(data=dataclasses.replace(r.data, y=y)))
+    return cut, float(np.mean(sizes))
+
+
+def _begun(
+    begin: Model | None, readings: Sequence[Reading]
+) -> tuple[Sequence[Reading], float] | None:
+    """Readings without what a model leaves that is far off, and how it scatters; None where it
+    cannot be asked.
+    """
+    if begin is None:
+        return None
+    try:
+        cut, _, _, scatter = _cut(begin, readings, readings)
+    except _LOST:
+        return None
+    return (cut, scatter) if np.isfinite(scatter) else None
+
+
+def _alike(best: _Settled, readings: Sequence[Reading]) -> list[str]:
+    """What is to be said of samples that are far off for one value that many of them have."""
+    said = []
+    for r, own in zip(readings, best.seen, strict=True):
+        assert isinstance(r.data, Record)
+        assert isinstance(own.data, Record)
+        moved = np.abs(own.data.outputs - r.data.outputs)
+        for name, y, apart in zip(r.data.output_names, r.data.outputs.T, moved.T, strict=True):
+            # as far beyond the cut as that is from nothing
+            scale = np.median(apart[apart > 0]) if apart.any() else np.inf
+            values, counts = np.unique(y[apart > scale], return_counts=True)
+            most = counts.max(initial=0)
+            if most >= _REPEATED and 2 * most > counts.sum():
+                said.append(
+                    f"{most} samples of {name!r} that are far off hold {values[counts.argmax()]:g}:"
+                    " a signal that drops out or stands still, or a code for none, pulls to one "
+                    "side, which no error bar knows; leave these samples out"
+                )
+    return said
+
+
+def _at_rest_of_most(error: FloatArray, motions: FloatArray) -> FloatArray:
+    """Errors (N, outputs) with the initial states, of which there are ``motions`` (q, N, outputs),
+    as most samples have them: one that is far off at the start would be taken for a motion.
+
+    Least absolute values by weights that are taken anew (Huber, Robust Statistics, 1981, 7.8).
+    """
+    if not len(motions):
+        return error
+    size = np.median(np.abs(error), axis=0) / _MEDIAN
+    # of which most is nothing, as of what is but rounding, the largest tells the size
+    size = np.where(size > 0, size, np.abs(error).max(axis=0))
+    size = np.where(size > 0, size, 1.0)
+    rows, left = (motions / size).reshape(len(motions), -1), (error / size).ravel()
+    for _ in range(_ROUNDS):
+        weights = 1 / np.maximum(np.abs(left), _CUT)
+        gram = (rows * weights) @ rows.T
+        step = np.linalg.lstsq(gram, (rows * weights) @ left)[0] @ rows
+        left = left - step
+        if np.abs(step).max(initial=0.0) < _STANDS:
+            break
+    return left.reshape(error.shape) * size
 
 
 def _cut(
@@ -151,6 +236,7 @@ def _cut(
         model = met_by(found, own) if isinstance(found, Estimate) else found
         error = errors_of(model, own).in_time()
         error = error + (seen.outputs - record.outputs)[: len(error)]
+        error = _at_rest_of_most(error, free_motions(model, own))
         scale = np.median(np.abs(error), axis=0) / _MEDIAN
         sizes.append(np.log(np.maximum(scale, _NONE)).mean())
         limit = _CUT * np.where(scale > 0, scale, np.inf)
