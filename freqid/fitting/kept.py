@@ -76,11 +76,17 @@ def written(est: Estimate) -> Written:
         "weights": est.weights if isinstance(est.weights, str) else None,
         "call": est.call,
         "findings": [_finding(w) for w in est.warnings],
-        "data": [_described(d) for d in est.data],
+        "data": vars(est).get("described") or [_described(d) for d in est.data],
         "suspects": _table(est.suspects),
-        "modes": _table(est.modes()) if est.problem is not None else None,
+        "modes": _modes_of(est),
         "box": _box_of(est),
     }
+
+
+def _modes_of(est: Estimate) -> Written | None:
+    """The table of modes, of a loaded estimate the one that it has kept."""
+    known = vars(est).get("known_modes")
+    return None if known is None and est.problem is None else _table(est.modes())
 
 
 def _box_of(est: Estimate) -> Written | None:
@@ -174,6 +180,7 @@ def _estimate(kept: Written, model: GreyBox | None) -> Estimate:
                   for w in kept["findings"]],
         told_by=told_by,
         _parameters=with_tied(table, est, quantile(told_by, 0.95)),
+        described=kept["data"],
         digests=[d["sha256"] for d in kept["data"]],
         remembered=(None if said is None else hold_of_dict(said), kept.get("input_dt")),
     )  # fmt: skip

@@ -85,7 +85,8 @@ def _delicate(A: FloatArray, apart: float) -> bool:
     if not np.isfinite(A).all():
         return False
     # in units of their own the states of any plant would look alike
-    poles, V = np.linalg.eig(scipy.linalg.matrix_balance(A, permute=False)[0])
+    with np.errstate(invalid="ignore"):
+        poles, V = np.linalg.eig(scipy.linalg.matrix_balance(A, permute=False)[0])
     size = np.abs(poles)
     largest = float(size.max())
     if largest == 0 or len(A) == 1:

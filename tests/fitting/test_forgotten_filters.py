@@ -131,3 +131,38 @@ def test_a_filter_that_is_tried_in_vain_warns_of_nothing(seed):
     y = y + 0.02 * y.std() * rng.standard_normal(3000)
     est = fq.fit(servo, fq.Record(u, y, 5e-3))
     assert est.warnings[0].kind == "hold rejected"
+
+
+def heat_exchanger():
+    def matrices(a, b, c):
+        return [[-a - c, c], [c, -b - c]], [[a, 0], [0, b]], np.eye(2), None
+
+    rates = [fq.Parameter(n, v) for n, v in (("a", 0.02), ("b", 0.05), ("c", 0.01))]
+    return fq.GreyBox(matrices, rates, name="exchanger")
+
+
+@pytest.mark.parametrize("late", [0, 1])
+@pytest.mark.parametrize("kind", ["white", "steps"])
+def test_a_lag_of_one_input_of_two_is_named_with_its_time(late, kind):
+    """Only lags of all inputs, or of an output, had been tried: 9 of 9 were a delay of the other
+    input as well, or a lag of an output.
+    """
+    plant, dt, T = heat_exchanger(), 5.0, 10.0
+    rng = np.random.default_rng(3)
+    u = rng.standard_normal((1000, 2))
+    if kind == "steps":
+        u = np.repeat(rng.choice([-1.0, 1.0], (100, 2)), 10, axis=0)
+    A, B = (np.array(m, float) for m in plant.matrices(a=0.02, b=0.05, c=0.01)[:2])
+    seen = np.arange(2) == late
+    whole = np.block([[A, B[:, [late]]], [np.zeros((1, 2)), np.full((1, 1), -1 / T)]])
+    drive = np.vstack([np.where(seen, 0.0, B), seen / T])
+    Ad, Bd, *_ = scipy.signal.cont2discrete((whole, drive, np.eye(2, 3), np.zeros((2, 2))), dt)
+    x, y = np.zeros(3), np.empty((1000, 2))
+    for k in range(1000):
+        y[k], x = x[:2], Ad @ x + Bd @ u[k]
+    y += 0.05 * y.std(axis=0) * rng.standard_normal(y.shape)
+    est = fq.fit(plant, fq.Record(u, y, dt))
+    first = est.warnings[0]
+    assert first.kind == "lag"
+    assert f"at input 'u{late + 1}'" in first
+    assert float(re.search(r"a lag of ([\d.]+) s", first)[1]) == pytest.approx(T, rel=0.05)

@@ -64,6 +64,11 @@ def test_what_is_kept(kind, tmp_path):
     assert np.array_equal(kept.to_control().A, est.to_control().A)
     kept.save(tmp_path / "again.json")
     assert fq.load(tmp_path / "again.json").verdict == est.verdict
+    # what the data were and how the plant moves is written once more
+    first, again = (json.loads((tmp_path / n).read_text()) for n in ("est.json", "again.json"))
+    assert {k: v for k, v in again.items() if k != "saved"} == {
+        k: v for k, v in first.items() if k != "saved"
+    }
 
 
 @pytest.mark.study

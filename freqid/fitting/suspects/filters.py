@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import Array, InputError
+from freqid.data import DataSet
+from freqid.fitting.estimate import Estimate
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.suspects.asking import Asking
@@ -30,12 +32,13 @@ _SEEN, _WIDE = 2.0, 1e3
 @dataclass(frozen=True)
 class _Filter:
     """One of a time T (s), of ``order`` 1 (1/(1 + Ts)) or 2 (Butterworth's), or what the first one
-    leaves (Ts/(1 + Ts)), ``high``; of all inputs, or of an ``output`` (a number).
+    leaves (Ts/(1 + Ts)), ``high``; of all inputs, of one ``input``, or of an ``output`` (numbers).
     """
 
     order: int = 1
     high: bool = False
     output: int | None = None
+    input: int | None = None
 
     def states(self, T: complex) -> tuple[Array, Array, Array]:
         """Its matrices A (n, n), B (n, 1) and C (1, n)."""
@@ -55,11 +58,12 @@ class _Filter:
             D = np.zeros((p, m)) if D is None else np.asarray(D)
             D = D if D.ndim else np.zeros((p, m))
             if self.output is None:
-                one = np.eye(m)
-                a, b, c = np.kron(one, a), np.kron(one, b), np.kron(one, c)
+                own = np.eye(m) if self.input is None else np.eye(m)[:, [self.input]]
+                one, rest = np.eye(own.shape[1]), np.eye(m) - own @ own.T
+                a, b, c = np.kron(one, a), np.kron(one, b), own @ np.kron(one, c)
                 corner = np.zeros((len(a), len(A)))
                 whole = np.block([[A, B @ c], [corner, a]])
-                return whole, np.vstack([0 * B, b]), np.hstack([C, D @ c]), 0 * D
+                return whole, np.vstack([B @ rest, b @ own.T]), np.hstack([C, D @ c]), D @ rest
             seen = np.arange(p)[:, None] == self.output
             whole = np.block([[A, np.zeros((len(A), len(a)))], [b @ C[[self.output]], a]])
             kept = 1.0 * (~seen | self.high)
@@ -69,11 +73,13 @@ class _Filter:
 
         return matrices
 
-    def words(self, T: float, begun: GreyBox, names: Sequence[str]) -> str:
+    def words(self, T: float, data: DataSet) -> str:
         """What it is, and where."""
-        where = f"at output {names[self.output]!r}" if self.output is not None else (
-            "at the inputs" if begun.n_inputs > 1 else "at the input"
-        )  # fmt: skip
+        where = "at the inputs" if len(data.input_names) > 1 else "at the input"
+        if self.output is not None:
+            where = f"at output {data.output_names[self.output]!r}"
+        if self.input is not None:
+            where = f"at input {data.input_names[self.input]!r}"
         hertz = f"{1 / (2 * np.pi * T):.3g} Hz"
         if self.high:
             return f"a high-pass of {hertz} {where} (a sensor that is AC-coupled)"
@@ -83,22 +89,25 @@ class _Filter:
 
 
 def filter_instead(
-    inquiry: Asking, scene: Scene, begun: GreyBox, seconds: float, left: float
+    inquiry: Asking, scene: Scene, begun: GreyBox, seconds: float, left: float, whole: float = 0.0
 ) -> list[Finding]:
-    """A finding where one filter leaves less than this part ``left`` of the data's energy: a lag of
-    about so many ``seconds``, or where these are none a high-pass.
+    """A finding where one filter leaves less than this part ``left`` of the data's energy, or less
+    than ``whole`` and nothing that a black box explains: a lag of about so many ``seconds``, or
+    where these are none a high-pass.
     """
-    names = inquiry.readings[0].data.output_names
-    each = range(len(names)) if len(names) > 1 else range(0)
+    data = inquiry.readings[0].data
+    outputs, inputs = len(data.output_names), begun.n_inputs
     slowest = min(float(s.omega_input[s.omega_input > 0].min()) for s in scene.seen)
     if seconds > 0:
         # of one output a lag before it is one behind the input
-        filters = [_Filter(), _Filter(2), *(_Filter(output=i) for i in each)]
+        filters = [_Filter(), _Filter(2)]
+        filters += [_Filter(output=i) for i in range(outputs) if outputs > 1]
+        filters += [_Filter(input=i) for i in range(inputs) if inputs > 1]
         times = [seconds * part for part in _TIMES]
     else:
-        filters = [_Filter(high=True, output=i) for i in range(len(names))]
+        filters = [_Filter(high=True, output=i) for i in range(outputs)]
         times = [2 * np.pi / slowest * part for part in _SLOW]
-    best: tuple[float, float, _Filter] | None = None
+    best: tuple[float, float, _Filter, Estimate] | None = None
     for one in filters:
         for time in times:
             try:
@@ -111,13 +120,15 @@ def filter_instead(
             if one.high and slowest * est[_NAME] > _SEEN:
                 # it passes all that there is
                 continue
-            if share < left and (best is None or share < best[0]):
-                best = share, est[_NAME], one
+            if share < max(left, whole) and (best is None or share < best[0]):
+                best = share, est[_NAME], one, est
     if best is None:
         return []
-    share, time, one = best
+    share, time, one, est = best
+    if share >= left and est.witness.verdict != "complete":
+        return []
     text = (
-        f"{one.words(time, begun, names)} explains what looks like "
+        f"{one.words(time, data)} explains what looks like "
         f"{'a hold that looks ahead' if one.high else 'a delay'}: so "
         f"{100 * (1 - np.sqrt(share)):.4g} % of the data are explained; give the model that"
     )

@@ -43,7 +43,8 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
     where a filter leaves less than a delay or a hold.
     """
     structure, model, first = inquiry.minimum.structure, inquiry.model, named[0]
-    delay = first.name == "delay" and first.test.size > 0 and not model.late
+    delays = [a for a in named if a.name == "delay" and a.test.size > 0 and not model.late]
+    delay = first in delays
     if (not delay and first.name not in (*LACKING, *_EARLY)) or not isinstance(model, GreyBox):
         return []
     if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
@@ -58,9 +59,12 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
     gains = [a.test.gain for a in named if a.name not in ("delay", "hold rejected")]
     rest = (scene.cost - max(gains, default=0.0)) / energy
     clearly = float(np.exp(-_CLEAR / scene.freedom))
+    # what a black box leaves is told in weights of its own
+    simple = max((a.test.gain for a in named if a.name not in LACKING), default=0.0)
+    whole = clearly * (scene.cost - simple) / energy
     if delay:
         left = min(clearly * left, _AS_GOOD * rest)
-        return filter_instead(inquiry, scene, begun, first.test.size, left)
+        return filter_instead(inquiry, scene, begun, first.test.size, left, whole)
     held_left = np.inf
     if any(a.name == "hold rejected" for a in named):
         # a score says how far, not whether there is such a hold
@@ -84,6 +88,8 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
         # one that passes nearly all is a slow motion more, which noise has, too
         left = min(clearly**2 * held_left, _AS_GOOD * rest)
         return filter_instead(inquiry, scene, begun, 0.0, left)
+    if found is None and delays and first.name in LACKING:
+        return filter_instead(inquiry, scene, begun, delays[0].test.size, 0.0, whole)
     return [] if found is None else [found]
 
 

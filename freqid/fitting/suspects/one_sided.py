@@ -42,7 +42,9 @@ class _Parts:
         by that of its state, too, and of what is linear in the state, which damping looks like.
         """
         A, B, C, _ = model.state_space()
-        along = (self.forces / np.linalg.norm(self.forces, axis=0)).T
+        size = np.linalg.norm(self.forces, axis=0)
+        # a force that moves nothing has no direction
+        along = (self.forces / np.where(size > 0, size, 1.0)).T
         seen = StateSpace(
             A,
             B,
