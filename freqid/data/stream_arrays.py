@@ -262,6 +262,8 @@ class Arrays:
 
 def _beside(wanted: Sequence[str], times: Sequence[str]) -> list[str]:
     """Times in the folders of the arrays that are ``wanted``, or the first of any."""
+    # as among the columns of a table "time" is the time, whatever else is called so
+    times = sorted(times, key=lambda n: _leaf(n) != "time")
     own = {folder_of(n): n for n in reversed(times)}
     return [own[f] for f in dict.fromkeys(map(folder_of, wanted)) if f in own] or [*times[:1]]
 

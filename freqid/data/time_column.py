@@ -47,7 +47,7 @@ def with_time(
     Raises ValueError for a column that is not there or holds no time, and where rows that are to be
     of ``one_clock`` hold another one's times beside it, which ``signals`` are not.
     """
-    frame = joined(frame) if time is None else frame
+    frame = joined(frame, signals) if time is None else frame
     name = _found(frame, time, units, dt, signals)
     if name is None:
         return frame, []

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from freqid.data.time_names import time_named
 from freqid.data.time_texts import as_known
 from freqid.data.times_in_seconds import DATE, UNITS
 
@@ -25,15 +27,19 @@ _WHOLE = r".*\d{1,2}:\d{2}:\d{2}\s*"
 _BEYOND = r"(nanosec|nanosecs|nanoseconds|nsec|nsecs|usec|usecs|ns|us)"
 
 
-def joined(frame: pd.DataFrame) -> pd.DataFrame:
-    """The frame with a time in two columns side by side, if there is one, in one."""
+def joined(frame: pd.DataFrame, signals: Sequence[str] = ()) -> pd.DataFrame:
+    """The frame with a time in two columns side by side, if there is one, in one; ``signals`` are
+    none.
+    """
     for at, (first, second) in enumerate(pairwise(frame.columns)):
-        stamps = _with_fractions(frame, first, second)
-        if stamps is not None:
+        stamps = None if second in signals else _with_fractions(frame, first, second)
+        # beside a time of its own it is another column
+        others = [str(c) for c in frame.columns if c not in (first, second)]
+        if stamps is not None and (time_named(others) is None or _is_day(frame, others)):
             rest = frame.drop(columns=[first, second])
             rest.insert(at, first, stamps)
             rest.attrs = frame.attrs
-            return joined(rest)
+            return joined(rest, signals)
     for first, second in pairwise(frame.columns):
         for way in (_of_day, _of_seconds):
             times = way(frame, first, second)
@@ -43,6 +49,13 @@ def joined(frame: pd.DataFrame) -> pd.DataFrame:
                 rest.attrs = frame.attrs
                 return rest
     return frame
+
+
+def _is_day(frame: pd.DataFrame, names: Sequence[str]) -> bool:
+    """Whether the column of these that is called a time holds days alone."""
+    name = time_named(names)
+    texts = frame[name].iloc[:5]
+    return texts.dtype.kind not in "fiubmM" and all(DATE.fullmatch(str(x)) for x in texts)
 
 
 def _with_fractions(frame: pd.DataFrame, clock: str, beyond: str) -> pd.Series[str] | None:

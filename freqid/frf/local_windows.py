@@ -26,6 +26,9 @@ _JUDGED = 24
 # part of a line's power below which an input is over, and how many times as wide as what its lines
 # have in common a window is that may reach so far
 _ENDED, _WIDE = 0.05, 3
+# part of its window's largest power from which a line lies within what an input drives: half of its
+# amplitude is where a sweep begins
+_FULL = 0.25
 # numbers that are kept of how the noise of lines gets into a response, at the most
 _KEPT = 4_000_000
 
@@ -158,6 +161,8 @@ def _first(lines: Lines, centres: IntArray, form: Form) -> IntArray:
         moved = np.where(left > first, left, np.where(right < last, right - width + 1, first))
         ends = np.clip(np.stack([moved, moved + width - 1]) - own.T + width, 0, 2 * width)
         kept = strong[np.arange(len(at)), ends].all(axis=0) & ((left == first) | (right == last))
+        # at the very end itself a window on one side reaches too far, and knows too little of it
+        kept &= power[own[:, 0]] > _FULL * power[at].max(axis=1)
         found[start : start + _BLOCK] = np.where(kept, moved, first)
     # neither does a window begin before another one whose own line it follows
     return np.maximum.accumulate(found)

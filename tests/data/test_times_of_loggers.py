@@ -95,6 +95,41 @@ def test_labview_without_columns_of_times(tmp_path):
     np.testing.assert_allclose(record.y, Y)
 
 
+def test_labview_tells_steps_with_decimal_commas_and_one_for_all(tmp_path):
+    """1,000000E-3 was a step of 1 s, and channels of two steps shared the first."""
+    path = tmp_path / "a.lvm"
+    rows = [f"\t{U[k]:f}\t{Y[k]:f}\t".replace(".", ",") for k in range(12)]
+
+    def written(first, second):
+        head = ["LabVIEW Measurement\t", "X_Columns\tNo", "***End_of_Header***\t", "\t",
+                f"Delta_X\t{first}\t{second}\t", "***End_of_Header***\t\t\t",
+                "X_Value\tu\ty\tComment"]  # fmt: skip
+        path.write_text("\n".join([*head, *rows]) + "\n")
+        return path
+
+    assert fq.read(written("1,000000E-3", "0,001000")).dt == pytest.approx(1e-3)
+    with pytest.raises(ValueError, match="channels of one rate"):
+        fq.read(written("1,000000E-3", "2,000000E-3"))
+
+
+def test_a_line_of_tags_that_begin_with_ts_is_one_of_names(tmp_path):
+    rows = [f"{10 * k},{U[k]:g},{Y[k]:g}" for k in range(12)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["Time stamp,Command,Speed", "TS,u,y", "ms,V,rad/s", *rows]))
+    record = fq.read(path)
+    assert record.dt == pytest.approx(0.01)
+    assert record.units == {"u": "V", "y": "rad/s"}
+
+
+def test_a_signal_called_ms_beside_a_time_is_one(tmp_path):
+    rows = [f"{0.1 * k:.1f},10:00:{k // 10:02d},{3 * k + 1},{U[k]:g}" for k in range(12)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["t,clock,ms,u", *rows]))
+    record = fq.read(path, "u", "ms")
+    assert record.dt == pytest.approx(0.1)
+    np.testing.assert_allclose(record.y, 3 * np.arange(12) + 1)
+
+
 def test_rigol_tells_its_step_in_the_line_of_names(tmp_path):
     path = tmp_path / "a.csv"
     rows = [f"{U[k]:g},{Y[k]:g},," for k in range(12)]
@@ -122,6 +157,16 @@ def test_streams_of_hdf5_say_what_records_do(tmp_path):
     with h5py.File(path, "a") as file:
         del file["t"]
     assert fq.open(path).dt == fq.read(path).dt == pytest.approx(0.002)
+
+
+def test_streams_take_the_time_that_is_called_so(tmp_path):
+    """Of `t` in ms and `time` in s the first by the alphabet was taken, for seconds."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["t"], file["time"] = 10.0 * np.arange(12), 0.01 * np.arange(12)
+        file["u"], file["y"] = U, Y
+    assert fq.open(path, "u", "y").dt == fq.read(path, "u", "y").dt == pytest.approx(0.01)
 
 
 def test_an_index_of_dates_without_a_name_is_the_time_of_a_stream(tmp_path):

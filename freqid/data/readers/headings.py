@@ -17,8 +17,8 @@ _UNIT = re.compile(
 )
 # as oscilloscopes write units below the names of their channels
 _SPOKEN = re.compile(r"(?i:seconds?|volts?|amps?|amperes?|hertz|watts?)")
-# the unit of Campbell's time stamps
-_STAMPS = "TS"
+# what Campbell's loggers call time stamps, and their unit
+_STAMPS = "TIMESTAMP", "TS"
 # rows that may stand between units and samples: of types, of descriptions
 _BELOW = 2
 
@@ -59,7 +59,7 @@ def _names_and_units(full: Sequence[list[str]]) -> tuple[list[str], list[str]]:
     """The row of names among rows of as many cells, and that of units, empty where none is."""
     last = len(full) - 1
     for above, units in pairwise(full):
-        if units[0] == _STAMPS and _are_distinct(above):
+        if (above[0].upper(), units[0]) == _STAMPS and _are_distinct(above):
             # below them Campbell's loggers print of which kind the samples are: Avg
             return above, [u if is_a_unit(u) else "" for u in units]
     for at in range(last, max(last - _BELOW, 1) - 1, -1):

@@ -35,14 +35,29 @@ def body_of(text: str) -> Body:
         # a column of remarks, which rows without one leave out
         plain = re.sub(r"\tComment\s*$", "", head)
         above = text[: ends[-1]]
-        step = re.search(r"^Delta_X\t([\d.eE+-]+)", above, re.MULTILINE)
+        step = re.search(r"^Delta_X\t([^\n]*)", above, re.MULTILINE)
         if step and re.search(r"^X_Columns\tNo\b", above, re.MULTILINE):
             # a column of times is kept free and not written
             plain = re.sub(r"^X_Value\b", "time", plain)
-            said.append(f"the time counts in steps of {float(step[1]):g} s")
-            return Body(plain + mark + rest, (0.0, float(step[1])), tuple(said))
+            dt = _one_step(step[1])
+            said.append(f"the time counts in steps of {dt:g} s")
+            return Body(plain + mark + rest, (0.0, dt), tuple(said))
         return Body(plain + mark + rest, notes=tuple(said))
     return _counted(text) or _stepped(text) or Body(text)
+
+
+def _one_step(told: str) -> float:
+    """The step in s that LabVIEW tells for each channel; InputError for several, or none."""
+    try:
+        steps = {float(x.replace(",", ".")) for x in told.split("\t") if x.strip()}
+    except ValueError:
+        steps = set()
+    if len(steps) != 1 or not min(steps) > 0:
+        raise InputError(
+            f"its channels have steps Delta_X of {told.strip()!r}, of which one is expected; keep "
+            "channels of one rate in a file"
+        )
+    return steps.pop()
 
 
 def _counted(text: str) -> Body | None:
