@@ -139,7 +139,12 @@ def few_enough(name: str, count: float) -> int:
 
 def whole(name: str, value: object, least: int = 1, most: float = math.inf) -> int:
     """Return ``value`` as an int; ValueError unless it is whole and from ``least`` to ``most``."""
-    number = finite(name, value)
+    try:
+        number = finite(name, value)
+    except InputError as error:
+        told = str(error)
+        kind = f", a whole one of at least {least}" if told.endswith("number") else ""
+        raise InputError(told + kind) from None
     if not number.is_integer() or number < least:
         raise InputError(f"{name}={value!r} must be a whole number of at least {least}")
     if number > most:
@@ -205,11 +210,13 @@ def samples(name: str, values: ArrayLike) -> FloatArray:
     return array
 
 
-def choice(name: str, value: object, allowed: Sequence[str]) -> str:
-    """Return ``value`` if it is one of ``allowed``; ValueError with the nearest name."""
+def choice(name: str, value: object, allowed: Sequence[str], other: str = "") -> str:
+    """Return ``value`` if it is one of ``allowed``; ValueError with the nearest name, and what
+    ``other`` than a name is taken.
+    """
     if isinstance(value, str) and value in allowed:
         return value
-    raise InputError(unknown(name, value, allowed))
+    raise InputError(unknown(name, value, allowed) + (f"; or give {other}" if other else ""))
 
 
 def increasing(name: str, value: FloatArray, unit: str) -> FloatArray:

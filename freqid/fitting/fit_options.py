@@ -41,10 +41,10 @@ def check_words(options: Options) -> None:
     whole("seed", options.get("seed", 0), least=0)
     named_values("start", options.get("start"))
     if options.get("offset") is not None:
-        choice("offset", options["offset"], ("estimate",))
+        choice("offset", options["offset"], ("estimate",), "None")
     reference = options.get("reference", "auto")
     if not isinstance(reference, bool):
-        choice("reference", reference, ("auto",))
+        choice("reference", reference, ("auto",), "True or False")
     flag("progress", options.get("progress", False))
 
 

@@ -256,7 +256,7 @@ def as_noise_model(weights: object, data: DataSet) -> NoiseModel:
     if weights is None:
         return BiasIntegral()
     if isinstance(weights, str):
-        choice("weights", weights, tuple(NoiseModel.named))
+        choice("weights", weights, tuple(NoiseModel.named), "None, or an array of weights")
         return NoiseModel.named[weights].of(data)
     return GivenWeights(numbers("weights", weights))  # type: ignore[arg-type]
 
