@@ -90,9 +90,13 @@ def through_references(
         if d.factor > 1:
             if reference is True:
                 raise InputError(
-                    "reference=True needs an input sampled like the output; decimate the input"
+                    "reference=True needs an input sampled like the output; decimate the input: "
+                    "decimate(factor, antialias=True) without keep_input"
                 )
-            notes.append("the input is faster than the reference, which is not used")
+            notes.append(
+                "the input is faster than the reference, which is not used: decimate(factor, "
+                "antialias=True) without keep_input keeps both at one rate"
+            )
             continue
         # experiments of one rate, the same channels and conditions are of one loop
         alike = (d.dt, d.input_names, d.output_names, tuple(sorted(d.conditions.items())))

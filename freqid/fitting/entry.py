@@ -16,7 +16,7 @@ from freqid.fitting.clock_offset import clock_notes, with_clock_offset
 from freqid.fitting.closed_loop import through_references, with_loop_noise
 from freqid.fitting.data_notes import notes_of
 from freqid.fitting.estimate import Estimate
-from freqid.fitting.fed_back import FED_BACK, could_go, fed_back, pulled_by_noise
+from freqid.fitting.fed_back import FED_BACK, could_go, fed_back, foretold, pulled_by_noise
 from freqid.fitting.fit_options import check_words
 from freqid.fitting.fitters import Near, SearchOptions, fitted, fitter_of
 from freqid.fitting.noise_models import Weights, in_one_unit, noise_models_of
@@ -222,7 +222,15 @@ def fit(
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes],
     )  # fmt: skip
     go_on = free and est.message != INTERRUPTED
-    return back() if go_on and fed_back(est, readings, way) else est
+    if not go_on:
+        return est
+    if fed_back(est, readings, way):
+        return back()
+    if foretold(est, readings, way):
+        # what the plant lacks is told better by the input as it is
+        through = back()
+        return est if any(w.severity == "serious" for w in through.warnings) else through
+    return est
 
 
 def _in_one_pass(

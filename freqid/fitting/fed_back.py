@@ -24,11 +24,8 @@ FED_BACK = (
     "what a fit to the input as it is leaves goes together with what the reference leaves of it: "
     "the noise comes back through a loop, or the input was measured with noise; it was not used"
 )
-# what an input that answers to the noise looks like: at once, or to a plant with a dead time, of
-# which a black box foretells the noise by its input
-_ALIKE = frozenset(
-    {"feedback", "delay", "lag", "feedthrough", "hold rejected", "high-pass", *LACKING}
-)
+# what an input that answers to the noise at once looks like
+_ALIKE = frozenset({"feedback", "delay", "lag", "feedthrough", "hold rejected", "high-pass"})
 # standard errors that it may have moved a parameter by: going through the reference costs as much
 _HARMLESS = 0.7
 
@@ -50,6 +47,14 @@ def fed_back(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
     # beside a reference each of these is asked of an input without noise
     asked = _ALIKE if heard else {"feedback"}
     return any(w.kind in asked and w.severity == "serious" for w in est.warnings)
+
+
+def foretold(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:
+    """Whether it may be by the noise that comes back that a black box explains more: of a plant
+    behind a dead time it foretells the noise by the input.
+    """
+    lacks = any(w.kind in LACKING and w.severity == "serious" for w in est.warnings)
+    return lacks and _heard(est, readings, way)
 
 
 def pulled_by_noise(est: Estimate, readings: Sequence[Reading], way: Through) -> bool:

@@ -258,7 +258,7 @@ def aliased(e: Evidence) -> Iterator[Finding]:
             "aliased",
             f"{100 * e.aliased:.3g} % of the input's power lay above the Nyquist limit when the "
             "record was decimated, and is folded into what is fitted; use "
-            "decimate(factor, keep_input=True), or antialias=True",
+            "decimate(factor, keep_input=True), or antialias=True, as a way by a reference needs",
             number=e.aliased,
         )
 

@@ -37,7 +37,9 @@ def possible_hold(inquiry: Asking, a: Asked) -> bool:
     if a.name not in HOLDS:
         return True
     if a.name == "hold":
-        return a.test.size > 0
+        # beside a delay that is free a step tells hardly which way, and a fit with another does
+        free = isinstance(inquiry.model, GreyBox) and bool(inquiry.model.delay_sources)
+        return a.test.size > 0 or free
     hold, dt = inquiry.readings[0].hold, input_dt(inquiry.readings[0].data)
     own = hold.period if isinstance(hold, PeriodicHold) else dt
     return a.test.size < 0 or own + a.test.size <= dt

@@ -17,10 +17,12 @@ from freqid.fitting.cost.structures import GreyStructure
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.descent import minimise, polish
 from freqid.fitting.uncertainty.minimum import Minimum
-from freqid.lti import BandLimited, FirstOrderHold, Hold, PeriodicHold
+from freqid.lti import BandLimited, FirstOrderHold, Hold, PeriodicHold, ZeroOrderHold
 
 # holds as parts of the sample time, from which a fit begins
 _PERIODS = (1.0, 0.3)
+# and whole parts of it that are tried where the model has a delay
+_PARTS = (1, 2, 3, 5, 10)
 # holds shorter than this part of the sample time are none, and longer ones no converter's
 _LEAST, _MOST = 0.02, 1.02
 # converters hold for the sample time or a whole part of it: so far from all of those is odd, above
@@ -76,9 +78,16 @@ def plain(structure: object) -> TypeGuard[GreyStructure]:
 def _of_any_length(
     near: FloatArray, structure: GreyStructure, readings: Sequence[Reading], dt: float
 ) -> Refit | None:
+    if structure.model.delay_sources:
+        # half of a longer hold is a later input: of both only one is free
+        held = [
+            _through(near, structure, readings, ZeroOrderHold(dt / part), _words(dt / part))
+            for part in _PARTS
+        ]
+        return min((h for h in held if h is not None), key=lambda h: h.cost, default=None)
     freed = structure.with_unknown(HoldPeriod.of(dt), near)
     lines = [r.lines() for r in readings]
-    if any(e.lines.aliases > 1 for e in lines) or structure.model.delay_sources:
+    if any(e.lines.aliases > 1 for e in lines):
         return None
     objective = Objective(freed, lines)
     hold = readings[0].hold
@@ -94,8 +103,11 @@ def _of_any_length(
             best = found.cost, float(found.x[-1])
     if best is None:
         return None
-    words = f"a zero-order hold of about {best[1] * dt:.3g} s"
-    return Refit(best[0], best[1] * dt, words, _odd(best[1]))
+    return Refit(best[0], best[1] * dt, _words(best[1] * dt), _odd(best[1]))
+
+
+def _words(period: float) -> str:
+    return f"a zero-order hold of about {period:.3g} s"
 
 
 def _odd(part: float) -> bool:
