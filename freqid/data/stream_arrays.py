@@ -88,6 +88,8 @@ class Arrays:
 
     def _told_by(self, time: str, count: int, channels: Sequence[str] | None) -> Told:
         """What the first rows of a time and of arrays beside it that are called so tell."""
+        import pandas as pd
+
         beside = {
             _leaf(n): n
             for n, s in self.shapes.items()
@@ -95,8 +97,6 @@ class Arrays:
             and folder_of(n) == folder_of(time)
             and (n == time or time_named([_leaf(n)]) or is_called_a_time(_leaf(n)))
         }  # fmt: skip
-        import pandas as pd
-
         with self.opened() as file:
             first = {
                 n: self.packings[full].values(file[full][:FIRST]).ravel()
@@ -223,7 +223,7 @@ class Arrays:
         notes += [said for full in named.values() if (said := self.unclear[full])]
         return Found(
             blocks, names, count, dt, str(self.path), units=units, clock=clock, hollow=hollow,
-            notes=tuple(dict.fromkeys(notes)), by_name=True,
+            notes=tuple(dict.fromkeys(notes)), by_name=self.path.suffix.lower() != ".zarr",
         )  # fmt: skip
 
     def _of_group(self, group: str | None) -> dict[str, tuple[int, ...]]:

@@ -33,7 +33,8 @@ _STEPS, _STANDS = 30, 0.01
 _ROUNDS, _MANY = 50, 0.1
 # samples far off of one value that are no chance
 _REPEATED = 5
-# logarithm by which errors scatter less than outputs of which something is explained
+# logarithm by which errors scatter less than outputs of which something is explained, and by which
+# a start's may
 _SOME = 0.05
 # the median of |e| in standard deviations of a normal variable
 _MEDIAN = 0.6744897501960817
@@ -66,7 +67,8 @@ def robust_fit(
     samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
     alone, nothing = _clipped(readings)
     start, least = _begun(begin, readings) or (None, np.inf)
-    least = min(least, nothing - _SOME)
+    # near its end a start may scatter less by chance
+    least = min(least + _SOME, nothing - _SOME)
     for cut in (lambda best: best.seen, lambda _: start, lambda _: alone):
         if best.at_rest(least, _MANY * samples):
             break
