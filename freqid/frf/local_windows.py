@@ -23,12 +23,14 @@ _BLOCK = 256
 _LINES_A_WINDOW = 24
 # windows from which the noise that a width costs is judged
 _JUDGED = 24
-# part of a line's power below which an input is over, and how many times as wide as what its lines
-# have in common a window is that may reach so far
+# part of a line's power below which an input has not begun, and how many times as wide as what its
+# lines have in common a window is that may reach so far
 _ENDED, _WIDE = 0.05, 3
 # part of its window's largest power from which a line lies within what an input drives: half of its
 # amplitude is where a sweep begins
 _FULL = 0.25
+# part of the driven lines that a window may have that is shifted
+_NARROW = 0.25
 # numbers that are kept of how the noise of lines gets into a response, at the most
 _KEPT = 4_000_000
 
@@ -135,8 +137,8 @@ def _centred(centres: IntArray, form: Form, K: int) -> IntArray:
 
 
 def _first(lines: Lines, centres: IntArray, form: Form) -> IntArray:
-    """First lines of windows that are shifted inwards where the input ends, too, as a chirp does:
-    lines that it leaves to the transient and the noise bend a denominator, and tell no response.
+    """First lines of windows, which begin no lower than the input does, as a chirp: towards zero
+    motions grow, and lines that are left to the transient and the noise bend a denominator.
     """
     K, width = len(lines.frequency), form.width
     power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
@@ -146,24 +148,20 @@ def _first(lines: Lines, centres: IntArray, form: Form) -> IntArray:
     if width < _WIDE * alike:
         return found
     power = scipy.ndimage.maximum_filter1d(power, alike, mode="nearest")
+    if width > _NARROW * np.count_nonzero(power > _ENDED * power.max()):
+        # one that is as wide as a good part of a sweep would reach too far away on one side
+        return found
     for start in range(0, len(centres), _BLOCK):
-        own = centres[start : start + _BLOCK, None]
-        reach = own + np.arange(-width, width + 1)
-        at = np.clip(reach, 0, K - 1)
-        strong = (power[at] > _ENDED * power[own]) & (reach == at)
+        own = centres[start : start + _BLOCK]
         first = found[start : start + _BLOCK]
-        # outermost lines that are driven: on the left within the window, or on the right
-        left = at[np.arange(len(at)), np.argmax(strong & (reach >= first[:, None]), axis=1)]
-        last = first + width - 1
-        inside = (strong & (reach <= last[:, None]))[:, ::-1]
-        right = at[:, ::-1][np.arange(len(at)), np.argmax(inside, axis=1)]
-        # and those that a shifted window would reach
-        moved = np.where(left > first, left, np.where(right < last, right - width + 1, first))
-        ends = np.clip(np.stack([moved, moved + width - 1]) - own.T + width, 0, 2 * width)
-        kept = strong[np.arange(len(at)), ends].all(axis=0) & ((left == first) | (right == last))
-        # at the very end itself a window on one side reaches too far, and knows too little of it
-        kept &= power[own[:, 0]] > _FULL * power[at].max(axis=1)
-        found[start : start + _BLOCK] = np.where(kept, moved, first)
+        rows = np.arange(len(own))
+        at = np.minimum(first[:, None] + np.arange(2 * width), K - 1)
+        strong = power[at] > _ENDED * power[own, None]
+        shift = np.argmax(strong, axis=1)
+        end = first + shift + width - 1
+        kept = (end < K) & strong[rows, np.minimum(shift + width - 1, 2 * width - 1)]
+        kept &= (shift <= own - first) & (power[own] > _FULL * power[at].max(axis=1))
+        found[start : start + _BLOCK] = np.where(kept, first + shift, first)
     # neither does a window begin before another one whose own line it follows
     return np.maximum.accumulate(found)
 

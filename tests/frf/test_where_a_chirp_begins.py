@@ -45,18 +45,23 @@ def test_an_input_that_has_no_end_within_a_window_keeps_its_windows_centred():
         assert (_first(lines, centres, form) == _centred(centres, form, K)).all()
 
 
-def test_windows_begin_and_end_where_the_input_does():
-    from freqid.frf.local_windows import Form, Lines, _first
+def test_windows_begin_where_the_input_does():
+    from freqid.frf.local_windows import Form, Lines, _centred, _first
 
     K, form = 900, Form(3, 3, 97)
     at = np.arange(K)
     U = np.where((at >= 200) & (at < 700), 1.0, 1e-3)[None, None].astype(complex)
     lines = Lines(U, U, at / 10, np.ones(K, bool))
-    centres = np.array([200, 210, 300, 650, 699])
+    centres = np.arange(K)
     first = _first(lines, centres, form)
     slack = 2 * form.order + 3
-    assert (first[:2] >= 200 - slack).all()
-    assert first[2] == 300 - 48
-    assert (first[3:] + 96 < 700 + slack).all()
-    # where nothing drives it a window is where it was
-    assert _first(lines, np.array([100]), form) == 100 - 48
+    assert (first[200:240] >= 200 - slack).all()
+    assert (first[200:240] <= centres[200:240]).all()
+    # elsewhere a window is where it was, as where it would be a good part of what is driven
+    others = (centres < 200 - slack) | (centres > 300)
+    assert (first == _centred(centres, form, K))[others].all()
+    wide = Form(3, 3, 151)
+    assert (_first(lines, centres, wide) == _centred(centres, wide, K)).all()
+    # a window holds its own line, and none begins before another one
+    assert ((first <= centres) & (centres < first + form.width)).all()
+    assert (np.diff(first) >= 0).all()
