@@ -191,7 +191,7 @@ def _alike(best: _Settled, readings: Sequence[Reading]) -> list[str]:
             most = counts.max(initial=0)
             if most >= _REPEATED and 2 * most > counts.sum():
                 said.append(
-                    f"{most} samples of {name!r} that are far off hold {values[counts.argmax()]:g}:"
+                    f"{most} samples of {name!r} that count less hold {values[counts.argmax()]:g}:"
                     " a signal that drops out or stands still, or a code for none, pulls to one "
                     "side, which no error bar knows; leave these samples out"
                 )

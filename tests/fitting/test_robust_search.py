@@ -87,6 +87,6 @@ def test_samples_that_drop_out_are_told() -> None:
     lost = np.random.default_rng(1).random(1000) < 0.1
     y = np.where(lost, 0.0, record.y)
     est = fq.fit(LAG, fq.Record(record.u, y, 1e-3), loss="huber")
-    assert any("far off hold 0: a signal that drops out" in note for note in est.notes)
+    assert any("count less hold 0: a signal that drops out" in note for note in est.notes)
     good = fq.fit(LAG, fq.Record(record.u, record.y, 1e-3), loss="huber")
-    assert not any("far off hold" in note for note in good.notes)
+    assert not any("count less hold" in note for note in good.notes)

@@ -342,3 +342,21 @@ def test_a_coherence_alone_is_no_variance(plant):
     frf = analyser(plant, 0, coherence=np.full(250, 0.999))
     with pytest.raises(ValueError, match=r"abs\(G\)\*\*2 \(1 - coherence\)"):
         fq.fit(plant, frf, weights="noise")
+
+
+def test_an_output_that_never_moves_does_not_end_the_verdict():
+    """One row of C is zero, and so is that sensor: a singular matrix."""
+    plant = fq.GreyBox(
+        lambda w, z, k: (
+            [[0, 1], [-w * w, -2 * z * w]],
+            [[0], [k * w * w]],
+            np.diag([1.0, 0]),
+            None,
+        ),
+        [fq.Parameter("w", 60.0), fq.Parameter("z", 0.05), fq.Parameter("k", 2.0)],
+    )
+    clean = fq.simulate(plant, np.random.default_rng(3).standard_normal(1000), 1e-3)
+    noise = 0.01 * clean.y.std(axis=0) * np.random.default_rng(4).standard_normal((1000, 2))
+    est = fq.fit(plant, fq.Record(clean.u, clean.y + noise, 1e-3))
+    assert est["w"] == pytest.approx(60.0, rel=0.01)
+    assert est.verdict.grade in ("trust", "doubt")

@@ -158,7 +158,7 @@ def _sticking_out(s: Seen) -> list[tuple[float, float]]:
         # a tone of few periods is a drift, and one beside a line left out has no neighbour
         beside = np.diff(at, prepend=-1) == 1
         inside = (at >= _PERIODS) & beside & np.append(beside[1:], False)
-        if not inside.any():
+        if not inside.any() or not power.any():
             continue
         k = int(np.argmax(np.where(inside, above, 0)))
         below, middle, over = X[k - 1 : k + 2]

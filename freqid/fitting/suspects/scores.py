@@ -131,9 +131,10 @@ def score(
     if scene.is_even(rest):
         chi = gain / (max(scene.cost - gain, 1e-300) / freedom)
     elif drawn.alike or freedom < _FEW * (q + scene.n_free):
-        # what is left of few rows tells no noise of its own at each
+        # what is left of few rows tells no noise of its own at each, and an output that never moves
+        # none at all
         spread = (Vt * scene.variance_of(rest)) @ Vt.T
-        chi = float(along @ np.linalg.solve(spread, along))
+        chi = float(along @ np.linalg.lstsq(spread, along)[0])
     else:
         seen = None if glance is None else glance.explained(drawn, freedom)
         if seen is None or scipy.special.fdtrc(q, freedom, seen / q) < _GLANCE:
