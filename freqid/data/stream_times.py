@@ -67,7 +67,12 @@ def told_by(
     """What a time and those beside it tell by their ``first`` rows, of which the ``channels`` that
     are asked for are signals; ValueError for times that are of two clocks.
     """
-    return told(first, time, units, signals=channels or ())
+    try:
+        return told(first, time, units, signals=channels or ())
+    except InputError as error:
+        # of a stream nobody can say which one is the time, only how long its steps are
+        other = f"or give time={time!r} for all of them"
+        raise InputError(str(error).replace(other, "or give dt in s for all of them")) from None
 
 
 def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "") -> Clock:

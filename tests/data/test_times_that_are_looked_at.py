@@ -91,8 +91,10 @@ def test_two_clocks_are_told_and_one_counts_once(tmp_path, kind):
         return path
 
     time = 0.01 * np.arange(N)
-    with pytest.raises(ValueError, match="both times, and not of one clock"):
-        fq.open(kept(time=time, time2=time + 0.003), "x", "y")
+    path = kept(time=time, time2=time + 0.003)
+    with pytest.raises(ValueError, match=r"both times, and not of one clock.*or give dt in s"):
+        fq.open(path, "x", "y")
+    assert fq.open(path, "x", "y", dt=0.01).n_samples == N
     stream = fq.open(kept(time=time, time_ms=1e3 * time))
     assert (stream.input_names, stream.output_names, stream.dt) == (("x",), ("y",), 0.01)
     assert "'time_ms' is of the same clock, and left out" in stream.notes[0]
