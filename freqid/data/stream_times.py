@@ -34,7 +34,7 @@ _ROUNDED, _MISSING = 1.1, 0.9
 @dataclass(frozen=True)
 class Clock:
     """What a time tells: the sample time in s, None of a single row, its ``first`` and ``last``
-    stamps as they came, its name and its unit.
+    stamps as they came, its name and its unit, and what is to be said of it.
     """
 
     step: float | None

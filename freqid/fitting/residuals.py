@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -122,35 +122,32 @@ def _at_samples(model: Model, reading: Reading) -> FloatArray:
 
 def errors_of(model: Model, reading: Reading) -> LineErrors:
     """Errors of a model at the lines of a reading, its weights saying which tell the transient."""
+    lines, rows = _left(model, reading.at_lines())
+    return _of_rows(reading, lines, rows)
+
+
+def errors_and_motions(model: Model, reading: Reading) -> tuple[FloatArray, FloatArray]:
+    """Errors (N, outputs) of a model in time, and what initial states can add to them, as signals
+    (q, N, outputs) of any size; none where these are known.
+    """
+    experiment, evaluation = _evaluated(model, reading.at_lines())
+    lines, rows, Q = experiment.lines, evaluation.residual, np.zeros((0, 0))
+    if evaluation.transient is not None:
+        Q, _ = eliminate(evaluation.transient, rows)
+        rows = rows - (Q @ rows) @ Q
+    each = [_of_rows(reading, lines, row).in_time() for row in (rows, *Q)]
+    return each[0], np.reshape(each[1:], (len(Q), *each[0].shape))
+
+
+def _of_rows(reading: Reading, lines: Lines, rows: FloatArray) -> LineErrors:
+    """Rows of an experiment as errors at its lines."""
     record = reading.data
     assert isinstance(record, Record)
-    steps("dt of the record", record.dt, model.dt or record.dt, least=1)
-    lines, rows = _left(model, reading.at_lines())
     error = rows.view(complex).reshape(channel_counts(record)[0], -1) / lines.scale[:, 0]
     N, dt = lines_of(record)
     number = np.round(lines.omega * N * dt / (2 * np.pi))
     multiplicity = np.where((number == 0) | (2 * number == N), 1.0, 2.0)
     return LineErrors(lines.omega, error, multiplicity, N, dt, len(record.u) // record.factor)
-
-
-def free_motions(model: Model, reading: Reading) -> FloatArray:
-    """What initial states can add to the errors of a model, as signals (q, N, outputs), in any
-    size; none where these are known.
-    """
-    record = reading.data
-    assert isinstance(record, Record)
-    whole = errors_of(model, reading)
-    reading = reading.at_lines()
-    shape, plane = (model.n_outputs, model.n_inputs), Plane() if model.dt else None
-    (experiment,) = read_for(shape, [reading], plane)
-    assert isinstance(experiment, SpectralExperiment)
-    evaluation = experiment.at(model.still())
-    if evaluation.transient is None:
-        return np.zeros((0, whole.shown, model.n_outputs))
-    Q, _ = eliminate(evaluation.transient, evaluation.residual)
-    scale = experiment.lines.scale[:, 0]
-    each = [row.view(complex).reshape(scale.shape) / scale for row in Q]
-    return np.array([replace(whole, error=error).in_time() for error in each])
 
 
 def errors_of_response(model: Model, reading: Reading) -> tuple[ComplexArray, FloatArray]:
@@ -164,10 +161,18 @@ def errors_of_response(model: Model, reading: Reading) -> tuple[ComplexArray, Fl
 
 def _left(model: Model, reading: Reading) -> tuple[Lines, FloatArray]:
     """Lines of a reading, and the rows that a model leaves there without their transient."""
+    experiment, evaluation = _evaluated(model, reading)
+    return experiment.lines, _without_transient(evaluation)
+
+
+def _evaluated(model: Model, reading: Reading) -> tuple[SpectralExperiment, Evaluation]:
+    """A reading as an experiment, and what a model makes of it."""
+    if isinstance(reading.data, Record):
+        steps("dt of the record", reading.data.dt, model.dt or reading.data.dt, least=1)
     shape, plane = (model.n_outputs, model.n_inputs), Plane() if model.dt else None
     (experiment,) = read_for(shape, [reading], plane)
     assert isinstance(experiment, SpectralExperiment)
-    return experiment.lines, _without_transient(experiment.at(model.still()))
+    return experiment, experiment.at(model.still())
 
 
 def _without_transient(evaluation: Evaluation) -> FloatArray:

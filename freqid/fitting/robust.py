@@ -18,8 +18,9 @@ from freqid.data import Record
 from freqid.fitting.black_box.output_error import with_scatter
 from freqid.fitting.estimate import Estimate
 from freqid.fitting.met import met_by
+from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading
-from freqid.fitting.residuals import errors_of, free_motions
+from freqid.fitting.residuals import errors_and_motions
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.uncertainty.minimum import Spread
 from freqid.fitting.witness import as_begun
@@ -62,6 +63,12 @@ def robust_fit(
         )
     if any(r.band is not None for r in readings):
         raise InputError("loss='huber' needs all lines: a band spreads a spike over the record")
+    given = [r.noise.given for r in readings if isinstance(r.noise, GivenWeights)]
+    if any(w.any() and not w.all() for w in given):
+        raise InputError(
+            "loss='huber' needs weights above zero at all lines, from which it tells the samples; "
+            "give small ones where lines are to count next to nothing"
+        )
     est, seen = work(readings, None)
     best = _settled(work, readings, est, seen)
     samples = sum(r.data.n_samples for r in readings if isinstance(r.data, Record))
@@ -236,9 +243,9 @@ def _cut(
         assert isinstance(record, Record)
         assert isinstance(seen, Record)
         model = met_by(found, own) if isinstance(found, Estimate) else found
-        error = errors_of(model, own).in_time()
+        error, motions = errors_and_motions(model, own)
         error = error + (seen.outputs - record.outputs)[: len(error)]
-        error = _at_rest_of_most(error, free_motions(model, own))
+        error = _at_rest_of_most(error, motions)
         scale = np.median(np.abs(error), axis=0) / _MEDIAN
         sizes.append(np.log(np.maximum(scale, _NONE)).mean())
         limit = _CUT * np.where(scale > 0, scale, np.inf)

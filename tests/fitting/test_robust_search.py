@@ -90,3 +90,14 @@ def test_samples_that_drop_out_are_told() -> None:
     assert any("count less hold 0: a signal that drops out" in note for note in est.notes)
     good = fq.fit(LAG, fq.Record(record.u, record.y, 1e-3), loss="huber")
     assert not any("count less hold" in note for note in good.notes)
+
+
+def test_weights_of_zero_are_refused_before_the_search() -> None:
+    """Errors at lines that do not count are none: samples of NaN were blamed, in row 0."""
+    record = spoilt(LAG, 0, 500, 50.0)
+    weights = np.ones(501)
+    weights[400:] = 0
+    with pytest.raises(ValueError, match="weights above zero"):
+        fq.fit(LAG, record, loss="huber", weights=weights)
+    weights[400:] = 1e-6
+    assert fq.fit(LAG, record, loss="huber", weights=weights)["a"] == pytest.approx(120, rel=0.02)
