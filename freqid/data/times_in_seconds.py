@@ -51,8 +51,6 @@ _DATED = rf"(?:^\s*{DATE.pattern}|\s{DATE.pattern}\s*$)"
 _DAY = 86_400.0
 # two numbers of a date, day and month, before its year
 _SLASHED = re.compile(r"\s*(\d{1,2})[/-](\d{1,2})(?:[/-]\d{4}|/\d{2}(?!\d))")
-    r"\s*(\d{1,2})[/-](\d{1,2})(?:[/-]\d{4}|(?<!-)(?<!-\d)(?<!-\d\d)/\d{2}(?!\d))"
-)
 _MONTHS = 12
 # a time of day of a clock that counts to twelve
 _HALF_DAYS = r"\s*\d{1,2}:\d{2}[\d:.,]*\s*[AaPp]\.?[Mm]\.?\s*"
