@@ -1,6 +1,8 @@
 """How many digits the matrices of a search have: on its way those of doubles, at its end all."""
 
+import numpy as np
 import pytest
+import scipy
 
 import freqid as fq
 from freqid.lti.holds import hold as holds
@@ -43,3 +45,30 @@ def test_a_plant_that_needs_twice_the_digits_has_them_at_the_end():
     record = fq.simulate(model, fq.white_noise(800, seed=1), 0.05)
     est = fq.fit(model.fix("b"), record, start={"a": 5.0, "g": -0.2}, n_starts=14)
     assert [est["a"], est["g"]] == pytest.approx([2.0, 0.5], rel=1e-9)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("n", "seed"), [(1500, 19), (3000, 33), (3000, 38)])
+def test_a_step_too_short_to_gain_gains_nothing(n, seed):
+    """A lag of -5 µs: steps of 1e-8 along derivatives that rounding had made were to gain half of
+    the cost, which nobody looked at. What ended there cost three times what the start did.
+    """
+
+    def drive(J, b, tau):
+        return [[-1 / tau, 0], [1 / J, -b / J]], [[1 / tau, 0], [0, 1 / J]], [[0, 1]], None
+
+    def model_of(inputs):
+        def matrices(J, b, tau):
+            A, B, C, D = drive(J, b, tau)
+            return A, [row[:inputs] for row in B], C, D
+
+        true = {"J": 0.01, "b": 0.05, "tau": 4e-3}
+        return fq.GreyBox(matrices, [fq.Parameter(n, v) for n, v in true.items()])
+
+    rng = np.random.default_rng(seed)
+    u = 3 * np.repeat(rng.normal(size=n // 100), 100)
+    torque = 0.13 * scipy.signal.lfilter([1], [1, -0.9], rng.normal(size=n))
+    y = fq.simulate(model_of(2), np.column_stack([u, torque]), 1e-3).y[:, 0]
+    est = fq.fit(model_of(1), fq.Record(u, y + 0.3 * rng.normal(size=n), 1e-3))
+    off = np.abs(est.values - [0.01, 0.05, 4e-3])
+    assert (off < 4 * np.sqrt(np.diag(est.covariance_matrix))).all()

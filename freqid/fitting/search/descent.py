@@ -182,6 +182,8 @@ def _fallen(objective: Objective) -> str:
 _SHORT = 1e-2
 # a Gauss-Newton step of this relative size needs no second look: the next one is its square
 _LAST_STEP = 1e-7
+# by how many times its own size a step may move what the data are
+_STEEP = 1e3
 # such steps in a row
 _STRAIGHT = 12
 
@@ -223,12 +225,16 @@ def _straight_down(
         step, c = _gauss_newton(point), point.triangle[:P, P]
         if step is None or _outside(objective.structure, x + step):
             break
-        # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain
-        if np.abs(step).max() <= last_step or float(c @ c) <= tolerance * point.cost:
+        # the step gains |c|² of the cost: nothing, or next to nothing, is left to gain. A short one
+        # that is to gain much follows derivatives that rounding has made
+        gain = float(c @ c)
+        short = np.abs(step).max() <= last_step
+        meant = gain <= (_STEEP * last_step) ** 2 * objective.energy
+        if (short and meant) or gain <= tolerance * point.cost:
             structure = objective.structure
             if isinstance(structure, Chart) and structure.refused(x + step):
                 break
-            left = max(1 - float(c @ c) / max(point.cost, 1e-300), 0.0)
+            left = max(1 - gain / max(point.cost, 1e-300), 0.0)
             triangle = point.triangle.copy()
             triangle[:P, P] = 0
             end = Point(triangle, point.initial, [p * left for p in point.parts])
