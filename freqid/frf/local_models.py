@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from freqid.checks import FloatArray, InputError, whole
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, whole
 from freqid.data import (
     FrequencyResponse,
     LocalResponse,
@@ -40,6 +40,8 @@ _HOPELESS = 100.0
 # part of the power of a line's neighbours below which it is not driven, that of the strongest line
 # below which none around is, and the part of all that polynomials need: every second line will do
 _UNDRIVEN, _SILENT, _FEW = 0.01, 1e-6, 0.45
+# part of the power of lines that is rounding
+_ROUNDED = 1e-24
 # inputs whose spectra have so small an eigenvalue are the same
 _DEPENDENT = 1e-12
 
@@ -246,12 +248,26 @@ def _lines(
     Y = np.stack([s.Y for s in each])[..., inner]
     f = f[inner]
     if signals is not None:
+        m = signals[0].shape[1]
+        names = [f"reference {j + 1}" for j in range(m)] if m > 1 else ["the reference"]
         as_input = [
-            spectra(Record(x, r.y, r.dt), limits).U[:, :, 0]
+            spectra(Record(x, r.y, r.dt, input_names=names), limits).U[:, :, 0]
             for x, r in zip(signals, sets, strict=True)
         ]
         Y = np.concatenate([Y, U], axis=1)
         U = np.stack(as_input)[..., inner]
     if len(f) < width:
         raise InputError(f"data hold {len(f)} lines for a window of {width}; narrow the window")
-    return Lines(U, Y, f, chosen(f, asked))
+    wanted = chosen(f, asked)
+    if signals is not None:
+        wanted = wanted & _referred(U, width, sum(float(np.vdot(x, x)) for x in signals))
+    return Lines(U, Y, f, wanted)
+
+
+def _referred(U: ComplexArray, width: int, energy: float) -> BoolArray:
+    """Lines (K,) next to which references of such an ``energy``, the mean power of all lines, move
+    something: elsewhere nothing but noise goes round, which tells minus one over the controller.
+    """
+    power = (np.abs(U) ** 2).sum(axis=(0, 1))
+    around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
+    return np.asarray(around > _ROUNDED * energy)

@@ -139,8 +139,9 @@ def _compute(record: Record, limits: Band | None, lifted: bool) -> Spectra:
         Y = dft_at(list(y.T), lines)
     if not np.abs(U).max() > 1e-13 * np.sqrt(np.vdot(u, u)):
         raise InputError(
-            f"u is zero over {'all lines' if limits is None else f'band={limits}'}; an input "
-            "without energy there identifies nothing"
+            f"{' and '.join(record.input_names)} is zero over "
+            f"{'all lines' if limits is None else f'band={limits}'}; an input without energy there "
+            "identifies nothing"
         )
     step = 2 * np.pi / (N * record.dt)
     return Spectra(
