@@ -86,7 +86,8 @@ def asymptotic_fit(
             or functions of ω (rad/s): the weight is multiplied by |L|²/|H|².
         noise_std, duration: standard deviation of white output noise and length of the record in s:
             they, and the aliasing of an input with a density, make the standard errors. Without
-            ``duration`` these are zero.
+            ``duration`` these are zero. They are those of a fit within the spectrum's own band;
+            for what a sweep's ends tell outside of it see ``experiment_design``.
         start, n_starts, seed: as in ``fit``.
 
     Returns an Estimate; its cost is the mean square of the (filtered) error, and "biased" among its

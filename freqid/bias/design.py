@@ -56,6 +56,7 @@ def experiment_design(
     true_hold: Hold | None = None,
     method: Literal["linear", "log"] = "linear",
     d_optimal: bool = False,
+    in_band: bool = False,
     criterion: str = "worst",
     n_jobs: int | None = None,
 ) -> pd.DataFrame:
@@ -71,6 +72,9 @@ def experiment_design(
         true_hold: what the converter does; None for a zero-order hold at ``base_dt``.
         method: of the chirps, ``"linear"`` or ``"log"``.
         d_optimal: add for each rate the multisine that determines the parameters best together.
+        in_band: that the fit is to be given the excitation's own ``band=(low, high)``, and not all
+            lines: what a chirp's ends tell outside of it is lost, and may be nearly all that is
+            known of slow motions.
         criterion: ``"worst"`` or ``"rms"`` of the parameters' relative errors makes the ranking.
         n_jobs: as in ``bias_map``.
 
@@ -123,6 +127,7 @@ def experiment_design(
                 "band-limited input; leave it out"
             )
     flag("d_optimal", d_optimal)
+    flag("in_band", in_band)
     processes(n_jobs)
     names = [p.name for p in plant.free_parameters]
     tables = [(counts, spectra)]
@@ -145,7 +150,7 @@ def experiment_design(
         keys = ["hold", "factor", "spectrum"]
         parts = dict(tuple(biases.groupby(keys, sort=False)))
         for name, spectrum in chosen.items():
-            sweep = Sweep.of(plant, spectrum, duration, hold, base_dt)
+            sweep = Sweep.of(plant, spectrum, duration, hold, base_dt, in_band)
             for given, factor in itertools.product(assumed, some):
                 label = hold_label(given)
                 sampling = Sampling(hold, base_dt, factor)

@@ -31,10 +31,18 @@ class Sweep:
     records: Sequence[Record]
     # at zero an integrator answers with anything at all
     skip_zero: bool
+    # of the lines that the fit takes, None for all
+    band: tuple[float, float] | None = None
 
     @classmethod
     def of(
-        cls, plant: GreyBox, spectrum: InputSpectrum, duration: float, hold: Hold, dt: float
+        cls,
+        plant: GreyBox,
+        spectrum: InputSpectrum,
+        duration: float,
+        hold: Hold,
+        dt: float,
+        in_band: bool = False,
     ) -> Sweep | None:
         """None for what is no chirp, is very long, or is held for another time than a sample's."""
         c = spectrum
@@ -45,7 +53,7 @@ class Sweep:
         u = chirp(c.low, c.high, duration, dt, c.method, amplitude=c.amplitude)
         alone = np.eye(plant.n_inputs)
         records = [simulate(plant, u[:, None] * row, dt, hold) for row in alone]
-        return cls(records, plant.integrates)
+        return cls(records, plant.integrates, (c.low, c.high) if in_band else None)
 
     def covariance(
         self,
@@ -62,7 +70,7 @@ class Sweep:
         (Gauss and Newton's), which counts as so much error.
         """
         kept = [r.decimate(factor) for r in self.records]
-        readings = [Reading.of(r, hold, skip_zero=self.skip_zero) for r in kept]
+        readings = [Reading.of(r, hold, self._seen(r), skip_zero=self.skip_zero) for r in kept]
         shape = len(self.records[0].output_names), len(self.records)
         objective = Objective(structure, read_for(shape, readings))
         point = objective.point(x)
@@ -72,3 +80,9 @@ class Sweep:
         told = determined(point.jacobian, x, structure.names, size, structure.scale)
         step = told.inverse @ (point.jacobian.T @ point.residual)
         return told.scatter(noise_std**2 * told.inverse + np.outer(step, step))
+
+    def _seen(self, record: Record) -> tuple[float, float] | None:
+        """The part of the band below a record's Nyquist frequency; None for all of its lines."""
+        if self.band is None or self.band[0] >= record.nyquist:
+            return None
+        return self.band[0], min(self.band[1], record.nyquist)

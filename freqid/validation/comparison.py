@@ -30,7 +30,7 @@ from freqid.fitting import (
     remembered,
 )
 from freqid.lti import Hold, PeriodicHold, as_hold
-from freqid.models import Model, ModelLike, as_model
+from freqid.models import DiscreteModel, Model, ModelLike, as_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -123,7 +123,8 @@ def compare(
     Args:
         model: an Estimate, a GreyBox, a rational model or a control system.
         hold: what the input does; None is what the fit assumed of its data, and else what the
-            record remembers. A discrete black box simulates at the hold that it was fitted with.
+            record remembers. A discrete model keeps its own where the input is held as long as it
+            lasts; where it is not the continuous plant inside it is simulated.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
             input to be periodic, ``"zero"`` begins at rest. Offsets of the outputs are fitted with
             it where the Estimate was (``offset="estimate"``). A plant that integrates is simulated
@@ -154,11 +155,11 @@ def compare(
         )
     fitted, record = met(model, record), in_order_of(as_model(model), record)
     assert isinstance(record, Record)
+    given, hold = held(model, fitted, hold, record)
     if isinstance(record, StampedRecord):
-        return _at_stamps(fitted, record, own_hold(model, hold, record), band)
+        return _at_stamps(given, record, hold, band)
     limits = as_band(band, record.nyquist)
     choice("initial_state", initial_state, ("estimate", "steady", "zero"))
-    given, hold = fitted, own_hold(model, hold, record)
     free = offset_is_free(model)
     residual = -errors_in_time(given, record, hold, initial_state, free, limits)
     y = record.outputs[: len(residual)]
@@ -208,7 +209,7 @@ def _with_response(
     band: tuple[float, float] | None,
 ) -> Comparison:
     """The model's response beside a measured one, each output in per cent."""
-    given, found = met(model, frf), own_hold(model, hold, frf)
+    given, found = held(model, met(model, frf), hold, frf)
     ordered = in_order_of(given, frf)
     assert isinstance(ordered, FrequencyResponse)
     frf = ordered
@@ -229,15 +230,37 @@ def _with_response(
     return Comparison(frf, frf.response, G, left, percent, found)
 
 
-def own_hold(model: ModelLike, hold: Hold | str | None, data: DataSet) -> Hold | str | None:
-    """The hold asked for; else the one inside a sampled model, else the one that a fit assumed.
+def held(
+    model: ModelLike, fitted: Model, hold: Hold | str | None, data: DataSet
+) -> tuple[Model, Hold | str | None]:
+    """What stands for a model that was ``fitted``, and the hold of its input: the one asked for;
+    else what the fit assumed of its data.
 
     A fit that took what its record remembers says so of another record, too; one that assumed a
-    hold at its own sample time assumes it at the other's.
+    hold at its own sample time assumes it at the other's. A sampled model has its hold inside:
+    where the input is held for another time its continuous plant stands for it.
     """
-    inside = as_model(model).own_hold
-    if hold is not None or inside is not None:
-        return hold if hold is not None else inside
+    between = _assumed(model, data) if hold is None else hold
+    if isinstance(fitted, DiscreteModel):
+        own, at = fitted.hold, data.hold
+        if isinstance(between, str) and (step := input_dt(data)):
+            between = as_hold(between, step, at)
+        lasts = between or at
+        if not (isinstance(own, PeriodicHold) and isinstance(lasts, PeriodicHold)):
+            return fitted, between or own
+        ratio = lasts.period / own.period
+        # nobody asked for a model of another rate beside data of which its own is no part
+        meant = hold is not None or abs(ratio - round(ratio)) < 1e-9 * ratio
+        if abs(ratio - 1) > 1e-9 and meant:
+            return as_model(fitted.to_continuous()), lasts
+        return fitted, between or own
+    return fitted, between
+
+
+def _assumed(model: ModelLike, data: DataSet) -> Hold | None:
+    """The hold that a fit assumed where it did not take what its data remembered; None for others,
+    to which the other data say what they remember.
+    """
     if not isinstance(model, Estimate):
         return None
     said, step = remembered(model)

@@ -21,7 +21,7 @@ from freqid.data import (
 from freqid.fitting import in_order_of, line_errors, met, offset_is_free
 from freqid.lti import Hold
 from freqid.models import ModelLike, as_model
-from freqid.validation.comparison import Comparison, compare, own_hold, part_inside
+from freqid.validation.comparison import Comparison, compare, held, part_inside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,8 +86,8 @@ def residual_test(
     if record.n_samples < 4 * lags:
         raise InputError(f"record has {record.n_samples} samples; {lags} lags need {4 * lags}")
     limits = as_band(band, record.nyquist)
-    hold = own_hold(model, hold, record)
-    fitted, record = met(model, record), in_order_of(as_model(model), record)
+    fitted, hold = held(model, met(model, record), hold, record)
+    record = in_order_of(as_model(model), record)
     assert isinstance(record, Record)
     e = -line_errors(fitted, record, hold, offset=offset_is_free(model)).in_time()
     u = record.inputs[:: record.factor][: len(e)]

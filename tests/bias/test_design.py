@@ -116,15 +116,20 @@ SWEEPS = {
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("case", SWEEPS)
-def test_a_sweep_promises_the_errors_that_fits_to_it_have(case):
-    """A density has no ends: a slow motion's dampings had been promised 5 times too large."""
+@pytest.mark.parametrize(
+    ("case", "in_band"), [*((case, False) for case in SWEEPS), ("a slow rigid motion", True)]
+)
+def test_a_sweep_promises_the_errors_that_fits_to_it_have(case, in_band):
+    """A density has no ends: a slow motion's dampings had been promised 5 times too large. Of a
+    fit within the band they were promised 10 times too small.
+    """
     function, band, dt, duration, factor, method, noise = SWEEPS[case]
     plant, amplitude = model_of(function), 2.0
     table = fq.experiment_design(
         plant, dt, noise_std=noise, amplitude=amplitude, duration=duration, factors=[factor],
-        bands=[band], method=method,
+        bands=[band], method=method, in_band=in_band,
     )  # fmt: skip
+    fitted = band if in_band else None
     names = [p.name for p in plant.free_parameters]
     promised = table.loc[0, [f"std {n}" for n in names]].to_numpy(float)
     u = fq.chirp(*band, duration, dt, method, amplitude=amplitude)
@@ -133,7 +138,9 @@ def test_a_sweep_promises_the_errors_that_fits_to_it_have(case):
     errors, told = [], []
     for seed in range(10):
         noisy = [r.with_noise(noise, seed=seed + 100 * i) for i, r in enumerate(alone)]
-        found = fq.fit(plant, noisy[0] if len(noisy) == 1 else noisy, n_starts=1).parameters
+        found = fq.fit(
+            plant, noisy[0] if len(noisy) == 1 else noisy, band=fitted, n_starts=1
+        ).parameters
         errors.append(found["value"][names] / [plant[n] for n in names] - 1)
         told.append(found["std"][names] / [plant[n] for n in names])
     assert np.median(told, axis=0) == pytest.approx(promised, rel=0.15)
