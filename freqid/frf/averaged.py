@@ -37,8 +37,10 @@ def h1(
     """S_yu S_uu⁻¹: the least-squares response where the noise is on the output.
 
     Args:
-        records: one, or repeats and experiments of one plant with one sample time; or a stream
-            (see ``open``), which takes one pass, and a ``segment`` where its length is not known.
+        records: one, or repeats and experiments of one plant with one sample time, of a faster
+            input those samples that outputs have (what they fold is told of the response, and of a
+            fit to it; ``etfe`` and fits of the record itself take all); or a stream (see
+            ``open``), which takes one pass, and a ``segment`` where its length is not known.
         segment: samples of each segment; by default an eighth of a single record, and the whole of
             each of several.
         band: in Hz, None for all above zero.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data import FrequencyResponse, Record, Stream, folded_part
+from freqid.data import FrequencyResponse, Record, Stream, folded_part, power_above
 
 
 def measured(
@@ -48,6 +48,12 @@ def aliased_of(sets: Sequence[Record | Stream]) -> float:
     """
     remembered = max(record.aliased for record in sets)
     return remembered or max(map(folded_part, sets))
+
+
+def aliased_at_outputs(sets: Sequence[Record | Stream]) -> float:
+    """The same where inputs are taken no more often than slower outputs."""
+    fast = [r for r in sets if isinstance(r, Record) and r.factor > 1]
+    return max([aliased_of(sets), *(power_above(r.inputs, r.factor) for r in fast)])
 
 
 def units_of(record: Record | Stream) -> dict[str, str]:

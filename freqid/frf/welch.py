@@ -10,7 +10,7 @@ import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError, flag, path_of
 from freqid.data import Bar, Record, Reference, Stream, as_band, as_records, chosen, references_of
-from freqid.frf.measured import aliased_of
+from freqid.frf.measured import aliased_at_outputs
 from freqid.frf.running_sums import RunningSums
 from freqid.frf.segment_sums import SegmentSums
 from freqid.frf.segments import (
@@ -176,7 +176,7 @@ def spectral(
         first,
         reach,
         told,
-        aliased_of(sets),
+        aliased_at_outputs(sets),
         joint,
     )
 
