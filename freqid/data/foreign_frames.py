@@ -76,17 +76,24 @@ def _of_xarray(found: object) -> Table:
     if hasattr(found, "data_vars"):
         if len(sizes) != 1:
             raise InputError(f"frame has the dimensions {sizes}; expected one, the time")
-        variables = found.data_vars.items()
-        units = {str(n): str(v.attrs["units"]) for n, v in variables if "units" in v.attrs}
-        return Table(found.to_dataframe(), units)  # type: ignore[attr-defined]
+        return Table(found.to_dataframe(), _units_of(found))  # type: ignore[attr-defined]
     if hasattr(found, "to_pandas") and len(sizes) == 2:
         frame = pd.DataFrame(found.to_pandas())
         frame.columns = [str(c) for c in frame.columns]
-        return Table(frame, {})
+        return Table(frame, _units_of(found))
     raise InputError(
         f"frame is a {type(found).__name__} of the dimensions {sizes}; expected an "
         "xarray.Dataset, or an array of time by channel"
     )
+
+
+def _units_of(found: object) -> dict[str, str]:
+    """Units of the variables of xarray, and of the time, which is a coordinate: those of the climate
+    and forecast conventions count since a date.
+    """
+    named = [*getattr(found, "coords", {}).items(), *getattr(found, "data_vars", {}).items()]
+    told = {str(n): str(v.attrs["units"]) for n, v in named if "units" in v.attrs}
+    return {n: unit.partition(" since ")[0] for n, unit in told.items()}
 
 
 def _of_data_set(found: object) -> Table:

@@ -36,7 +36,9 @@ def with_its_time(
         twice = str(frame.columns[frame.columns.duplicated()][0])
         raise InputError(f"column {twice!r} is there twice; rename one of them")
     if "time" not in frame.columns:
-        if frame.index.name is not None and _is_time(frame.index.name):
+        name, told = frame.index.name, (units or {}).get("time") is not None
+        counted = name == "time" and told and frame.index.dtype.kind in "iuf"
+        if name is not None and (counted or _is_time(name)):
             frame = frame.reset_index()
         elif times_of(frame) is not None:
             return frame, []

@@ -123,3 +123,23 @@ def test_an_empty_frame_is_told():
     empty = pd.DataFrame({"time": np.array([], object), "u": [], "y": []})
     with pytest.raises(InputError, match="0 rows"):
         fq.Record.from_frame(empty, "u", "y")
+
+
+@pytest.mark.parametrize("unit", ["ms", "milliseconds", "ms since 2020-01-01"])
+@pytest.mark.parametrize("name", ["time", "t"])
+def test_the_unit_of_the_time_stands_at_its_coordinate(unit, name):
+    """It was left out: a sample time of 1 s, without a word."""
+    at = {name: (name, 1e3 * T, {"units": unit})}
+    table = xr.Dataset({"torque": (name, U, {"units": "N m"}), "speed": (name, Y)}, at)
+    for frame in (table, table.to_array("channel").T):
+        record = fq.Record.from_frame(frame, inputs="torque", outputs="speed")
+        assert record.dt == pytest.approx(T[1] - T[0])
+        assert any(f"in {unit.split()[0]}" in note for note in record.notes)
+
+
+def test_a_unit_of_the_time_is_one_of_an_index_too():
+    frame = pd.DataFrame({"torque": U, "speed": Y}, pd.Index(1e3 * T, name="time"))
+    named = fq.Record.from_frame(frame, inputs="torque", outputs="speed", units={"time": "ms"})
+    assert named.dt == pytest.approx(T[1] - T[0])
+    frame.attrs["units"] = {"time": "ms"}
+    assert fq.Record.from_frame(frame, inputs="torque", outputs="speed").dt == named.dt
