@@ -88,8 +88,8 @@ def _of_xarray(found: object) -> Table:
 
 
 def _units_of(found: object) -> dict[str, str]:
-    """Units of the variables of xarray, and of the time, which is a coordinate: those of the climate
-    and forecast conventions count since a date.
+    """Units of xarray's variables, and of the time, which is a coordinate: those of the climate and
+    forecast conventions count since a date.
     """
     named = [*getattr(found, "coords", {}).items(), *getattr(found, "data_vars", {}).items()]
     told = {str(n): str(v.attrs["units"]) for n, v in named if "units" in v.attrs}

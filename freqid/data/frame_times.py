@@ -36,8 +36,8 @@ def with_its_time(
         twice = str(frame.columns[frame.columns.duplicated()][0])
         raise InputError(f"column {twice!r} is there twice; rename one of them")
     if "time" not in frame.columns:
-        name, told = frame.index.name, (units or {}).get("time") is not None
-        counted = name == "time" and told and frame.index.dtype.kind in "iuf"
+        name, unit = frame.index.name, (units or {}).get("time")
+        counted = name == "time" and unit is not None and frame.index.dtype.kind in "iuf"
         if name is not None and (counted or _is_time(name)):
             frame = frame.reset_index()
         elif times_of(frame) is not None:

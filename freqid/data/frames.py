@@ -24,6 +24,7 @@ from freqid.data.remembered import (
     kept_notes,
     kept_reference,
 )
+from freqid.data.runs_in_one import runs_in_one
 from freqid.lti import Hold
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def record_of(
     u_names, y_names = _channels(signals, inputs, outputs, reference, told)
     between = kept_hold(frame, u_names) if hold is None else hold
     notes = [*kept_notes(frame), *said]
+    notes += runs_in_one(frame, {"time", *u_names, *y_names, str(reference)})
     if resample:
         held = set(u_names) if between is None or between == "zoh" else set()
         frame, more = _resampled(frame, signals, held, y_names)

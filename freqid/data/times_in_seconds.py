@@ -91,7 +91,8 @@ def converted(column: Column) -> Column | None:
             )
         cell = column[numbers].iloc[-1]
         raise InputError(
-            f"{column.name!r} holds the text {cell!r} among its numbers; give decimal=, or mend it"
+            f"{column.name!r} holds the text {cell!r} among its numbers; give read() decimal=, or "
+            "mend it"
         )
     # with dots the day comes first
     first = bool(texts.contains(r"\d\.\d+\.").any()) or _begins_with_the_day(column)

@@ -143,3 +143,25 @@ def test_a_unit_of_the_time_is_one_of_an_index_too():
     assert named.dt == pytest.approx(T[1] - T[0])
     frame.attrs["units"] = {"time": "ms"}
     assert fq.Record.from_frame(frame, inputs="torque", outputs="speed").dt == named.dt
+
+
+def test_runs_of_one_table_are_records_of_their_own(tmp_path):
+    """Three of them had been glued together without a word."""
+    t, u = 1e-3 * np.arange(300), np.sin(np.arange(300.0))
+    frame = pd.DataFrame({"time": t, "run": np.arange(300) // 100, "u": u, "y": np.cumsum(u)})
+    frame.to_csv(tmp_path / "runs.csv", index=False)
+    glued = (
+        fq.Record.from_frame(frame, inputs="u", outputs="y"),
+        fq.read(tmp_path / "runs.csv", inputs="u", outputs="y"),
+    )
+    for record in glued:
+        (note,) = [n for n in record.notes if "'run'" in n]
+        assert "3 runs" in note
+    run = fq.Record.from_frame(frame[frame["run"] == 1], inputs="u", outputs="y")
+    assert not run.notes
+    # a channel that is called so is one
+    named = frame.rename(columns={"run": "test", "u": "run"})
+    assert fq.Record.from_frame(named.drop(columns="test"), inputs="run", outputs="y").notes == ()
+    levels = frame.set_index(["run", "time"])
+    with pytest.raises(InputError, match=r"2 levels, run, time.*xs\(\.\.\., level='run'\)"):
+        fq.Record.from_frame(levels, inputs="u", outputs="y")
