@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from freqid.checks import InputError
+from freqid.checks import FloatArray, InputError
 from freqid.data import FrequencyResponse, Record
 from freqid.fitting.black_box.reference import Reference
 from freqid.fitting.cost.structures import GreyStructure
@@ -29,6 +29,9 @@ from freqid.models import GreyBox
 # standard error that ends them
 _NOISE_ROUNDS, _ROUGH_ROUNDS = 8, 5
 _STANDS = 0.01
+# energy of an output's errors, in parts of what the first fits left, from which it is no noise: what
+# a model cannot explain has been learnt as such, and then more of the signal, up to all of it
+_RUN_AWAY = 4.0
 # part of the cost by which another start's end is another minimum, and how often a delay may go on
 # to the next sample
 _DEEPER, _DOORS = 1e-6, 3
@@ -67,21 +70,30 @@ def _in_turn(
     """The first estimate, the one that stands, and the readings by whose noise it was found."""
     est, readings = fitted(model, readings, options)
     first, whole, rough = est, est, True
+    began: tuple[Estimate, Sequence[Reading]] | None = None
+    most = np.inf
     for i in range(_NOISE_ROUNDS):
         if est.message == INTERRUPTED or est.minimum.objective.noiseless(est.minimum.cost):
             # of rounding no noise can be learnt
             return first, est, readings
-        readings = [_learnt(est, r, options.estimated_hold) for r in readings]
+        readings, energy = _learnt_of(est, readings, options.estimated_hold)
+        if began is not None and (energy > most).any():
+            return first, *began
+        if i < 2:
+            most = _RUN_AWAY * np.minimum(energy, most)
         before, anew = est, again(est, options)
         # a black box begins by itself where noise is first told, and walks from there
         walks = anew.start is None and i > 0
         own = dataclasses.replace(anew, before=before if walks else None, rough=rough)
         est, readings = fitted(model, readings, own)
         whole = whole if walks else est
+        began = began or (est, readings)
         if _stands(est, before) and (est.converged or not rough):
             break
         # a round that moves little is the last: it goes to its end
         rough = i + 1 < _ROUGH_ROUNDS and not _stands(est, before)
+    if began is not None and (_learnt_of(est, readings, False)[1] > most).any():
+        return first, *began
     if not _stands(est, whole):
         # what is noise has changed on the way, and with it perhaps which minimum is the least
         other, left = fitted(model, readings, anew)
@@ -236,10 +248,24 @@ def relative_to_model(est: Estimate, reading: Reading) -> Reading:
     return reading.with_(data=frf, noise=ModelNoise(share))
 
 
+def _learnt_of(
+    est: Estimate, readings: Sequence[Reading], estimated_hold: bool
+) -> tuple[list[Reading], FloatArray]:
+    """Readings with the noise that an estimate leaves of them, where that is to be learnt, and the
+    energy of each output's errors there, one after the other.
+    """
+    weighted, energy = [], [np.zeros(0)]
+    for r in readings:
+        if not r.noise.to_be_learnt:
+            weighted.append(r)
+            continue
+        seen = r.with_(hold=est.hold) if estimated_hold else r
+        left = errors_of(met_by(est, r), seen)
+        weighted.append(r.with_(noise=r.noise.learnt(left.error, left.n_samples)))
+        energy.append((np.abs(left.error) ** 2).sum(axis=-1))
+    return weighted, np.concatenate(energy)
+
+
 def _learnt(est: Estimate, reading: Reading, estimated_hold: bool) -> Reading:
-    """The reading with the noise that an estimate leaves of it, where that is to be learnt."""
-    if not reading.noise.to_be_learnt:
-        return reading
-    seen = reading.with_(hold=est.hold) if estimated_hold else reading
-    left = errors_of(met_by(est, reading), seen)
-    return reading.with_(noise=reading.noise.learnt(left.error, left.n_samples))
+    """One reading so."""
+    return _learnt_of(est, [reading], estimated_hold)[0][0]

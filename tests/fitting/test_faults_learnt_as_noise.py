@@ -77,3 +77,39 @@ def test_what_is_right_is_trusted() -> None:
     u, y = flown(3)
     record = fq.Record(u, y, STEP, output_names=["alpha", "q", "az"])
     assert fq.fit(plant(), record, weights="noise").verdict.trusted
+
+
+def motor(R, Ld, Lq):
+    """Currents of a permanent magnet motor at 300 rad/s by its voltages."""
+    A = [[-R / Ld, 300 * Lq / Ld], [-300 * Ld / Lq, -R / Lq]]
+    return A, [[1 / Ld, 0], [0, 1 / Lq]], np.eye(2), None
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("seed", range(4))
+def test_the_delay_of_a_converter(seed: int) -> None:
+    """Learnt in turn, what a delay of 1.5 samples leaves became all of the data: inductances of
+    1e17 H, and "no signal".
+    """
+    free = [fq.Parameter(n, v) for n, v in {"R": 0.5, "Ld": 4e-3, "Lq": 7e-3}.items()]
+    late = fq.GreyBox(motor, free, input_delay=1.5e-4)
+    u = fq.white_noise(1000, seed=seed), fq.white_noise(1000, seed=seed + 50)
+    record = fq.simulate(late, np.column_stack(u), 1e-4)
+    record = record.with_noise(0.01 * record.y.std(), seed=seed + 1)
+    said = fq.fit(fq.GreyBox(motor, free), record, weights="noise").warnings
+    delay = next(w for w in said if w.kind == "delay")
+    assert delay == said[0]
+    assert "every input acts 0.15" in delay or "every input acts 0.149" in delay
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("n", "seed"), [(500, 1), (500, 0), (3000, 2)])
+def test_a_drift_beside_a_right_model_is_learnt(n: int, seed: int) -> None:
+    """A walk of three times the signal's size: values had been off by up to 70 %."""
+    plant, rng = fq.first_order(), np.random.default_rng(seed)
+    u = rng.standard_normal(n)
+    y = fq.simulate(plant, u, 2e-3).y
+    walk, noise = np.cumsum(rng.standard_normal(n)), rng.standard_normal(n)
+    drift = 3 * (walk - walk.mean()) / walk.std()
+    est = fq.fit(plant, fq.Record(u, y + y.std() * (drift + 0.01 * noise), 2e-3), weights="noise")
+    assert est.values == pytest.approx([plant[name] for name in est.names], rel=0.15)
