@@ -29,8 +29,8 @@ from freqid.models import GreyBox
 # standard error that ends them
 _NOISE_ROUNDS, _ROUGH_ROUNDS = 8, 5
 _STANDS = 0.01
-# energy of an output's errors, in parts of what the first fits left, from which it is no noise: what
-# a model cannot explain has been learnt as such, and then more of the signal, up to all of it
+# energy of an output's errors, in parts of what the first fits left, from which it is no noise:
+# what a model cannot explain was learnt as such, and then more of the signal, up to all of it
 _RUN_AWAY = 4.0
 # part of the cost by which another start's end is another minimum, and how often a delay may go on
 # to the next sample
