@@ -71,7 +71,7 @@ def _in_turn(
     est, readings = fitted(model, readings, options)
     first, whole, rough = est, est, True
     began: tuple[Estimate, Sequence[Reading]] | None = None
-    most = np.inf
+    most: FloatArray | float = np.inf
     for i in range(_NOISE_ROUNDS):
         if est.message == INTERRUPTED or est.minimum.objective.noiseless(est.minimum.cost):
             # of rounding no noise can be learnt

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from freqid.checks import ComplexArray, InputError
+from freqid.checks import ComplexArray, FloatArray, InputError
 from freqid.data import DataSet, Record
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
 from freqid.models import GreyBox, Model, Parameter
@@ -58,15 +58,22 @@ def gone_with(
 
 
 def hold_that_changes(hold: Hold, data: DataSet) -> Hold:
-    """The hold as slow as the input itself: one that is faster than the output, but changes only
-    with it, tells no more than the output's own samples.
+    """The hold as slow as the input itself: one that is faster than the output, but changes less
+    often, tells no more than samples that are so far apart.
     """
     if not isinstance(data, Record) or data.factor == 1 or hold != ZeroOrderHold(data.input_dt):
         return hold
-    M, inputs = data.factor, data.inputs
+    for count in range(data.factor, 1, -1):
+        if data.factor % count == 0 and _held_for(count, data.inputs, data.factor):
+            return ZeroOrderHold(count * data.input_dt)
+    return hold
+
+
+def _held_for(count: int, inputs: FloatArray, factor: int) -> bool:
+    """Whether inputs (N, m) change no more often than every so many samples."""
     # nearly every input that is no such says so within a few samples
-    for some in (inputs[: _FEW * M], inputs):
-        steps = some[: len(some) // M * M].reshape(-1, M, inputs.shape[1])
+    for some in (inputs[: _FEW * factor], inputs):
+        steps = some[: len(some) // count * count].reshape(-1, count, inputs.shape[1])
         if not (steps == steps[:, :1]).all():
-            return hold
-    return ZeroOrderHold(data.dt)
+            return False
+    return True

@@ -10,6 +10,7 @@ import numpy as np
 from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
 from freqid.data import channel_counts, common_names
 from freqid.fitting.black_box.channel_units import Descent
+from freqid.fitting.black_box.in_sight import in_sight, samples_held
 from freqid.fitting.black_box.order_minimum import (
     HIGH,
     Orders,
@@ -35,16 +36,18 @@ from freqid.fitting.noise_models import GivenWeights
 from freqid.fitting.reading import Reading
 from freqid.fitting.reading_sets import aliased_part, read_for
 from freqid.fitting.search.descent import UncomputableError, polish
-from freqid.fitting.sight import out_of_sight
+from freqid.fitting.sight import out_of_sight, poles_of
 from freqid.fitting.signs import Evidence, findings, unstable
 from freqid.fitting.sufficiency import enough_rows, moving, told_apart
 from freqid.fitting.uncertainty.error_bars import pole_scatter
 from freqid.fitting.uncertainty.minimum import Minimum, Spread
-from freqid.lti import Hold, Plane
+from freqid.lti import Hold, PeriodicHold, Plane
 from freqid.models import DiscreteModel, Model, OutputError, coefficients_of
 
 # evaluations of a start on lines that are kept
 _STEPS = 80
+# part of a cost by which two are the same
+_SAME = 1e-6
 # by how much rounding makes the motion of an integrator grow within the data
 _ROUNDED = 1e-6
 
@@ -95,6 +98,13 @@ def fit_output_error(
         edge = edge or at_the_edge(chart, solution.x, objective.experiments)
     if edge is not None:
         chart, solution, objective = edge
+    held = samples_held(readings)
+    if held > 1 and (seen := in_sight(chart.in_z(solution.x), held)) is not None:
+        # as good, and the one of the two that was meant
+        near = chart.around(to_plane(seen, chart.plane))
+        other = descended(near, objective.experiments)
+        if other[1].cost <= solution.cost * (1 + _SAME) + objective.rounding:
+            chart, solution, objective = other
     at = chart.in_z(solution.x)
     model = DiscreteModel(at, dt, first.hold, *common_names([first.data]), spec.stable)
     est = coefficient_estimate(
@@ -105,6 +115,7 @@ def fit_output_error(
         first.hold,
         dt,
         aliased_part(readings),
+        held,
     )
     if edge is not None:
         est = dataclasses.replace(est, signs=[*est.signs, *held_back(chart, solution, objective)])
@@ -172,10 +183,12 @@ def coefficient_estimate(
     hold: Hold,
     dt: float,
     aliased: float,
+    held: int = 1,
 ) -> Estimate:
     """An Estimate whose parameters are coefficients: smooth functions of the unknowns x.
 
-    ``coefficients`` gives them at many points, (S, unknowns) to (S, names).
+    ``coefficients`` gives them at many points, (S, unknowns) to (S, names); the input was ``held``
+    for so many samples of the model.
     """
     x, step = minimum.x, 1e-7
     values, *others = coefficients(x + np.vstack([np.zeros(len(x)), step * np.eye(len(x))]))
@@ -185,6 +198,10 @@ def coefficient_estimate(
     failure = "" if solution.converged else solution.message
     rows = minimum.objective.n_rows
     growing = _growing(model, rows * dt)
+    unseen = hold
+    if model.dt and isinstance(hold, PeriodicHold):
+        # a sampled model's own poles are at most at its Nyquist frequency
+        unseen = type(hold)(held * hold.period)
     evidence = Evidence(
         [],
         none,
@@ -195,7 +212,7 @@ def coefficient_estimate(
         n_unknowns=len(values),
         growing=growing.tolist(),
         growth=_growth(minimum, spread, rows * dt) if len(growing) else np.inf,
-        out_of_sight=[] if model.dt else out_of_sight(model.poles, hold),
+        out_of_sight=out_of_sight(poles_of(model), unseen),
     )
     return Estimate(
         model=model,

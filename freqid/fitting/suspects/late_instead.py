@@ -4,6 +4,7 @@ are one mode more, and an input that is logged a sample late is a hold that look
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Sequence
 
@@ -20,12 +21,12 @@ from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.filters import filter_instead
 from freqid.fitting.suspects.late_inputs import called
-from freqid.fitting.suspects.order import LACKING
+from freqid.fitting.suspects.order import LACKING, evidence
 from freqid.fitting.suspects.refits import held
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import CURES, words
-from freqid.models import GreyBox
+from freqid.models import GreyBox, Parameter
 
 # starts of a fit to data that are moved, part of the data's energy that is worth one, and standard
 # errors by which what was to be said moves no parameter
@@ -35,6 +36,10 @@ _TRIED, _AS_GOOD = 2, 1.1
 # samples by which a channel may be logged late that are tried anyway, what looks like that, and the
 # logarithm of a likelihood ratio that is no chance
 _ROWS, _EARLY, _CLEAR = (-1, -2), ("hold rejected", "feedthrough", "feedback"), 12.0
+
+# what a plant that answers at once is said to be where it does so late, and names of its delay
+_AT_ONCE = (*LACKING, "delay", "asymmetric", "unsteady", "feedthrough")
+_NAMES = ("input_delay", "delay_of_inputs", "delay_of_all_inputs")
 
 
 def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
@@ -91,6 +96,48 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
     if found is None and delays and first.name in LACKING:
         return filter_instead(inquiry, scene, begun, delays[0].test.size, 0.0, whole)
     return [] if found is None else [found]
+
+
+def late_at_once(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
+    """A finding where a free delay of all inputs of a plant that answers at once explains more than
+    what was ``named`` first.
+
+    What such a plant answers late is to a fit one fast lag in the feedthrough's place, which takes
+    its values away with it: next to where that ends no score sees a delay.
+    """
+    structure, model = inquiry.minimum.structure, inquiry.model
+    if named[0].name not in _AT_ONCE or not isinstance(model, GreyBox):
+        return []
+    if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
+        return []
+    start = dict(zip(structure.physical_names, structure.values, strict=False))
+    begun = model.with_values(**start)
+    record = _in_step(inquiry, begun)
+    if record is None or not np.any(begun.state_space().D):
+        return []
+    own = Parameter(next(n for n in _NAMES if n not in begun.values), 0.5 * record.dt, unit="s")
+    late = dataclasses.replace(begun, parameters=[*begun.parameters, own], input_delay=own.name)
+    readings = [r.with_(delayed=True) for r in inquiry.readings]
+    try:
+        est = fitter_of(late)(late, readings, SearchOptions(n_starts=1))
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return []
+    n = max(scene.freedom, 2)
+    told = n * np.log(scene.cost / max(est.cost, 1e-300)) - np.log(n)
+    lag, most = est[own.name], max(evidence(scene, a) for a in named)
+    if not est.converged or lag <= 0 or told <= max(most, 2 * _CLEAR):
+        return []
+    std = float(np.sqrt(est.covariance_matrix[(at := est.names.index(own.name)), at]))
+    size = words("delay", lag, "s", "the input")
+    if not std < lag:
+        samples = int(np.ceil(lag / record.dt))
+        within = "a sample" if samples == 1 else f"{samples} samples"
+        size = (
+            f"the input acts later than the model says, within {within}, and the data do not tell "
+            "by how much beside what the plant answers at once"
+        )
+    text = f"{size}: {_so(float(est.cost / max(scene.energy, 1e-300)))}; {CURES['delay']}"
+    return [Finding("delay", text, number=lag)]
 
 
 def late_instead(

@@ -19,7 +19,7 @@ from freqid.fitting.noise_models import MeasuredNoise
 from freqid.fitting.reading import Reading
 from freqid.fitting.residuals import errors_of
 from freqid.fitting.suspects.asking import Asking
-from freqid.fitting.suspects.late_instead import late_for_another
+from freqid.fitting.suspects.late_instead import late_at_once, late_for_another
 from freqid.fitting.suspects.late_outputs import late_output
 from freqid.fitting.suspects.order import BENT, LACKING, LIKELY, evidence
 from freqid.fitting.suspects.refits import plain
@@ -88,6 +88,7 @@ def instead(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Findi
     return (
         on_another_scale(inquiry, scene, named)
         or late_output(inquiry, scene, named)
+        or late_at_once(inquiry, scene, named)
         or late_for_another(inquiry, scene, named)
     )
 
