@@ -214,8 +214,9 @@ def main(arguments: list[str] | None = None) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     except OSError as error:
-        told = error.filename is not None or error.errno is None
-        _fail(str(error) if told else f"the output cannot be written: {error.strerror}")
+        if error.errno is None:
+            _fail(str(error))
+        _fail(f"{error.filename or 'the output'} cannot be read or written: {error.strerror}")
     except (ValueError, MemoryError) as error:
         _fail(str(error))
     except KeyboardInterrupt:

@@ -131,6 +131,11 @@ def print_estimate(estimate: fq.Estimate, title: str, verdict: Verdict | None = 
         print(f"note: {typed(note)}")
 
 
+# what the other fits of a table are told, and who types a command
+_ANOTHER = "give another path or remove it"
+_REPLACED = "give another --out, or --force to replace it"
+
+
 def fit_many(
     data: list[str],
     *,
@@ -172,11 +177,15 @@ def fit_many(
     options = search.given()
     if asked.start:
         options["start"] = asked.values()
-    with engine(scheduler):
-        table = fq.fit_many(
-            asked.plant(), files, table_at, n_jobs=jobs, verdicts=verdicts, reading=reading.given(),
-            **options,
-        )  # fmt: skip
+    try:
+        with engine(scheduler):
+            table = fq.fit_many(
+                asked.plant(), files, table_at, n_jobs=jobs, verdicts=verdicts,
+                reading=reading.given(), **options,
+            )  # fmt: skip
+    except InputError as wrong:
+        # what Python is told otherwise
+        raise InputError(str(wrong).replace(_ANOTHER, _REPLACED)) from wrong
     if table_at != out:
         table_at.replace(out)
     failed = table[table["error"] != ""]
@@ -188,7 +197,10 @@ def fit_many(
                 for name in table[table["verdict"] == grade]["name"].head(10):
                     print(f"    {typed(str(name))}")
     for row in failed.head(10).itertuples():
-        print(f"  {typed(str(row.error))}")
+        name, why = typed(str(row.name)), typed(str(row.error))
+        # there is no part of a file here
+        why = why.replace("--between START STOP", "freqid fit --between START STOP")
+        print(f"  {why if name in why else f'{name}: {why}'}")
     return 0 if len(failed) < len(table) else 1
 
 

@@ -14,6 +14,8 @@ def matching(patterns: Sequence[str]) -> list[str]:
     """Files of names and patterns, in order; ValueError for one that matches none."""
     found: list[str] = []
     for pattern in patterns:
+        if Path(pattern).is_dir():
+            raise InputError(f"{pattern} is a folder; give its files, as in '{pattern}/**/*.csv'")
         some = [pattern] if Path(pattern).is_file() else sorted(glob.glob(pattern, recursive=True))
         if not some:
             raise InputError(f"{pattern} matches no file; check the pattern, in quotes")

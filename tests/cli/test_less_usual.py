@@ -96,7 +96,9 @@ def test_a_table_of_other_fits_is_replaced_where_that_is_said(folder, capsys):
     words = ["fit-many", "log.csv", "--model", "mine.py:plant", "--out", "table.parquet"]
     assert run(*words, "--no-verdicts") == 0
     assert run(*words) == 2
-    assert "other fits" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "other fits" in said
+    assert "or --force to replace it" in said
     assert "verdict" not in pd.read_parquet("table.parquet")
     assert run(*words, "--force") == 0
     assert pd.read_parquet("table.parquet")["verdict"].iloc[0] == "trust"
@@ -172,3 +174,21 @@ def test_a_start_inside_of_its_bounds_is_one(folder, capsys):
     assert code == 0, capsys.readouterr().err
     assert run("fit", "log.csv", "--model", "first-order", "--bounds", "a", "1", "60") == 2
     assert "a=100" in capsys.readouterr().err
+
+
+def test_what_failed_in_a_fleet_is_told_by_file(folder, capsys):
+    still = fq.read("log.csv")
+    fq.write(fq.Record(0 * still.u, still.y, still.dt), "still.csv")
+    words = ["--model", "mine.py:plant", "--out", "table.parquet", "--no-verdicts"]
+    assert run("fit-many", "*.csv", *words) == 0
+    assert "still.csv: " in capsys.readouterr().out
+    (folder / "logs").mkdir()
+    assert run("fit-many", "logs", *words) == 2
+    assert "logs is a folder; give its files, as in 'logs/**/*.csv'" in capsys.readouterr().err
+
+
+def test_files_that_cannot_be_written_are_named(folder, capsys):
+    assert run("fit", "log.csv", "--model", "mine.py:plant", "--out", "/proc/est.json") == 2
+    said = capsys.readouterr().err
+    assert "/proc/est.json" in said
+    assert "Errno" not in said
