@@ -91,9 +91,10 @@ def _units_of(found: object) -> dict[str, str]:
     """Units of xarray's variables, and of the time, which is a coordinate: those of the climate and
     forecast conventions count since a date.
     """
-    named = [*getattr(found, "coords", {}).items(), *getattr(found, "data_vars", {}).items()]
-    told = {str(n): str(v.attrs["units"]) for n, v in named if "units" in v.attrs}
-    return {n: unit.partition(" since ")[0] for n, unit in told.items()}
+    coords, variables = (getattr(found, of, {}).items() for of in ("coords", "data_vars"))
+    at = {str(n): str(v.attrs["units"]).partition(" since ")[0] for n, v in coords
+          if "units" in v.attrs}  # fmt: skip
+    return at | {str(n): str(v.attrs["units"]) for n, v in variables if "units" in v.attrs}
 
 
 def _of_data_set(found: object) -> Table:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -24,9 +26,10 @@ def runs_in_one(frame: pd.DataFrame, used: Collection[str]) -> list[str]:
     for name in frame.columns:
         if name in used or not _NUMBERS.fullmatch(str(name).strip()):
             continue
-        column = frame[name]
-        changes = int((column != column.shift()).to_numpy()[1:].sum())
-        if 0 < changes <= len(frame) / _LONG - 1:
+        codes, values = frame[name].factorize()
+        changes = int(np.count_nonzero(np.diff(codes)))
+        # what comes back, or is missing at times, numbers none
+        if 0 < changes == len(values) - 1 <= len(frame) / _LONG - 1 and (codes >= 0).all():
             return [
                 f"column {name!r} changes {changes} times: {changes + 1} runs are taken as one, of "
                 f"which each is a record of its own, as in [Record.from_frame(run, ...) for _, run "

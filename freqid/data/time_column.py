@@ -158,10 +158,10 @@ def runs_as_a_time(column: Column) -> bool:
 def no_time(frame: pd.DataFrame) -> InputError:
     """The error for a table without a time, with the column that may be it."""
     if frame.index.nlevels > 1:
-        levels = [str(level) for level in frame.index.names]
+        levels = [i if name is None else name for i, name in enumerate(frame.index.names)]
         raise InputError(
-            f"the data have an index of {len(levels)} levels, {', '.join(levels)}; give one run, "
-            f"as frame.xs(..., level={levels[0]!r}), whose index is the time"
+            f"the data have an index of {len(levels)} levels, {', '.join(map(str, levels))}; give "
+            f"one run, as frame.xs(..., level={levels[0]!r}), whose index is the time"
         )
     first = frame.columns[0]
     may_be = f"; {first!r} may be it: call it 'time'" if runs_as_a_time(frame[first]) else ""

@@ -251,8 +251,8 @@ def held(
         ratio = lasts.period / own.period
         # nobody asked for a model of another rate beside data of which its own is no part
         meant = hold is not None or abs(ratio - round(ratio)) < 1e-9 * ratio
-        if abs(ratio - 1) > 1e-9 and meant:
-            return as_model(fitted.to_continuous()), lasts
+        if abs(ratio - 1) > 1e-9:
+            return (as_model(fitted.to_continuous()), lasts) if meant else (fitted, own)
         return fitted, between or own
     return fitted, between
 

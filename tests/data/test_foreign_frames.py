@@ -162,6 +162,9 @@ def test_runs_of_one_table_are_records_of_their_own(tmp_path):
     # a channel that is called so is one
     named = frame.rename(columns={"run": "test", "u": "run"})
     assert fq.Record.from_frame(named.drop(columns="test"), inputs="run", outputs="y").notes == ()
+    # neither is a motor that runs at times, nor what is missing
+    for run in (frame["run"] % 2, frame["run"].astype("Int64").where(frame["run"] > 0)):
+        assert fq.Record.from_frame(frame.assign(run=run), inputs="u", outputs="y").notes == ()
     levels = frame.set_index(["run", "time"])
     with pytest.raises(InputError, match=r"2 levels, run, time.*xs\(\.\.\., level='run'\)"):
         fq.Record.from_frame(levels, inputs="u", outputs="y")

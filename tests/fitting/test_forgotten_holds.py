@@ -118,3 +118,29 @@ def test_a_hold_is_named_beside_a_delay_of_the_plant(factor, seed):
     held = fq.fit(plant, slow, start=start, hold=fq.ZeroOrderHold(DT))
     assert held.verdict.trusted
     assert held["Td"] == pytest.approx(true["Td"], rel=0.01)
+
+
+def tanks(C1, C2, k12, h1, h2):
+    """Temperatures of two tanks that share heat, one of them heated."""
+    A = [[-(k12 + h1) / C1, k12 / C1], [k12 / C2, -(k12 + h2) / C2]]
+    return A, [[1 / C1], [0]], [[1, 0], [0, 1]], None
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", ["white", "steps", "chirp"])
+@pytest.mark.parametrize("seed", range(3))
+def test_straight_lines_where_steps_are_true_are_the_hold(name, seed):
+    """Half a sample late: "delay" had been said of 7 of 7 of them, which lines do not go with."""
+    values = {"C1": 500.0, "C2": 800.0, "k12": 5.0, "h1": 1.0, "h2": 2.0}
+    model = fq.GreyBox(tanks, [fq.Parameter(n, v) for n, v in values.items()])
+    rng = np.random.default_rng(seed)
+    u = {
+        "white": rng.standard_normal(1000),
+        "steps": np.repeat(rng.standard_normal(100), 10),
+        "chirp": fq.chirp(1e-3, 0.05, 5000, 5.0)[:1000],
+    }[name]
+    clean = fq.simulate(model, 50 * u, 5.0)
+    noisy = clean.y + 0.01 * clean.y.std(axis=0) * rng.standard_normal(clean.y.shape)
+    said = fq.fit(model, fq.Record(50 * u, noisy, 5.0, hold="foh")).verdict.reasons[0]
+    assert said.startswith("hold rejected: the data contradict FirstOrderHold(period=5.0)")
+    assert "a zero-order hold of about" in said

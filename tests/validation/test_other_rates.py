@@ -48,6 +48,14 @@ def test_a_hold_that_a_fit_assumed_against_what_its_data_say_is_kept():
     assert fq.compare(est, slow).hold == fq.ZeroOrderHold(5 * DT)
 
 
+def test_a_hold_that_a_fit_assumed_is_kept_beside_a_faster_input():
+    plant = fq.first_order(a=50.0, b=50.0)
+    held = np.repeat(fq.white_noise(800, seed=3), 5)
+    fast = fq.simulate(plant, held, DT).with_noise(1e-3, seed=4)
+    est = fq.fit(fq.OutputError(1), fast.decimate(5), hold="zoh")
+    assert fq.compare(est, fast.decimate(5, keep_input=True)).fit_percent[0] > 99
+
+
 def test_residuals_are_those_of_the_plant(box):
     record = fq.simulate(fq.two_mass(), fq.white_noise(3000, seed=2), 2e-3).with_noise(0.01)
     assert fq.residual_test(box, record)["passed"].all()

@@ -103,16 +103,19 @@ def _of_any_length(
             best = found.cost, float(found.x[-1])
     if best is None:
         return None
-    return Refit(best[0], best[1] * dt, _words(best[1] * dt), _odd(best[1]))
+    usual = all(r.hold == ZeroOrderHold(dt) for r in readings)
+    return Refit(best[0], best[1] * dt, _words(best[1] * dt), _odd(best[1], usual))
 
 
 def _words(period: float) -> str:
     return f"a zero-order hold of about {period:.3g} s"
 
 
-def _odd(part: float) -> bool:
-    """Whether a hold of this part of the sample time is no whole part of it."""
-    off = min(abs(part * k - 1) for k in (2, 3, 4))
+def _odd(part: float, held: bool) -> bool:
+    """Whether a hold of this part of the sample time is no whole part of it, nor all of it where
+    the data were not ``held`` so before.
+    """
+    off = min(abs(part * k - 1) for k in ((2, 3, 4) if held else (1, 2, 3, 4)))
     return part > _ANY and off > _ODD
 
 
