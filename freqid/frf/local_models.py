@@ -40,8 +40,8 @@ _HOPELESS = 100.0
 # part of the power of a line's neighbours below which it is not driven, that of the strongest line
 # below which none around is, and the part of all that polynomials need: every second line will do
 _UNDRIVEN, _SILENT, _FEW = 0.01, 1e-6, 0.45
-# part of the power of lines that is rounding
-_ROUNDED = 1e-24
+# parts of the power of lines, and of that of a constant, that are rounding
+_ROUNDED, _CONSTANT = 1e-24, 1e-29
 # inputs whose spectra have so small an eigenvalue are the same
 _DEPENDENT = 1e-12
 
@@ -166,8 +166,9 @@ def _dense(lines: Lines, width: int) -> None:
     within = lines.wanted & (around > _SILENT * largest)
     driven = float(np.mean(power[within] > _UNDRIVEN * around[within])) if within.any() else 1.0
     if driven < _FEW:
+        part = f"one line of {1 / driven:.0f}" if driven > 0 else "no line"
         raise InputError(
-            f"the input drives one line of {1 / driven:.0f}, as a signal that repeats within the "
+            f"the input drives {part}, as a signal that repeats within the "
             "record or a multisine of few lines does, and polynomials do not reach from one to the "
             "next; average its periods with fq.periodic(record, period=...), cut out one with "
             "slice(), or take local_rational"
@@ -260,14 +261,21 @@ def _lines(
         raise InputError(f"data hold {len(f)} lines for a window of {width}; narrow the window")
     wanted = chosen(f, asked)
     if signals is not None:
-        wanted = wanted & _referred(U, width, sum(float(np.vdot(x, x)) for x in signals))
+        wanted = wanted & _referred(U, width, signals)
+        if not wanted.any():
+            raise InputError(
+                f"the reference is zero over {'all lines' if limits is None else f'band={limits}'}"
+                ", and tells nothing there"
+            )
     return Lines(U, Y, f, wanted)
 
 
-def _referred(U: ComplexArray, width: int, energy: float) -> BoolArray:
-    """Lines (K,) next to which references of such an ``energy``, the mean power of all lines, move
-    something: elsewhere nothing but noise goes round, which tells minus one over the controller.
+def _referred(U: ComplexArray, width: int, signals: Sequence[FloatArray]) -> BoolArray:
+    """Lines (K,) next to which references move something: elsewhere nothing but noise goes round,
+    which tells minus one over the controller.
     """
+    # the mean power of all lines, and what a constant leaves at others
+    least = sum(_ROUNDED * x.size * x.var() + _CONSTANT * np.vdot(x, x) for x in signals)
     power = (np.abs(U) ** 2).sum(axis=(0, 1))
     around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
-    return np.asarray(around > _ROUNDED * energy)
+    return np.asarray(around > least)

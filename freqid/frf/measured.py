@@ -53,7 +53,15 @@ def aliased_of(sets: Sequence[Record | Stream]) -> float:
 def aliased_at_outputs(sets: Sequence[Record | Stream]) -> float:
     """The same where inputs are taken no more often than slower outputs."""
     fast = [r for r in sets if isinstance(r, Record) and r.factor > 1]
-    return max([aliased_of(sets), *(power_above(r.inputs, r.factor) for r in fast)])
+    folded = [power_above(r.inputs, r.factor) for r in fast if not _held(r)]
+    return max([aliased_of(sets), *folded])
+
+
+def _held(record: Record) -> bool:
+    """Whether inputs change only with the outputs, so that nothing of them is left out."""
+    M, inputs = record.factor, record.inputs
+    steps = inputs[: len(inputs) // M * M].reshape(-1, M, inputs.shape[1])
+    return bool((steps == steps[:, :1]).all())
 
 
 def units_of(record: Record | Stream) -> dict[str, str]:

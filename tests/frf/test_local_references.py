@@ -86,8 +86,15 @@ def test_lines_that_no_reference_drives_are_left_out():
         assert 58 < frf.frequency[-1] < 62
         size = np.abs(frf.response[0, 0] - response_at(frf.omega)) ** 2 / frf.variance[0, 0]
         assert size.max() < 60
-    with pytest.raises(ValueError, match="reference is zero over"):
-        fq.local_rational(record, band=(100, 200), reference=True)
+    for estimate in (fq.local_polynomial, fq.local_rational):
+        for low in (62, 100):
+            with pytest.raises(ValueError, match="reference is zero over"):
+                estimate(record, band=(low, 200), reference=True)
+    with pytest.raises(ValueError, match="drives no line"):
+        fq.local_polynomial(record, band=(60.25, 200), reference=True)
+    # a constant says nothing of the others
+    lifted = fq.Record(record.u, record.y, DT, reference=record.reference + 1e5)
+    assert len(fq.local_rational(lifted, reference=True).frequency) == len(frf.frequency)
 
 
 def test_the_noise_of_lines_is_that_of_the_response():
