@@ -21,6 +21,7 @@ from freqid.checks import (
 )
 from freqid.data import Record, as_holds
 from freqid.lti import (
+    BandLimited,
     Hold,
     InputHolds,
     PeriodicHold,
@@ -255,7 +256,9 @@ def _outputs(
         following = np.array([later(c, q - 1) for c, q in zip(inputs.T, shifts, strict=True)])
         x = propagate(late.phi, late.gamma @ seen + late.gamma_next @ following, x0)
         return (system.C @ x + system.D @ seen).T
-    if plant.dt or isinstance(hold, PeriodicHold):
+    # of a sampled model that integrates there is none that is periodic
+    steps = plant.dt and (begun or plant.integrates or not isinstance(hold, BandLimited))
+    if steps or isinstance(hold, PeriodicHold):
         sampled = plant.sampled(hold)
         x = propagate(sampled.phi, forcing(sampled, inputs.T), x0)
         return (system.C @ x + system.D @ inputs.T).T
