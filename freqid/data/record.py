@@ -194,8 +194,9 @@ class Record(Signals):
         """The record with white Gaussian noise on every output.
 
         ``std`` is its standard deviation, one or one an output; ``snr`` (dB) the power of outputs
-        over it, means left out. An input drawn with the same ``seed`` is this very noise. Raises
-        ValueError for a negative or non-finite ``std``, another number of them, or both or none.
+        over it, means left out. An input drawn with the same ``seed`` is this very noise, as that
+        of another record is. Raises ValueError for a negative or non-finite ``std``, another number
+        of them, or both or none.
         """
         size = noise_sizes(self.outputs, std, snr)
         noise = np.random.default_rng(whole("seed", seed, least=0)).standard_normal(self.y.shape)
