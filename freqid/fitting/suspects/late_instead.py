@@ -75,6 +75,10 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
         # a score says how far, not whether there is such a hold
         hold = held(inquiry.minimum, inquiry.readings)
         held_left = scene.cost / energy if hold is None else hold.cost / energy
+        boxes = [scene.cost - a.test.gain for a in named if a.name in LACKING]
+        if hold is not None and not hold.odd and hold.cost <= min(boxes, default=-np.inf):
+            # one unknown that leaves no more than a black box of a larger order leaves nothing
+            return []
     if first.name == "hold rejected":
         left = clearly * min(_AS_GOOD * left, held_left)
     elif first.name == "feedthrough":
