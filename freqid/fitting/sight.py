@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import DataSet, Record
-from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
+from freqid.data import DataSet, Record, input_dt
+from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, in_doubles
 from freqid.models import GreyBox, Model, Parameter
 
 # nepers in a sample of a motion that no sample can show
 _GONE = 1e6
+# nepers in a sample up to which doubles do
+_FAST = 1e2
 # output samples of an input that are looked at first
 _FEW = 100
 
@@ -55,6 +58,14 @@ def gone_with(
 
     # a user's function is not called once more for nothing
     return [p.name for p in free if back(p)] if out(poles) else []
+
+
+def plainly(begun: Model, data: DataSet) -> AbstractContextManager[None]:
+    """In doubles alone, where a search for another explanation begins at rates that samples show:
+    what it runs to beyond these was never built, and would take a hundred times as long.
+    """
+    fastest = float(np.abs(poles_of(begun)).max(initial=0.0))
+    return in_doubles() if fastest * (input_dt(data) or np.inf) < _FAST else nullcontext()
 
 
 def hold_that_changes(hold: Hold, data: DataSet) -> Hold:

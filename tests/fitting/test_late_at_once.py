@@ -45,3 +45,21 @@ def test_one_that_does_not_is_not_told_so(name):
     est = fq.fit(fq.GreyBox(cell, FREE), record.with_noise(0.01 * record.y.std(), seed=5))
     assert est.witness.verdict == "complete"
     assert not any(w.kind == "delay" for w in est.warnings)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fast_lag_of_such_a_plant_is_no_delay(seed):
+    """It explains more than a delay does, and has a size."""
+
+    def behind(k, a, T):
+        return [[-a, k], [0, -1 / T]], [[0], [1 / T]], [[1, 1]], None
+
+    def plant(k, a):
+        return [[-a]], [[k]], [[1]], [[1]]
+
+    free = [fq.Parameter("k", 30.0), fq.Parameter("a", 60.0)]
+    lagged = fq.GreyBox(behind, [*free, fq.Parameter("T", 3e-4)])
+    u = np.repeat(np.random.default_rng(seed).standard_normal(50), 20)
+    record = fq.simulate(lagged, u, 1e-3)
+    est = fq.fit(fq.GreyBox(plant, free), record.with_noise(0.02 * record.y.std(), seed=seed + 70))
+    assert re.match("lag: a lag of 0.000(29|30|31)", est.verdict.reasons[0])

@@ -103,7 +103,8 @@ def fit_output_error(
         # as good, and the one of the two that was meant
         near = chart.around(to_plane(seen, chart.plane))
         other = descended(near, objective.experiments)
-        if other[1].cost <= solution.cost * (1 + _SAME) + objective.rounding:
+        ended = other[1].converged or not solution.converged
+        if ended and other[1].cost <= solution.cost * (1 + _SAME) + objective.rounding:
             chart, solution, objective = other
     at = chart.in_z(solution.x)
     model = DiscreteModel(at, dt, first.hold, *common_names([first.data]), spec.stable)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import InputError
-from freqid.data import Record
+from freqid.data import Record, input_dt
 from freqid.fitting.black_box.lag_scan import farthest, likely_lags
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.cost.placed_structure import PlacedStructure
@@ -76,8 +76,14 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
         hold = held(inquiry.minimum, inquiry.readings)
         held_left = scene.cost / energy if hold is None else hold.cost / energy
         boxes = [scene.cost - a.test.gain for a in named if a.name in LACKING]
-        if hold is not None and not hold.odd and hold.cost <= min(boxes, default=-np.inf):
-            # one unknown that leaves no more than a black box of a larger order leaves nothing
+        if (
+            hold is not None
+            and not hold.odd
+            and hold.size < 0.99 * input_dt(inquiry.readings[0].data)
+            and hold.cost <= min(boxes, default=-np.inf)
+        ):
+            # one unknown that leaves no more than a black box of a larger order leaves nothing;
+            # straight lines are half of a sample that comes too late
             return []
     if first.name == "hold rejected":
         left = clearly * min(_AS_GOOD * left, held_left)

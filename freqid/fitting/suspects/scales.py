@@ -88,8 +88,8 @@ def instead(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Findi
     return (
         on_another_scale(inquiry, scene, named)
         or late_output(inquiry, scene, named)
-        or late_at_once(inquiry, scene, named)
         or late_for_another(inquiry, scene, named)
+        or late_at_once(inquiry, scene, named)
     )
 
 

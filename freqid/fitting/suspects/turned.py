@@ -24,7 +24,7 @@ from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.interrupted import INTERRUPTED
-from freqid.fitting.sight import hold_that_changes, out_of_sight
+from freqid.fitting.sight import hold_that_changes, out_of_sight, plainly
 from freqid.fitting.suspects.asking import Asking
 from freqid.fitting.suspects.at_places import at_places
 from freqid.fitting.suspects.late_instead import late_instead
@@ -97,7 +97,8 @@ def turned_and_complete(
     for turn in _likeliest(turns, begun, inquiry.readings):
         try:
             readings = [turn.back(r) for r in inquiry.readings]
-            est = fitter_of(model)(begun, readings, options)
+            with plainly(begun, inquiry.readings[0].data):
+                est = fitter_of(model)(begun, readings, options)
             told = asked.explained(est, readings, turn.kind)
             driven = asked.driven(est, readings, turn.kind)
         except (InputError, np.linalg.LinAlgError, ArithmeticError):
