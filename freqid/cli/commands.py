@@ -216,7 +216,9 @@ def main(arguments: list[str] | None = None) -> None:
     except OSError as error:
         if error.errno is None:
             _fail(str(error))
-        _fail(f"{error.filename or 'the output'} cannot be read or written: {error.strerror}")
+        if error.filename is None:
+            _fail(f"the output cannot be written: {error.strerror}")
+        _fail(f"{error.filename} cannot be read or written: {error.strerror}")
     except (ValueError, MemoryError) as error:
         _fail(str(error))
     except KeyboardInterrupt:

@@ -159,7 +159,7 @@ def no_time(frame: pd.DataFrame) -> InputError:
     """The error for a table without a time, with the column that may be it."""
     if frame.index.nlevels > 1:
         levels = [i if name is None else name for i, name in enumerate(frame.index.names)]
-        raise InputError(
+        return InputError(
             f"the data have an index of {len(levels)} levels, {', '.join(map(str, levels))}; give "
             f"one run, as frame.xs(..., level={levels[0]!r}), whose index is the time"
         )

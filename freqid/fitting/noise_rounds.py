@@ -92,13 +92,14 @@ def _in_turn(
             break
         # a round that moves little is the last: it goes to its end
         rough = i + 1 < _ROUGH_ROUNDS and not _stands(est, before)
-    if began is not None and (_learnt_of(est, readings, False)[1] > most).any():
+    left = _learnt_of(est, readings, options.estimated_hold)[1]
+    if began is not None and (left > most).any():
         return first, *began
     if not _stands(est, whole):
         # what is noise has changed on the way, and with it perhaps which minimum is the least
-        other, left = fitted(model, readings, anew)
+        other, seen = fitted(model, readings, anew)
         if other.cost < est.cost * (1 - _DEEPER):
-            est, readings = other, left
+            est, readings = other, seen
     for _ in range(_DOORS):
         door = _next_door(model, est, readings, options)
         if door is None:

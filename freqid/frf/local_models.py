@@ -65,7 +65,7 @@ def local_polynomial(
         width: lines of each window, odd; by default a third more than the unknowns (two thirds
             for ``local_rational``), and wider, up to a point, where the input is so smooth, as a
             chirp's is, that it cannot be told from the transient in so few lines.
-        reference: for closed loop, as in ``h1``.
+        reference: for closed loop, as in ``h1``; lines that it does not move are left out.
 
     Returns a FrequencyResponse (outputs, inputs, K) at the DFT lines with its variance; its
     ``coherence`` is the part of the output's power in each window that is not noise. Polynomials

@@ -169,6 +169,8 @@ def _stopped(objective: Objective, x: FloatArray) -> bool:
         return True
     R, c = point.triangle[:-1, :-1], point.triangle[:-1, -1]
     step = -np.linalg.lstsq(R, c, rcond=None)[0]
+    if not np.isfinite(step).all():
+        return True
     short = step * min(_SHORT / max(np.abs(step).max(), 1e-300), 1.0)
     there = np.clip(x + short, objective.structure.lower, objective.structure.upper)
     return objective.point(there) is None
