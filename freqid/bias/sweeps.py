@@ -69,8 +69,13 @@ class Sweep:
         What the ends fold moves the estimate as well, by a step to where this sweep's cost is least
         (Gauss and Newton's), which counts as so much error.
         """
-        kept = [r.decimate(factor) for r in self.records]
-        readings = [Reading.of(r, hold, self._seen(r), skip_zero=self.skip_zero) for r in kept]
+        kept, band = [r.decimate(factor) for r in self.records], self.band
+        if band is not None:
+            if band[0] >= kept[0].nyquist:
+                # a fit that is given such a band has no line
+                return np.full((len(x), len(x)), np.inf)
+            band = band[0], min(band[1], kept[0].nyquist)
+        readings = [Reading.of(r, hold, band, skip_zero=self.skip_zero) for r in kept]
         shape = len(self.records[0].output_names), len(self.records)
         objective = Objective(structure, read_for(shape, readings))
         point = objective.point(x)
@@ -80,9 +85,3 @@ class Sweep:
         told = determined(point.jacobian, x, structure.names, size, structure.scale)
         step = told.inverse @ (point.jacobian.T @ point.residual)
         return told.scatter(noise_std**2 * told.inverse + np.outer(step, step))
-
-    def _seen(self, record: Record) -> tuple[float, float] | None:
-        """The part of the band below a record's Nyquist frequency; None for all of its lines."""
-        if self.band is None or self.band[0] >= record.nyquist:
-            return None
-        return self.band[0], min(self.band[1], record.nyquist)

@@ -18,7 +18,7 @@ from freqid.data.data_set import (
 )
 from freqid.data.empirical_response import EmpiricalResponse
 from freqid.data.files import check_name, naming, read, whole_file, write
-from freqid.data.folding import fold, low_pass_gain, merged_lines, power_above, unfold
+from freqid.data.folding import fold, held_for, low_pass_gain, merged_lines, power_above, unfold
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.local_response import LineNoise, LocalResponse, ToldNoise, noise_that_is_told
 from freqid.data.logged import channels

@@ -129,3 +129,13 @@ def low_pass_gain(frequency: ArrayLike, dt: float, factor: int) -> FloatArray:
     above = np.clip((2 * factor * dt * seen - _PASSED) / (1 - _PASSED), 0, 1)
     gain: FloatArray = np.cos(np.pi / 2 * above) ** 2
     return gain
+
+
+def held_for(count: int, x: FloatArray, few: int = _FEWEST) -> bool:
+    """Whether signals (N, channels) change no more often than every ``count`` samples."""
+    # nearly every signal that is no such says so within a few samples
+    for some in (x[: few * count], x):
+        steps = some[: len(some) // count * count].reshape(-1, count, x.shape[1])
+        if not (steps == steps[:, :1]).all():
+            return False
+    return True

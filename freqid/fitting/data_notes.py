@@ -6,15 +6,17 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from freqid.data import DataSet, FrequencyResponse, Record
+from freqid.data import DataSet, FrequencyResponse, PeriodicResponse, Record
 from freqid.fitting.cost.trends import trends_taken
+from freqid.fitting.noise_models import BiasIntegral
 
 # notes of the data that an estimate repeats
 _MOST = 8
 # samples by which records are told apart at a glance
 _BEGIN = 32
-# times the median variance from which a line that counts as much as others spoils a fit
-_UNLIKE = 1e4
+# mean variance of lines, as a fit counts them, in parts of the median: so much more than they need
+# do parameters scatter
+_UNLIKE = 1e3
 # trends by their number
 _TRENDS = ("", "constant", "straight line")
 
@@ -22,8 +24,8 @@ _TRENDS = ("", "constant", "straight line")
 def notes_of(
     sets: Sequence[DataSet], band: tuple[float, float] | None = None, plain: bool = False
 ) -> list[str]:
-    """The notes of the data sets, each once, and how many more there are; ``plain`` where all lines
-    of the ``band`` (Hz) count alike.
+    """The notes of the data sets, each once, and how many more there are; ``plain`` where no
+    line of the ``band`` (Hz) counts by its noise.
     """
     each = dict.fromkeys(note for d in sets for note in getattr(d, "notes", ()))
     taken = max((trends_taken(d) for d in sets if isinstance(d, Record)), default=0)
@@ -42,7 +44,9 @@ def notes_of(
 
 def _in_own_units(sets: Sequence[DataSet]) -> Iterator[str]:
     """Records beside responses, of which the larger numbers decide."""
-    if len({isinstance(d, FrequencyResponse) for d in sets}) > 1:
+    kinds = {isinstance(d, FrequencyResponse) for d in sets}
+    # beside means over periods all are weighed by their noise
+    if len(kinds) > 1 and not any(isinstance(d, PeriodicResponse) for d in sets):
         yield (
             "data: records and responses count each in their own units, whatever they tell; "
             "weights='noise' counts both by their noise, where responses tell their variance"
@@ -50,17 +54,20 @@ def _in_own_units(sets: Sequence[DataSet]) -> Iterator[str]:
 
 
 def _unlike(sets: Sequence[DataSet], band: tuple[float, float] | None) -> Iterator[str]:
-    """A response whose own variances say that some of its lines tell next to nothing."""
+    """A response whose own variances say that lines which tell next to nothing decide."""
     for d in sets:
-        if not isinstance(d, FrequencyResponse) or d.variance is None:
+        if not isinstance(d, FrequencyResponse) or isinstance(d, PeriodicResponse):
+            continue
+        if d.variance is None:
             continue
         low, high = (0.0, np.inf) if band is None else band
-        variance = d.variance[..., (d.frequency >= low) & (d.frequency <= high)]
-        known = variance[np.isfinite(variance) & (variance > 0)]
-        if known.size and (ratio := float(known.max() / np.median(known))) > _UNLIKE:
+        counted = d.variance * BiasIntegral().weights(d, d.response.shape)
+        counted = counted[..., (d.frequency >= low) & (d.frequency <= high)]
+        known = counted[np.isfinite(counted) & (counted > 0)]
+        if known.size and known.mean() > _UNLIKE * np.median(known):
             yield (
-                f"data: of the response the worst line's variance is {ratio:.2g} times the usual "
-                "one, and all lines count alike; weights='noise' counts each by its own"
+                "data: a few lines of the response, of far larger variance than the usual one, "
+                "decide in this fit; weights='noise' counts each by its own"
             )
             return
 

@@ -216,7 +216,7 @@ def fit(
         est, share = with_loop_noise(est, readings, way.loops)
     call = call_of(model, len(sets), given)
     inquiry = None if est.problem is None else asked_of(est.problem, est.model, readings, share)
-    notes += [*est.notes, *notes_of(given_sets, band, weights is None)]
+    notes += [*est.notes, *notes_of(given_sets, band, weights is None and error == "linear")]
     est = dataclasses.replace(
         est, data=given_sets, band=band, weights=weights, call=call, inquiry=inquiry,
         notes=[*passed, *clocks, *clock_notes(est, given_sets), *notes],

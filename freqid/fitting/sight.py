@@ -7,8 +7,8 @@ from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray, InputError
-from freqid.data import DataSet, Record, input_dt
+from freqid.checks import ComplexArray, InputError
+from freqid.data import DataSet, Record, held_for, input_dt
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold, in_doubles
 from freqid.models import GreyBox, Model, Parameter
 
@@ -16,8 +16,6 @@ from freqid.models import GreyBox, Model, Parameter
 _GONE = 1e6
 # nepers in a sample up to which doubles do
 _FAST = 1e2
-# output samples of an input that are looked at first
-_FEW = 100
 
 
 def poles_of(model: Model) -> ComplexArray:
@@ -75,16 +73,6 @@ def hold_that_changes(hold: Hold, data: DataSet) -> Hold:
     if not isinstance(data, Record) or data.factor == 1 or hold != ZeroOrderHold(data.input_dt):
         return hold
     for count in range(data.factor, 1, -1):
-        if data.factor % count == 0 and _held_for(count, data.inputs, data.factor):
+        if data.factor % count == 0 and held_for(count, data.inputs):
             return ZeroOrderHold(count * data.input_dt)
     return hold
-
-
-def _held_for(count: int, inputs: FloatArray, factor: int) -> bool:
-    """Whether inputs (N, m) change no more often than every so many samples."""
-    # nearly every input that is no such says so within a few samples
-    for some in (inputs[: _FEW * factor], inputs):
-        steps = some[: len(some) // count * count].reshape(-1, count, inputs.shape[1])
-        if not (steps == steps[:, :1]).all():
-            return False
-    return True

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from freqid.checks import ComplexArray, FloatArray
-from freqid.data import FrequencyResponse, Record, Stream, folded_part, power_above
+from freqid.data import FrequencyResponse, Record, Stream, folded_part, held_for, power_above
 
 
 def measured(
@@ -51,17 +51,12 @@ def aliased_of(sets: Sequence[Record | Stream]) -> float:
 
 
 def aliased_at_outputs(sets: Sequence[Record | Stream]) -> float:
-    """The same where inputs are taken no more often than slower outputs."""
+    """The same where inputs are taken no more often than slower outputs; those that change only
+    with these lose nothing.
+    """
     fast = [r for r in sets if isinstance(r, Record) and r.factor > 1]
-    folded = [power_above(r.inputs, r.factor) for r in fast if not _held(r)]
+    folded = [power_above(r.inputs, r.factor) for r in fast if not held_for(r.factor, r.inputs)]
     return max([aliased_of(sets), *folded])
-
-
-def _held(record: Record) -> bool:
-    """Whether inputs change only with the outputs, so that nothing of them is left out."""
-    M, inputs = record.factor, record.inputs
-    steps = inputs[: len(inputs) // M * M].reshape(-1, M, inputs.shape[1])
-    return bool((steps == steps[:, :1]).all())
 
 
 def units_of(record: Record | Stream) -> dict[str, str]:

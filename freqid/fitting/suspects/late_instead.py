@@ -36,7 +36,8 @@ _TRIED, _AS_GOOD = 2, 1.1
 # samples by which a channel may be logged late that are tried anyway, what looks like that, and the
 # logarithm of a likelihood ratio that is no chance
 _ROWS, _EARLY, _CLEAR = (-1, -2), ("hold rejected", "feedthrough", "feedback"), 12.0
-
+# part of the sample time below which a hold is no other one of its length
+_SHORTER = 0.99
 # what a plant that answers at once is said to be where it does so late, and names of its delay
 _AT_ONCE = (*LACKING, "delay", "asymmetric", "unsteady", "feedthrough")
 _NAMES = ("input_delay", "delay_of_inputs", "delay_of_all_inputs")
@@ -47,17 +48,14 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
     that a mode or the structure lacks something, or than what has the output answer at once; and
     where a filter leaves less than a delay or a hold.
     """
-    structure, model, first = inquiry.minimum.structure, inquiry.model, named[0]
+    model, first, options = inquiry.model, named[0], SearchOptions(n_starts=_STARTS)
     delays = [a for a in named if a.name == "delay" and a.test.size > 0 and not model.late]
     delay = first in delays
-    if (not delay and first.name not in (*LACKING, *_EARLY)) or not isinstance(model, GreyBox):
+    if not delay and first.name not in (*LACKING, *_EARLY):
         return []
-    if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
+    begun = _begun(inquiry)
+    if begun is None or first.test.largest_shift < _SMALL:
         return []
-    if first.test.largest_shift < _SMALL:
-        return []
-    start = dict(zip(structure.physical_names, structure.values, strict=False))
-    begun, options = model.with_values(**start), SearchOptions(n_starts=_STARTS)
     energy = max(scene.energy, 1e-300)
     left = (scene.cost - first.test.gain) / energy
     # beside what leaves even less a filter is not all; what is fitted again counts as that
@@ -79,7 +77,7 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
         if (
             hold is not None
             and not hold.odd
-            and hold.size < 0.99 * input_dt(inquiry.readings[0].data)
+            and hold.size < _SHORTER * input_dt(inquiry.readings[0].data)
             and hold.cost <= min(boxes, default=-np.inf)
         ):
             # one unknown that leaves no more than a black box of a larger order leaves nothing;
@@ -108,6 +106,16 @@ def late_for_another(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> l
     return [] if found is None else [found]
 
 
+def _begun(inquiry: Asking) -> GreyBox | None:
+    """The plant where the user began; None for black boxes and experiments at many places."""
+    structure, model = inquiry.minimum.structure, inquiry.model
+    grey = isinstance(structure, GreyStructure) and not isinstance(structure, PlacedStructure)
+    if not isinstance(model, GreyBox) or not grey:
+        return None
+    names, values = structure.physical_names, structure.values  # type: ignore[attr-defined]
+    return model.with_values(**dict(zip(names, values, strict=False)))
+
+
 def late_at_once(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[Finding]:
     """A finding where a free delay of all inputs of a plant that answers at once explains more than
     what was ``named`` first.
@@ -115,15 +123,9 @@ def late_at_once(inquiry: Asking, scene: Scene, named: Sequence[Asked]) -> list[
     What such a plant answers late is to a fit one fast lag in the feedthrough's place, which takes
     its values away with it: next to where that ends no score sees a delay.
     """
-    structure, model = inquiry.minimum.structure, inquiry.model
-    if named[0].name not in _AT_ONCE or not isinstance(model, GreyBox):
-        return []
-    if not isinstance(structure, GreyStructure) or isinstance(structure, PlacedStructure):
-        return []
-    start = dict(zip(structure.physical_names, structure.values, strict=False))
-    begun = model.with_values(**start)
-    record = _in_step(inquiry, begun)
-    if record is None or not np.any(begun.state_space().D):
+    begun = _begun(inquiry) if named[0].name in _AT_ONCE else None
+    record = None if begun is None else _in_step(inquiry, begun)
+    if begun is None or record is None or not np.any(begun.state_space().D):
         return []
     own = Parameter(next(n for n in _NAMES if n not in begun.values), 0.5 * record.dt, unit="s")
     late = dataclasses.replace(begun, parameters=[*begun.parameters, own], input_delay=own.name)
