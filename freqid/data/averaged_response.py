@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from freqid.checks import FloatArray, State, numbers, positive
+from freqid.checks import FloatArray, State, flag, numbers, positive
 from freqid.data.argument_order import formerly
 from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.sources import that_follows
@@ -15,9 +15,9 @@ from freqid.data.sources import that_follows
 if TYPE_CHECKING:
     import pandas as pd
 
-# columns of a table: the memory from its first sample to its last, how many it has, and degrees of
-# freedom
-MEMORY, SEGMENT, FREEDOM = "memory", "segment samples", "degrees of freedom"
+# columns of a table: the memory from its first sample to its last, how many it has, degrees of
+# freedom, and whether the input swept through the segments
+MEMORY, SEGMENT, FREEDOM, SWEPT = "memory", "segment samples", "degrees of freedom", "swept"
 
 
 class AveragedResponse(FrequencyResponse):
@@ -31,6 +31,8 @@ class AveragedResponse(FrequencyResponse):
             Data, 2010, section 8.5.1).
         freedom: complex values that have told the variance at each line, its degrees of freedom;
             None where nothing says how many.
+        swept: whether the input drove each line in few of the segments, as a sweep longer than
+            they are does: ``memory`` then says too little of what they cut off.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it says by how much that moves
     the parameters. Made by ``h1``, ``h2`` and ``hv``, by ``etfe`` of repeated experiments and by
@@ -39,12 +41,14 @@ class AveragedResponse(FrequencyResponse):
 
     memory: FloatArray | None
     freedom: float | None
+    swept: bool
 
     def __init__(
         self,
         *given: object,
         memory: FloatArray | None = None,
         freedom: float | None = None,
+        swept: bool = False,
         **fields: object,
     ) -> None:
         super().__init__(*given, **fields)  # type: ignore[arg-type]
@@ -52,16 +56,16 @@ class AveragedResponse(FrequencyResponse):
             memory = numbers("memory", memory)
             memory.flags.writeable = False
         freedom = None if freedom is None else positive("freedom", freedom)
-        self.__dict__.update(memory=memory, freedom=freedom)
+        self.__dict__.update(memory=memory, freedom=freedom, swept=flag("swept", swept))
 
     def __setstate__(self, state: State) -> None:
         """Restore; what was written before lacks what was not known then."""
-        super().__setstate__({"freedom": None} | state)
+        super().__setstate__({"freedom": None, "swept": False} | state)
 
     @property
     def of_averages(self) -> Mapping[str, FloatArray | float | None]:
         """What it has beyond other responses, by name."""
-        return {"memory": self.memory, "freedom": self.freedom}
+        return {"memory": self.memory, "freedom": self.freedom, "swept": self.swept}
 
     @formerly(band="limits")
     @that_follows
@@ -79,6 +83,8 @@ class AveragedResponse(FrequencyResponse):
             frame[SEGMENT] = count
         if self.freedom is not None:
             frame[FREEDOM] = self.freedom
+        if self.swept:
+            frame[SWEPT] = True
         return frame
 
 

@@ -30,6 +30,7 @@ from freqid.data.averaged_response import (
     FREEDOM,
     MEMORY,
     SEGMENT,
+    SWEPT,
     AveragedResponse,
     remembered_memory,
 )
@@ -229,6 +230,8 @@ def _long(frame: pd.DataFrame, hertz: float) -> FrequencyResponse:
     averaged: dict[str, Any] = {}
     if FREEDOM in frame.columns:
         averaged["freedom"] = float(numbers_of(first, FREEDOM)[0])
+    if SWEPT in frame.columns:
+        averaged["swept"] = bool(numbers_of(first, SWEPT)[0])
     if len(f) > 1 and {MEMORY, SEGMENT} <= set(frame.columns):
         count = round(float(numbers_of(first, SEGMENT)[0]))
         averaged["memory"] = remembered_memory(numbers_of(first, MEMORY), count)

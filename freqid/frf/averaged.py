@@ -207,4 +207,4 @@ def _packed(
     frf = measured(s.first, s.frequency, G, variance, shown, power, s.reach, s.aliased)
     freedom = s.averages - G.shape[-1]
     told = freedom if variance is not None and freedom > 0 else None
-    return AveragedResponse(**frf.__dict__, memory=s.memory, freedom=told)
+    return AveragedResponse(**frf.__dict__, memory=s.memory, freedom=told, swept=s.swept)

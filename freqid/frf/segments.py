@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from freqid.checks import FloatArray, InputError, finite, flag, whole
+from freqid.checks import BoolArray, FloatArray, InputError, finite, flag, whole
 from freqid.data import Record, Stream
 
 # segments of a single record where none are asked for
@@ -24,6 +24,8 @@ _TIED = 0.01
 _PIECE = 1 << 19
 # segments that show where in one the input acts; relative difference of some that are the same
 _SHOWN, _SAME = 16, 1e-6
+# times what random segments would have, from which a line's power lies in few of them
+_FEW = 1.5
 
 # what scipy.signal.csd takes under these names
 Window = str | tuple[str | float, ...] | ArrayLike
@@ -160,6 +162,30 @@ def memory(
     early, late = scipy.fft.rfft(w * acts, padded), scipy.fft.rfft(w, padded)
     told: FloatArray = scipy.fft.irfft(early.conj() * late, padded)[:length]
     return told / told[0]
+
+
+def swept(
+    window: Window, length: int, step: int, inputs: Sequence[FloatArray], keep: BoolArray
+) -> bool:
+    """Whether inputs (m, N) of records drive each of the lines that ``keep`` in few segments.
+
+    Of random segments |U|² of a line is exponential, and Σ|U|⁴/(Σ|U|²)² over them has the mean
+    2 Σa²/(1 + Σa²) if they hold parts a of the power (of even parts 2/(S + 1), as of uniform
+    spacings: Feller, An Introduction to Probability Theory II, 1971, section I.7). A sweep that is
+    longer than a segment passes a line in one of them or two.
+    """
+    if not inputs:
+        return False
+    each = max(_SHOWN // len(inputs), 2)
+    shown = np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
+    shown = shown - shown.mean(axis=-1, keepdims=True)
+    power = np.abs(scipy.fft.rfft(shown * taper(window, length))[..., keep]) ** 2
+    power = power[..., power.max(axis=(0, 1)) > 0]
+    share = power.sum(axis=-1)
+    share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-300)
+    even = (share**2).sum(axis=1)
+    alone = (power**2).sum(axis=1) / np.maximum(power.sum(axis=1) ** 2, 1e-300)
+    return bool((alone.mean(axis=-1) > _FEW * 2 * even / (1 + even)).any())
 
 
 def _some(u: FloatArray, length: int, step: int, count: int) -> FloatArray:

@@ -21,6 +21,7 @@ from freqid.frf.segments import (
     memory,
     pieces,
     shared_lines,
+    swept,
 )
 
 
@@ -97,6 +98,7 @@ class Spectral:
     reach: int
     memory: FloatArray | None
     aliased: float
+    swept: bool
     reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
 
 
@@ -177,6 +179,7 @@ def spectral(
         reach,
         told,
         aliased_at_outputs(sets),
+        swept(averaging.window, length, step, inputs, keep),
         joint,
     )
 

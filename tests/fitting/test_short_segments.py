@@ -185,3 +185,56 @@ def test_an_unstable_plant_in_its_loop_answers_no_longer_than_the_loop():
     est = fq.fit(plant, fq.h1(data, 1000, band=(5, 2000), reference=True), weights="noise")
     assert "short segments" not in kinds(est)
     assert est["b"] == pytest.approx(60, abs=5 * est.parameters["std"]["b"])
+
+
+def sweep(samples, dt, ends, logarithmic=False):
+    t = np.arange(samples) * dt
+    method = "logarithmic" if logarithmic else "linear"
+    return scipy.signal.chirp(t, ends[0], samples * dt, ends[1], method=method, phi=-90)
+
+
+@pytest.mark.parametrize("segments", [3, 8, 20])
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_a_sweep_longer_than_its_segments_is_no_other_mode(segments, logarithmic):
+    """Two masses under one sweep: "another mode" had been the reason, of a right model."""
+    plant, u = fq.two_mass(), sweep(20_000, 1e-3, (1, 80), logarithmic)
+    data = fq.simulate(plant, u, 1e-3)
+    data = data.with_noise(0.02 * data.y.std(), seed=segments)
+    frf = fq.h1(data, data.n_samples // segments, band=(1, 80))
+    assert frf.swept
+    est = fq.fit(plant, frf, weights="noise")
+    assert est.verdict.grade == "doubt"
+    assert est.verdict.reasons[0].startswith("short segments")
+    assert "local_rational(record)" in est.verdict.reasons[0]
+
+
+def test_segments_that_a_sweep_fits_into_and_random_ones_are_not_swept(tmp_path):
+    rng = np.random.default_rng(3)
+    one = sweep(1000, DT, (1, 30))
+    loud = np.repeat([1.0, 0.1, 1.0, 0.1], 2000)
+    quiet = [
+        rng.standard_normal(8000),
+        loud * rng.standard_normal(8000),
+        np.repeat(rng.choice([-1.0, 1.0], 1000), 8),
+    ]
+    for u in quiet:
+        for segment in (4000, 1000, 400):
+            assert not fq.h1(record(1, u=u), segment, band=(1, 30)).swept
+    for segment, longer in (4000, False), (1000, False), (400, True):
+        assert fq.h1(record(1, u=np.tile(one, 8)), segment, band=(1, 30)).swept == longer
+    frf = fq.h1(record(1, u=sweep(8000, DT, (1, 30))), 1000, band=(1, 30))
+    assert frf.swept
+    frf.to_frame().to_csv(tmp_path / "h.csv", index=False)
+    for kept in (fq.read_response(tmp_path / "h.csv"), frf.select((2, 20))):
+        assert kept.swept
+
+
+def test_what_decays_within_a_segment_is_told_by_a_sweep_too():
+    """A fast plant loses nothing at the ends of segments, and nothing is said."""
+    plant = fq.first_order()
+    data = fq.simulate(plant, sweep(20_000, 1e-3, (0.1, 50), True), 1e-3)
+    for seed in range(3):
+        noisy = data.with_noise(0.3 * data.y.std(), seed=seed)
+        frf = fq.h1(noisy, 2500, band=(0.1, 50))
+        assert frf.swept
+        assert fq.fit(plant, frf, weights="noise").verdict.grade == "trust"

@@ -30,7 +30,7 @@ from freqid.fitting.suspects.holds import (
     remembered,
     unmirrored,
 )
-from freqid.fitting.suspects.leakage import leaking
+from freqid.fitting.suspects.leakage import leaking, swept
 from freqid.fitting.suspects.no_values import no_values
 from freqid.fitting.suspects.one_more import one_more_mode
 from freqid.fitting.suspects.order import LACKING, LIKELY, evidence, ordered, outdone, simply
@@ -230,7 +230,8 @@ class Inquiry(Lone):
             return turned(self, scene, quiet=True) or constant(scene, self.model) or found
         asked = scene, self.model, self._std
         found = leaking(*asked) or still_moving(*asked, self.readings)
-        if found := found or begun_in_motion(self.minimum, scene, self.readings):
+        found = found or begun_in_motion(self.minimum, scene, self.readings)
+        if found := found or swept(scene, self.speaking):
             return found
         turn, complete = turned_and_complete(self, scene)
         if turn and (complete or not outdone(turn[0].number or 0.0, self.named, scene)):
@@ -246,10 +247,7 @@ class Inquiry(Lone):
         least = (most := evidence(scene, named[0])) * (_WORTH if most > 0 else 1)
         # beside one that is no certainty, what is even less by chance is said as well
         chance = named[0].p_value if named[0].p_value > _SURE else 0.0
-        near = [
-            a for a in named
-            if a in apart or a.p_value < chance or evidence(scene, a) >= least
-        ]  # fmt: skip
+        near = [a for a in named if a in apart or a.p_value < chance or evidence(scene, a) >= least]
         said = [a for a in near if not negligible(scene, a)]
         said = [a for i, a in enumerate(said) if i < _SAID or a.certain]
         found = [finding_of(scene, a, self.readings) for a in said]

@@ -8,6 +8,7 @@ Random Data, 2010, section 8.5.1).
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from freqid.checks import ComplexArray, FloatArray
 from freqid.data import AveragedResponse
 from freqid.fitting.findings import Finding
 from freqid.fitting.sight import poles_of
+from freqid.fitting.suspects.said import negligible
 from freqid.fitting.suspects.scene import Scene
+from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.seen import Seen
 from freqid.fitting.suspects.sentences import farthest
 from freqid.lti import Hold, PeriodicHold, ZeroOrderHold
@@ -51,6 +54,24 @@ def leaking(scene: Scene, model: Model, std: FloatArray) -> list[Finding]:
         "local_rational(record), or take longer segments"
     )
     return [Finding("short segments", text, number=shift)]
+
+
+def swept(scene: Scene, speaking: Sequence[Asked]) -> list[Finding]:
+    """A finding where something speaks, and the input passed each line in few of the segments.
+
+    What these cut off of its answer is then no mean over them, and looks like any suspect.
+    """
+    averaged = [s.reading.data for s in scene.seen]
+    passed = [d for d in averaged if isinstance(d, AveragedResponse) and d.swept]
+    loud = [a for a in speaking if not negligible(scene, a)]
+    if not passed or not loud:
+        return []
+    text = (
+        "the input drives each line in few of the segments, as a sweep does that is longer than "
+        "they are: what they cut off of its answer no average brings back, and it looks like "
+        f"{loud[0].name}; fit the record itself, local_rational(record) or etfe(record)"
+    )
+    return [Finding("short segments", text, number=loud[0].test.largest_shift)]
 
 
 def _lost(s: Seen, model: Model) -> FloatArray:
