@@ -17,7 +17,7 @@ from freqid.data.remembered import as_printed, kept_step
 from freqid.data.same_clock import same_clock
 from freqid.data.time_column import LOOKED_AT, no_time, with_time
 from freqid.data.time_names import time_named
-from freqid.data.times_in_seconds import EPOCHS, of_this_world
+from freqid.data.times_in_seconds import EPOCHS, days_since, of_this_world
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,12 +37,13 @@ def with_its_time(
         raise InputError(f"column {twice!r} is there twice; rename one of them")
     if "time" not in frame.columns:
         name, unit = frame.index.name, (units or {}).get("time")
-        counted = name == "time" and unit is not None and frame.index.dtype.kind in "iuf"
+        counted = name == "time" and (unit is not None or _counts(frame.index.to_series()))
+        counted = counted and frame.index.dtype.kind in "iuf"
         if name is not None and (counted or _is_time(name)):
             frame = frame.reset_index()
         elif times_of(frame) is not None:
             return frame, []
-    elif (units or {}).get("time") is None and not _counts(frame) and not _is_text(frame):
+    elif (units or {}).get("time") is None and not _counts(frame["time"]) and not _is_text(frame):
         return _of_one_clock(frame, dict(units or {}), signals)
     plain = {str(c): named(str(c)) for c in frame.columns}
     own = time_named([n for n in plain if n not in signals])
@@ -83,10 +84,11 @@ def _is_text(frame: pd.DataFrame) -> bool:
     return column.dtype.kind not in "fiubcmM" and words
 
 
-def _counts(frame: pd.DataFrame) -> bool:
-    """Whether a column of times may be a count since 1970."""
-    x = frame["time"]
-    return x.dtype.kind in "iuf" and bool((x.abs() > EPOCHS[-1][0]).any())
+def _counts(x: pd.Series[Any]) -> bool:
+    """Whether times may be a count since 1970, or days."""
+    if x.dtype.kind not in "iuf":
+        return False
+    return bool((x.abs() > EPOCHS[-1][0]).any() or days_since(x.to_numpy(dtype=float)))
 
 
 def sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> float:

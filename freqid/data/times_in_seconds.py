@@ -37,6 +37,8 @@ EPOCHS = (
 # days of a spreadsheet since 1900, or of MATLAB since year 0, that mean the same, and the step up
 # to which numbers so large are no seconds: 2 s as days, 43 kHz as seconds since half a day ago
 _DAYS, _DAY_STEP = ((36_892, 73_051, "1900"), (730_852, 767_011, "year 0")), 2.4e-5
+# seconds between rows of slow logs, whose days are rates of 1.4 kHz and more that no converter has
+_SLOW = (5, 10, 15, 20, 30, 60)
 # a name that ends in a unit, and one of the time with a longer unit behind it
 SUFFIX = (
     r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos|seconds|milliseconds"
@@ -189,16 +191,17 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
     for least, most, scale, text in EPOCHS:
         if least < size < most:
             return _scaled(values - values[0], scale), text
-    if since := _days_since(values):
+    if since := days_since(values):
         return _scaled(values - values[0], _DAY), f"days since {since}"
     return values, "s"
 
 
-def _days_since(values: FloatArray) -> str:
+def days_since(values: FloatArray) -> str:
     """The year since which a column counts days, as spreadsheets do; empty where it may be s."""
     with np.errstate(all="ignore"):
-        step = np.diff(values)
-        finer = len(step) > 0 and bool(0 < np.median(step) < _DAY_STEP)
+        step = float(np.median(np.diff(values))) if len(values) > 1 else np.nan
+        slow = any(abs(step * _DAY / seconds - 1) < 1e-4 for seconds in _SLOW)
+        finer = 0 < step < _DAY_STEP or slow
     found = (year for least, most, year in _DAYS if least < values.min() <= values.max() < most)
     return next(found, "") if finer else ""
 

@@ -249,8 +249,9 @@ def held(
         if not (isinstance(own, PeriodicHold) and isinstance(lasts, PeriodicHold)):
             return fitted, between or own
         ratio = lasts.period / own.period
-        # nobody asked for a model of another rate beside data of which its own is no part
-        meant = hold is not None or abs(ratio - round(ratio)) < 1e-9 * ratio
+        # nobody asked for a model of another rate beside a record of which its own is no part
+        whole = [r for r in (ratio, (data.dt or 0.0) / own.period) if abs(r - round(r)) < 1e-9 * r]
+        meant = hold is not None or isinstance(data, FrequencyResponse) or bool(whole)
         if abs(ratio - 1) > 1e-9:
             return (as_model(fitted.to_continuous()), lasts) if meant else (fitted, own)
         return fitted, between or own

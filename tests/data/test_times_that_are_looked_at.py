@@ -232,3 +232,39 @@ def test_switches_in_hdf5_are_samples(tmp_path):
         file["time"], file["u"], file["y"] = t, np.sin(9 * t) > 0, np.cos(t)
     for record in (fq.read(tmp_path / "a.h5"), fq.open(tmp_path / "a.h5").load()):
         np.testing.assert_array_equal(record.u, np.sin(9 * t) > 0)
+
+
+@pytest.mark.parametrize("place", ["index", "column"])
+@pytest.mark.parametrize(
+    ("start", "per_second", "dt"),
+    [
+        (1.77e12, 1e3, 0.01),
+        (1.77e15, 1e6, 0.01),
+        (1.77e18, 1e9, 0.01),
+        (6.39e17, 1e7, 0.01),
+        (739_000.4, 1 / 86400, 0.01),
+        (739_000.4, 1 / 86400, 60.0),
+        (46_000.4, 1 / 86400, 30.0),
+    ],
+)
+def test_counts_called_time_of_a_frame_are_no_seconds(place, start, per_second, dt):
+    """Milliseconds since 1970 in an index had been a sample time of 10 s, trusted; rows of a minute
+    in a spreadsheet's days one of 0.7 ms.
+    """
+    u = np.random.default_rng(0).standard_normal(300)
+    count = start + np.arange(300) * dt * per_second
+    frame = pd.DataFrame({"time": count.astype("i8") if per_second > 1 else count, "u": u, "y": u})
+    frame = frame.set_index("time") if place == "index" else frame
+    record = fq.Record.from_frame(frame)
+    assert record.dt == pytest.approx(dt, rel=1e-5)
+    assert "since" in record.notes[0]
+
+
+def test_seconds_of_half_a_day_stay_seconds():
+    u = np.random.default_rng(0).standard_normal(300)
+    for dt in (1e-3, 1e-2, 0.1, 1 / 1000.5):
+        for start in (40_000.0, 740_000.0):
+            frame = pd.DataFrame({"u": u, "y": u}, index=start + np.arange(300) * dt)
+            record = fq.Record.from_frame(frame.rename_axis("time"))
+            assert record.dt == pytest.approx(dt, rel=1e-4)
+            assert not record.notes

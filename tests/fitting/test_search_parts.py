@@ -10,6 +10,7 @@ import freqid as fq
 from freqid.fitting import grey_search
 from freqid.fitting.search.interrupted import INTERRUPTED, best_so_far
 from freqid.fitting.search.scatter import around, promising
+from freqid.fitting.search.stopping import Bound, Found, StopRule
 
 
 def structure(start, reach=3.0, lower=-1e9, upper=1e9):
@@ -118,3 +119,19 @@ def test_a_minimum_that_few_lines_leave_open_is_followed_to_more(monkeypatch):
     # the minimum is that of all lines
     many = fq.fit(plant, record, start=start, n_starts=8)
     assert est.cost == pytest.approx(many.cost, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("converged", "told", "starts", "enough"),
+    [(False, False, 49, True), (False, False, 37, False), (True, False, 49, False),
+     (False, True, 49, False)],
+)  # fmt: skip
+def test_a_valley_without_an_end_does_not_take_all_starts(converged, told, starts, enough):
+    """A missing delay in noise rounds: each round had gone on in the same valley for 70 s."""
+    triangle = np.diag([1.0, 1.0 if told else 1e-9, 10.0])
+    end = SimpleNamespace(
+        cost=100.0, converged=converged, x=np.ones(2) * 100.0,
+        point=SimpleNamespace(triangle=triangle, cost=100.0),
+    )  # fmt: skip
+    rule = StopRule(None, 0.0, lambda: 1.0, Bound(1.0, 3, 1000))
+    assert rule.enough(Found(end, n_starts=starts, n_agreed=1)) is enough

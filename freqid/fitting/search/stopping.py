@@ -177,6 +177,9 @@ class StopRule:
             return found.n_agreed >= 3 and both
         if cost > self.bound.cost * (1 + _MISSED) and not self.explains(cost):
             # the model lacks something, or this is not its minimum
+            if both and not (found.solution.converged or self.determined(found)):
+                # each round goes on in a valley that has no end
+                return True
             return found.n_agreed >= (_DOUBTED if both else _ALIKE)
         level = self.bound.level(cost)
         wanted, determined = agreement(level), self.determined(found)
