@@ -9,13 +9,13 @@ transient is taken off, and what is left tells the noise, from one record.
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from collections.abc import Sequence
 
 import numpy as np
-import scipy
 
-from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, whole
+from freqid.checks import FloatArray, InputError, whole
 from freqid.data import (
     FrequencyResponse,
     LocalResponse,
@@ -27,6 +27,7 @@ from freqid.data import (
     references_of,
     that_estimates,
 )
+from freqid.frf.local_lines import dense, reached, referred
 from freqid.frf.local_windows import Form, Lines, inflation, local_models
 from freqid.frf.measured import aliased_of, measured
 from freqid.frf.spectra import spectra
@@ -37,11 +38,6 @@ from freqid.lti import tuned
 _INFLATED, _WIDEST = 10.0, 0.15
 # and where polynomials remain useless all the same
 _HOPELESS = 100.0
-# part of the power of a line's neighbours below which it is not driven, that of the strongest line
-# below which none around is, and the part of all that polynomials need: every second line will do
-_UNDRIVEN, _SILENT, _FEW = 0.01, 1e-6, 0.45
-# parts of the power of lines, and of that of a constant, that are rounding
-_ROUNDED, _CONSTANT = 1e-24, 1e-29
 # inputs whose spectra have so small an eigenvalue are the same
 _DEPENDENT = 1e-12
 
@@ -96,7 +92,8 @@ def local_rational(
 
     ``order`` is that of numerator, transient and common denominator. Arguments, result and errors
     as in ``local_polynomial``. In strong noise the local polynomial is the safer one: the
-    denominator is fitted to noisy outputs.
+    denominator is fitted to noisy outputs. Of an input of few lines, as a multisine may be, it
+    gives these alone, and others where enough are driven around them.
 
     >>> import freqid as fq
     >>> u = fq.chirp(10, 80, duration=10, dt=0.5e-3)
@@ -123,9 +120,11 @@ def _estimate(
     lines = _lines(sets, signals, band, form.width)
     _told_apart(lines, sets[0])
     if not poles:
-        _dense(lines, form.width)
+        dense(lines, form.width)
     if width is None:
         lines, form = _widened(sets, signals, band, lines, form)
+    if poles and signals is None:
+        lines = dataclasses.replace(lines, wanted=lines.wanted & reached(lines, form))
     local = local_models(lines, form, 0 if signals is None else sets[0].n_inputs)
     spectrum = None
     if signals is None:
@@ -152,26 +151,6 @@ def _told_apart(lines: Lines, first: Record) -> None:
         raise InputError(
             f"inputs {', '.join(first.input_names)} depend on one another at every line, so that "
             "their effects cannot be told apart; excite them differently"
-        )
-
-
-def _dense(lines: Lines, width: int) -> None:
-    """InputError where so few lines are driven, as those of a signal of several periods, that
-    polynomials would have to reach from one to the next over a resonance between them.
-    """
-    power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
-    around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
-    # a line or two that are far above all others say nothing of these
-    largest = np.sort(around)[-min(4 * width, len(around))]
-    within = lines.wanted & (around > _SILENT * largest)
-    driven = float(np.mean(power[within] > _UNDRIVEN * around[within])) if within.any() else 1.0
-    if driven < _FEW:
-        part = f"one line of {1 / driven:.0f}" if driven > 0 else "no line"
-        raise InputError(
-            f"the input drives {part}, as a signal that repeats within the "
-            "record or a multisine of few lines does, and polynomials do not reach from one to the "
-            "next; average its periods with fq.periodic(record, period=...), cut out one with "
-            "slice(), or take local_rational"
         )
 
 
@@ -261,21 +240,10 @@ def _lines(
         raise InputError(f"data hold {len(f)} lines for a window of {width}; narrow the window")
     wanted = chosen(f, asked)
     if signals is not None:
-        wanted = wanted & _referred(U, width, signals)
+        wanted = wanted & referred(U, width, signals)
         if not wanted.any():
             raise InputError(
                 f"the reference is zero over {'all lines' if limits is None else f'band={limits}'}"
                 ", and tells nothing there"
             )
     return Lines(U, Y, f, wanted)
-
-
-def _referred(U: ComplexArray, width: int, signals: Sequence[FloatArray]) -> BoolArray:
-    """Lines (K,) next to which references move something: elsewhere nothing but noise goes round,
-    which tells minus one over the controller.
-    """
-    # the mean power of all lines, and what a constant leaves at others
-    least = sum(_ROUNDED * x.size * x.var() + _CONSTANT * np.vdot(x, x) for x in signals)
-    power = (np.abs(U) ** 2).sum(axis=(0, 1))
-    around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
-    return np.asarray(around > least)

@@ -1,0 +1,67 @@
+"""Which lines of an input local models can tell: those that it drives, and those near enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError
+from freqid.frf.local_windows import Form, Lines
+
+# part of the power of a line's neighbours below which it is not driven, that of the strongest line
+# below which none around is, and the part of all that polynomials need: every second line will do
+_UNDRIVEN, _SILENT, _FEW = 0.01, 1e-6, 0.45
+# driven lines of a window for each unknown of its fraction, from which the others are told
+_MORE = 1.7
+# parts of the power of lines, and of that of a constant, that are rounding
+_ROUNDED, _CONSTANT = 1e-24, 1e-29
+
+
+def dense(lines: Lines, width: int) -> None:
+    """InputError where so few lines are driven, as those of a signal of several periods, that
+    polynomials would have to reach from one to the next over a resonance between them.
+    """
+    power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
+    around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
+    # a line or two that are far above all others say nothing of these
+    largest = np.sort(around)[-min(4 * width, len(around))]
+    within = lines.wanted & (around > _SILENT * largest)
+    driven = float(np.mean(power[within] > _UNDRIVEN * around[within])) if within.any() else 1.0
+    if driven < _FEW:
+        part = f"one line of {1 / driven:.0f}" if driven > 0 else "no line"
+        raise InputError(
+            f"the input drives {part}, as a signal that repeats within the "
+            "record or a multisine of few lines does, and polynomials do not reach from one to the "
+            "next; average its periods with fq.periodic(record, period=...), cut out one with "
+            "slice(), or take local_rational"
+        )
+
+
+def reached(lines: Lines, form: Form) -> BoolArray:
+    """Lines (K,) that are driven, or around which so many are that a fraction in between is told.
+
+    Where one line in a window is driven there is a fraction with any pole next to it, and what it
+    is worth elsewhere no noise says. Where none is, as with inputs of rounding alone, all are taken
+    as they come.
+    """
+    power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
+    around = scipy.ndimage.maximum_filter1d(power, form.width, mode="reflect")
+    driven = (power > _UNDRIVEN * around) & (around > _ROUNDED * power.max(initial=0))
+    near = scipy.ndimage.uniform_filter1d(driven.astype(float), form.width, mode="reflect")
+    equations = np.round(near * form.width) * len(lines.U)
+    unknown = (form.order + 1) * lines.U.shape[1] + form.poles
+    told = np.asarray(driven | (near > _FEW) | (equations >= _MORE * unknown))
+    return told if (told & lines.wanted).any() else np.ones_like(told)
+
+
+def referred(U: ComplexArray, width: int, signals: Sequence[FloatArray]) -> BoolArray:
+    """Lines (K,) next to which references move something: elsewhere nothing but noise goes round,
+    which tells minus one over the controller.
+    """
+    # the mean power of all lines, and what a constant leaves at others
+    least = sum(_ROUNDED * x.size * x.var() + _CONSTANT * np.vdot(x, x) for x in signals)
+    power = (np.abs(U) ** 2).sum(axis=(0, 1))
+    around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
+    return np.asarray(around > least)
