@@ -43,17 +43,27 @@ def reached(lines: Lines, form: Form) -> BoolArray:
     """Lines (K,) that are driven, or around which so many are that a fraction in between is told.
 
     Where one line in a window is driven there is a fraction with any pole next to it, and what it
-    is worth elsewhere no noise says. Where none is, as with inputs of rounding alone, all are taken
-    as they come.
+    is worth elsewhere no noise says; nor does it tell more inputs than there are experiments.
+    InputError where no line is told. Where none is driven, as with inputs of rounding alone, all
+    are taken as they come.
     """
     power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
     around = scipy.ndimage.maximum_filter1d(power, form.width, mode="reflect")
     driven = (power > _UNDRIVEN * around) & (around > _ROUNDED * power.max(initial=0))
     near = scipy.ndimage.uniform_filter1d(driven.astype(float), form.width, mode="reflect")
-    equations = np.round(near * form.width) * len(lines.U)
-    unknown = (form.order + 1) * lines.U.shape[1] + form.poles
-    told = np.asarray(driven | (near > _FEW) | (equations >= _MORE * unknown))
-    return told if (told & lines.wanted).any() else np.ones_like(told)
+    E, m = lines.U.shape[:2]
+    equations = np.round(near * form.width) * E
+    many = (near > _FEW) | (equations >= _MORE * ((form.order + 1) * m + form.poles))
+    told = np.asarray(many | driven if m <= E else many)
+    if (told & lines.wanted).any():
+        return told
+    if (driven & lines.wanted).any() and m > E:
+        raise InputError(
+            f"{m} inputs drive one line of {1 / np.mean(driven[lines.wanted]):.0f}, which does not "
+            "tell them apart; fit the record itself, drive more lines, or give as many experiments "
+            "as inputs"
+        )
+    return np.ones_like(told)
 
 
 def referred(U: ComplexArray, width: int, signals: Sequence[FloatArray]) -> BoolArray:

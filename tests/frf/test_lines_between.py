@@ -63,3 +63,22 @@ def test_lines_between_many_that_are_driven_are_kept():
         frf = fq.local_rational(record, band=(10, 390))
         spacing = 1 / (record.n_samples * DT)
         assert np.allclose(np.diff(frf.frequency), spacing)
+
+
+def test_few_lines_do_not_tell_two_inputs_apart():
+    """Each line was the same one equation for two unknowns: up to 1e31 standard errors off."""
+    plant = fq.GreyBox(
+        lambda a, b, c: ([[-a, b], [-b, -a]], [[1, 0], [0, c]], [[1, 0], [0, 1]], None),
+        [fq.Parameter("a", 20.0), fq.Parameter("b", 200.0), fq.Parameter("c", 2.0)],
+    )
+    phases = np.random.default_rng(0).uniform(0, 2 * np.pi, (4, len(LINES)))
+    u = np.cos(2 * np.pi * np.arange(N)[:, None] / N * LINES + phases[:, None]).sum(axis=-1)
+    records = [fq.simulate(plant, u[at].T, DT).with_noise(1e-3, seed=1) for at in ([0, 1], [2, 3])]
+    with pytest.raises(ValueError, match="as many experiments as inputs"):
+        fq.local_rational(records[0], band=(300, 600))
+    for given in (records[0], records):
+        frf = fq.local_rational(given)
+        true = plant.frequency_response(frf.omega, fq.ZeroOrderHold(DT)).response
+        assert (np.abs(frf.response - true) ** 2 / frf.variance).max() < 30
+    rough = np.random.default_rng(1).standard_normal((N, 2))
+    assert len(fq.local_rational(fq.simulate(plant, rough, DT)).frequency) == N // 2 - 1
