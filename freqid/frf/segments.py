@@ -179,13 +179,20 @@ def swept(
     each = max(_SHOWN // len(inputs), 2)
     shown = np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
     shown = shown - shown.mean(axis=-1, keepdims=True)
+    # of order one, so that fourth powers are numbers in any unit
+    shown /= np.maximum(np.abs(shown).max(axis=(1, 2), keepdims=True), 1e-300)
     power = np.abs(scipy.fft.rfft(shown * taper(window, length))[..., keep]) ** 2
     power = power[..., power.max(axis=(0, 1)) > 0]
-    share = power.sum(axis=-1)
-    share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-300)
-    even = (share**2).sum(axis=1)
-    alone = (power**2).sum(axis=1) / np.maximum(power.sum(axis=1) ** 2, 1e-300)
-    return bool((alone.mean(axis=-1) > _FEW * 2 * even / (1 + even)).any())
+    even = _concentrated(power.sum(axis=-1))
+    alone = _concentrated(power).mean(axis=-1)
+    return bool((alone > _FEW * 2 * even / (1 + even)).any())
+
+
+def _concentrated(power: FloatArray) -> FloatArray:
+    """Σp²/(Σp)² over the segments, the second axis: one where all is in one, 1/S in even ones."""
+    share = power / np.maximum(power.sum(axis=1, keepdims=True), 1e-300)
+    concentrated: FloatArray = (share**2).sum(axis=1)
+    return concentrated
 
 
 def _some(u: FloatArray, length: int, step: int, count: int) -> FloatArray:

@@ -224,6 +224,9 @@ def test_segments_that_a_sweep_fits_into_and_random_ones_are_not_swept(tmp_path)
         assert fq.h1(record(1, u=np.tile(one, 8)), segment, band=(1, 30)).swept == longer
     frf = fq.h1(record(1, u=sweep(8000, DT, (1, 30))), 1000, band=(1, 30))
     assert frf.swept
+    for unit in (1e-120, 1e120):
+        scaled = fq.Record(unit * sweep(8000, DT, (1, 30)), record(1, samples=8000).y, DT)
+        assert fq.h1(scaled, 1000, band=(1, 30)).swept
     frf.to_frame().to_csv(tmp_path / "h.csv", index=False)
     for kept in (fq.read_response(tmp_path / "h.csv"), frf.select((2, 20))):
         assert kept.swept
