@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from freqid.fitting.cost.stamped_experiments import StampedExperiment
 from freqid.fitting.search.verdict import RARE
 from freqid.fitting.uncertainty.parts_of_values import parts_of_values
 from freqid.fitting.uncertainty.profiles import wider_than_linear
@@ -275,4 +276,10 @@ def _supported(est: Estimate, std: np.ndarray) -> str:
             text += ": the data do not tell it from zero" if relative[worst] > 0.5 else ""
     if est.witness.verdict == "complete":
         text += f"; {est.witness.sentence}"
+    experiments = () if est.problem is None else est.problem.experiments
+    if any(isinstance(e, StampedExperiment) for e in experiments):
+        text += (
+            "; of samples at times of their own nothing was asked but whether their stamps are "
+            "late: what a fit to record.regular() lacks, this one may lack as well"
+        )
     return text

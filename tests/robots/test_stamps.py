@@ -337,3 +337,12 @@ def test_a_comparison_draws_what_it_tells_where_an_output_came_before_the_input_
     assert drawn == pytest.approx(compared.fit_percent[0], abs=1.5)
     # nothing is drawn across the gap
     assert record.n_samples * record.dt <= y_time[-1] - 0.5 + 2 * record.dt
+
+
+def test_trust_in_samples_at_their_own_times_says_what_was_not_asked():
+    """A spring that stiffens was trusted with 35 % explained, and on the grid doubted."""
+    est = fq.fit(LAG, fq.Record.from_logs(*logged(noise=0.01)), start={"a": 30})
+    assert est.verdict.grade == "trust"
+    assert "record.regular()" in est.verdict.reasons[0]
+    on_grid = fq.Record(fq.white_noise(800), fq.white_noise(800, seed=1), 1e-2)
+    assert "regular()" not in repr(fq.fit(LAG, on_grid, n_starts=1).verdict)
