@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from freqid.data.readers.kinds import Channel, Log, reads_log
 
 # entries of an array that become channels of their own
 _LONGEST = 64
+_ENTRY = re.compile(r"([^\[\]]+)\[(\d+)\]")
+# what a message calls the entries of its arrays
+Names: TypeAlias = tuple[str, ...]
 # ns, and from where on a time is one since 1970
 _SECOND, _CALENDAR = 10**9, 10**17
 
@@ -22,6 +26,9 @@ _SECOND, _CALENDAR = 10**9, 10**17
 @reads_log(".bag", ".mcap", ".db3")
 def read_bag(path: Path) -> Log:
     """Every number of every message by topic and field, ``joint_states.velocity[2]``.
+
+    Where the messages of a topic name their entries, and not all the same, as several publishers
+    do, entries are those of a name: ``joint_states.velocity[shoulder]``.
 
     Times are those of the messages' headers, where they have one, and else those of the log; in s,
     of a clock that counts from 1970 from a whole second before the first, as a float has no digits
@@ -40,28 +47,55 @@ def bag_channels(path: Path) -> Log:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    rows: dict[str, tuple[list[int], dict[str, list[float]]]] = {}
+    rows: dict[tuple[str, Names], tuple[list[int], dict[str, list[float]]]] = {}
     usual = get_typestore(Stores.LATEST)
     with AnyReader([path], default_typestore=usual) as bag:
         for connection, stamp, raw in bag.messages():
             message = bag.deserialize(raw, connection.msgtype)
-            topic = connection.topic.strip("/")
-            times, fields = rows.setdefault(topic, ([], {}))
+            named = connection.topic.strip("/"), _names(message)
+            times, fields = rows.setdefault(named, ([], {}))
             times.append(_time(message, stamp))
             for name, value in _numbers(message, ""):
                 fields.setdefault(name, []).append(value)
     found = Log()
     base = min((min(times) for times, _ in rows.values()), default=0) // _SECOND * _SECOND
     base = base if base > _CALENDAR else 0
-    for topic, (counts, fields) in rows.items():
+    topics = [topic for (topic, _), (_, fields) in rows.items() if fields]
+    for (topic, names), (counts, fields) in rows.items():
         seconds = 1e-9 * np.array([count - base for count in counts], dtype=float)
         for name, values in fields.items():
             # an array that changes its length is no channel
             if len(values) == len(counts):
-                found[f"{topic}.{name}"] = Channel(seconds, np.array(values))
+                own = name if topics.count(topic) == 1 else _of_its_name(name, names)
+                channel = Channel(seconds, np.array(values))
+                found[f"{topic}.{own}"] = _with(found.get(f"{topic}.{own}"), channel)
     if not found:
         raise InputError("holds no numbers")
     return found
+
+
+def _names(message: Any) -> Names:
+    """What a message calls the entries of its arrays, as those of joints do; else nothing."""
+    names = getattr(message, "name", None)
+    if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
+        return ()
+    return tuple(names) if len(set(names)) == len(names) else ()
+
+
+def _of_its_name(field: str, names: Names) -> str:
+    """A field ``velocity[2]`` by the name of its entry."""
+    entry = _ENTRY.fullmatch(field)
+    at = int(entry[2]) if entry else len(names)
+    return f"{entry[1]}[{names[at]}]" if entry and at < len(names) else field
+
+
+def _with(first: Channel | None, more: Channel) -> Channel:
+    """One channel of both, in the order of their times."""
+    if first is None:
+        return more
+    times = np.concatenate([first.times, more.times])
+    order = np.argsort(times, kind="stable")
+    return Channel(times[order], np.concatenate([first.values, more.values])[order])
 
 
 def _time(message: Any, stamp: int) -> int:
