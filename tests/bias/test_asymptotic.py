@@ -285,3 +285,19 @@ def test_a_hold_that_runs_out_of_reach_is_named_in_the_estimate(plant):
     )
     assert est.verdict.grade == "do not use"
     assert "no hold" in [w.kind for w in est.warnings]
+
+
+@pytest.mark.parametrize(("cutoff", "factor"), [(0.2, 1), (0.35, 4), (0.4, 1)])
+def test_two_lags_that_are_one_do_not_run_away(cutoff, factor):
+    """Values of ±1e5 had stood beside the cost of two equal tanks, as converged."""
+    tanks = fq.GreyBox(
+        lambda a1, a2, c: ([[-a1 - c, c], [c, -a2 - c]], [[1], [0]], [[0, 1.0]], None),
+        [fq.Parameter("a1", 0.8), fq.Parameter("a2", 0.5), fq.Parameter("c", 0.3)],
+    )
+    est = fq.asymptotic_fit(
+        tanks, fq.FilteredSpectrum(scipy.signal.butter(2, cutoff)), dt=0.05 * factor, hold="bl",
+        true_hold=fq.ZeroOrderHold(0.05), antialias=factor > 1,
+    )  # fmt: skip
+    assert est["a1"] == pytest.approx(est["a2"], rel=1e-2)
+    assert 0.3 < est["a1"] < 1.0
+    assert 0.2 < est["c"] < 0.4

@@ -253,7 +253,7 @@ def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
 
     A cost that no longer falls in sixteen digits leaves half of them in x; the gradient has more.
     """
-    P, smallest, before = len(x), np.inf, x
+    P, smallest, before, first = len(x), np.inf, x, x
     for _ in range(limit):
         point = objective.point(x)
         if point is None:
@@ -271,7 +271,11 @@ def settled(objective: Objective, x: FloatArray, limit: int = 60) -> FloatArray:
         x, smallest, before = moved, size, x
         if size < 1e-13:
             break
-    return x if objective.point(x) is not None else before
+    end, own = objective.point(x), objective.point(first)
+    if end is None or own is None:
+        return before
+    # where two unknowns do the same, as two equal lags, a step has no size
+    return x if end.cost <= (1 + _EDGE) * own.cost + objective.rounding else first
 
 
 def _gauss_newton(point: Point) -> FloatArray | None:
