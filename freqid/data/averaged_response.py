@@ -32,7 +32,8 @@ class AveragedResponse(FrequencyResponse):
         freedom: complex values that have told the variance at each line, its degrees of freedom;
             None where nothing says how many.
         swept: whether the input drove each line in few of the segments, as a sweep longer than
-            they are does: ``memory`` then says too little of what they cut off.
+            they are does: ``memory`` then says too little of what they cut off. Not asked of
+            streams, whose samples are not in memory.
 
     The other arguments are as in ``FrequencyResponse``. A ``fit`` to it says by how much that moves
     the parameters. Made by ``h1``, ``h2`` and ``hv``, by ``etfe`` of repeated experiments and by

@@ -39,17 +39,16 @@ def dense(lines: Lines, width: int) -> None:
         )
 
 
-def reached(lines: Lines, form: Form) -> BoolArray:
+def reached(lines: Lines, form: Form, signals: Sequence[FloatArray]) -> BoolArray:
     """Lines (K,) that are driven, or around which so many are that a fraction in between is told.
 
     Where one line in a window is driven there is a fraction with any pole next to it, and what it
     is worth elsewhere no noise says; nor does it tell more inputs than there are experiments.
-    InputError where no line is told. Where none is driven, as with inputs of rounding alone, all
-    are taken as they come.
+    InputError where no line is told.
     """
     power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
     around = scipy.ndimage.maximum_filter1d(power, form.width, mode="reflect")
-    driven = (power > _UNDRIVEN * around) & (around > _ROUNDED * power.max(initial=0))
+    driven = (power > _UNDRIVEN * around) & (around > _rounding(signals))
     near = scipy.ndimage.uniform_filter1d(driven.astype(float), form.width, mode="reflect")
     E, m = lines.U.shape[:2]
     equations = np.round(near * form.width) * E
@@ -57,21 +56,24 @@ def reached(lines: Lines, form: Form) -> BoolArray:
     told = np.asarray(many | driven if m <= E else many)
     if (told & lines.wanted).any():
         return told
-    if (driven & lines.wanted).any() and m > E:
-        raise InputError(
-            f"{m} inputs drive one line of {1 / np.mean(driven[lines.wanted]):.0f}, which does not "
-            "tell them apart; fit the record itself, drive more lines, or give as many experiments "
-            "as inputs"
-        )
-    return np.ones_like(told)
+    if not (driven & lines.wanted).any():
+        raise InputError("the input drives no line of the band; give one that it excites")
+    raise InputError(
+        f"{m} inputs drive one line of {1 / np.mean(driven[lines.wanted]):.0f}, which does not "
+        "tell them apart; fit the record itself, drive more lines, or give as many experiments "
+        "as inputs"
+    )
 
 
 def referred(U: ComplexArray, width: int, signals: Sequence[FloatArray]) -> BoolArray:
     """Lines (K,) next to which references move something: elsewhere nothing but noise goes round,
     which tells minus one over the controller.
     """
-    # the mean power of all lines, and what a constant leaves at others
-    least = sum(_ROUNDED * x.size * x.var() + _CONSTANT * np.vdot(x, x) for x in signals)
     power = (np.abs(U) ** 2).sum(axis=(0, 1))
     around = scipy.ndimage.maximum_filter1d(power, width, mode="reflect")
-    return np.asarray(around > least)
+    return np.asarray(around > _rounding(signals))
+
+
+def _rounding(signals: Sequence[FloatArray]) -> float:
+    """Power of a line that is no more than rounding, of the mean power of all and of a constant."""
+    return float(sum(_ROUNDED * x.size * x.var() + _CONSTANT * np.vdot(x, x) for x in signals))

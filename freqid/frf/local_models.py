@@ -124,7 +124,9 @@ def _estimate(
     if width is None:
         lines, form = _widened(sets, signals, band, lines, form)
     if poles and signals is None:
-        lines = dataclasses.replace(lines, wanted=lines.wanted & reached(lines, form))
+        lines = dataclasses.replace(
+            lines, wanted=lines.wanted & reached(lines, form, [r.inputs for r in sets])
+        )
     local = local_models(lines, form, 0 if signals is None else sets[0].n_inputs)
     spectrum = None
     if signals is None:

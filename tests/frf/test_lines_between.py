@@ -48,6 +48,12 @@ def test_lines_around_which_none_are_driven_are_left_out(band):
         assert np.abs(est.values / list(MODES.values.values()) - 1).max() < 0.02
 
 
+def test_a_band_that_is_not_driven_at_all_is_refused():
+    """Responses of 1e12 had come of it."""
+    with pytest.raises(ValueError, match="drives no line of the band"):
+        fq.local_rational(few_lines(0), band=(700, 900))
+
+
 def test_lines_between_many_that_are_driven_are_kept():
     """Every second line, a binary sequence's zeros and noise leave out nothing."""
     rng = np.random.default_rng(1)

@@ -344,5 +344,6 @@ def test_trust_in_samples_at_their_own_times_says_what_was_not_asked():
     est = fq.fit(LAG, fq.Record.from_logs(*logged(noise=0.01)), start={"a": 30})
     assert est.verdict.grade == "trust"
     assert "record.regular()" in est.verdict.reasons[0]
-    on_grid = fq.Record(fq.white_noise(800), fq.white_noise(800, seed=1), 1e-2)
-    assert "regular()" not in repr(fq.fit(LAG, on_grid, n_starts=1).verdict)
+    on_grid = fq.fit(LAG, fq.simulate(LAG, fq.white_noise(800), 1e-2).with_noise(0.01, seed=1))
+    assert on_grid.verdict.grade == "trust"
+    assert "regular()" not in on_grid.verdict.reasons[0]
