@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, overload
 
@@ -25,6 +26,38 @@ def without_units(
         return frame, dict(units)
     own = {name: unit for name, unit in told if unit}
     return frame.set_axis([name for name, _ in told], axis=1), {**own, **units}
+
+
+# words of a name that tell which side of the plant a signal is on
+_INPUT = frozenset(("u", "in", "input", "inputs"))
+_OUTPUT = frozenset(("y", "out", "output", "outputs"))
+
+
+def told_sides(names: Sequence[str]) -> tuple[list[str], list[str]] | None:
+    """The input and the output where their names say which they are, whatever their order.
+
+    These are ``u`` and ``y`` among others, or of two names one with a word for the input and one
+    with a word for the output. None where the names do not tell.
+
+    >>> told_sides(["plant_output", "plant_input"])
+    (['plant_input'], ['plant_output'])
+    >>> told_sides(["torque", "angle"])
+    """
+    if set(names) >= {"u", "y"}:
+        return ["u"], ["y"]
+    if len(names) != 2:
+        return None
+    inner, outer = (
+        [n for n in names if _words(n) & own and not _words(n) & other]
+        for own, other in ((_INPUT, _OUTPUT), (_OUTPUT, _INPUT))
+    )
+    return (inner, outer) if inner and outer else None
+
+
+def _words(name: str) -> frozenset[str]:
+    """The words of a name, small: of ``motorInput_1`` motor and input."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    return frozenset(re.findall(r"[a-z]+", apart.casefold()))
 
 
 def listed_by_name(first: str) -> str:

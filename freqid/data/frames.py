@@ -9,7 +9,7 @@ import numpy as np
 
 from freqid.checks import FloatArray, InputError, listed, real, unknown
 from freqid.data.cells import no_number
-from freqid.data.column_names import known, without_units
+from freqid.data.column_names import known, told_sides, without_units
 from freqid.data.foreign_frames import as_pandas
 from freqid.data.frame_times import sample_time, times_of, with_its_time
 from freqid.data.regular_time import on_a_grid, rows_apart
@@ -172,8 +172,8 @@ def _channels(
     if u is None and y is None and told is not None:
         return told
     if u is None and y is None:
-        if set(rest) >= {"u", "y"}:
-            return ["u"], ["y"]
+        if sides := told_sides(rest):
+            return sides
         if len(rest) != 2:
             raise InputError(f"inputs=None, outputs=None: name them; the columns are {signals}")
         return rest[:1], rest[1:]

@@ -238,8 +238,9 @@ class Record(Signals):
         """A record from a DataFrame (pandas, polars, …), an xarray.Dataset, or u, y, sampling_time.
 
         The time is found as in a file (``read``), or is an index of times or of numbers (s); it
-        must be uniform. ``dt`` (s) is for frames without one. Of two unnamed columns the first is
-        the input. ``resample`` puts an irregular time, or missing samples, on a regular grid.
+        must be uniform. ``dt`` (s) is for frames without one. Of two columns that are not asked for
+        the input is the one named so (``u``, ``input``), else the first. ``resample`` puts an
+        irregular time, or missing samples, on a regular grid.
         Raises ValueError for unknown columns, and else for missing samples or irregular times.
 
         >>> import pandas as pd

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from freqid.checks import Array, FloatArray, InputError, finite, listed, positive, unknown, whole
-from freqid.data.column_names import listed_by_name
+from freqid.data.column_names import listed_by_name, told_sides
 from freqid.data.conditions import as_conditions
 from freqid.data.replacing import has_read
 from freqid.data.rows import as_rows
@@ -41,7 +41,8 @@ def open(
             extra ``zarr``), several, or a pattern such as ``"logs/*.h5"``, of files that follow one
             another without a gap, an array or a dask array (N, channels), an iterable of blocks
             (n, channels), or a function that starts such an iterable anew for each pass.
-        inputs, outputs: channels by name; of two, the first is the input.
+        inputs, outputs: channels by name; of two the input is the one named so (``u``,
+            ``input``), else the first.
         dt: sample time in s, where the file has no time (a column like ``t [ms]``, a data set or
             an attribute ``time``, ``dt`` or ``fs``), or instead of one that is not even.
         hold: what the input did, where the file does not remember it; a zero-order hold else.
@@ -226,8 +227,8 @@ def _chosen(
         raise InputError(f"inputs and outputs share {', '.join(sorted(both))}; a channel is one")
     rest = [n for n in names if n not in (u or []) + (y or [])]
     if u is None and y is None:
-        if {"u", "y"} <= set(names):
-            return ["u"], ["y"]
+        if sides := told_sides(names):
+            return sides
         if len(names) != 2:
             raise InputError(f"inputs=None, outputs=None: name them; the channels are {names}")
         return names[:1], names[1:]

@@ -279,3 +279,22 @@ def test_counts_since_1970_that_begin_apart_are_two_clocks(tmp_path):
     path = table(tmp_path / "a.csv", "time_cmd,u,time_meas,y", *columns, columns[1], sep=",")
     with pytest.raises(ValueError, match="both times, and not of one clock"):
         fq.read(path)
+
+
+@pytest.mark.parametrize(
+    ("y", "u"), [("output", "input"), ("plantOutput", "plantInput"), ("y_meas", "u_cmd")]
+)
+def test_the_input_is_the_column_that_says_so(tmp_path, y, u):
+    path = table(tmp_path / "a.csv", f"time,{y},{u}", *np.array((TIMES, LEVELS, U), str), sep=",")
+    record = fq.read(path)
+    assert (record.input_names, record.output_names) == ((u,), (y,))
+    assert np.array_equal(record.u, U)
+    np.save(tmp_path / "a.npy", np.column_stack([LEVELS, U]))
+    stream = fq.open(tmp_path / "a.npy", dt=1e-3, columns=[y, u])
+    assert (stream.input_names, stream.output_names) == ((u,), (y,))
+
+
+def test_columns_whose_names_do_not_tell_are_input_and_output_in_their_order(tmp_path):
+    columns = np.array((TIMES, U, LEVELS), str)
+    path = table(tmp_path / "a.csv", "time,force,x_out", *columns, sep=",")
+    assert fq.read(path).input_names == ("force",)
