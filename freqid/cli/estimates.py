@@ -74,6 +74,8 @@ def fit(
         other = other and other.with_conditions(**record.conditions)
     if not decimate.is_integer():
         raise InputError(f"--decimate={decimate:g}: expected a whole number of samples")
+    if keep_input and decimate == 1:
+        raise InputError("--keep-input says what --decimate keeps of the input; give that, too")
     if decimate != 1:
         if not isinstance(record, fq.Record):
             raise InputError("--decimate is for records; a response has no samples")

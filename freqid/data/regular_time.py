@@ -25,8 +25,9 @@ def on_a_grid(
     """Columns, and their ``time``, on a regular one, blanks filled; and what was done, in words.
 
     Outputs are drawn by straight lines, and stay as they are where only every so many rows have
-    one; inputs that a converter ``held`` keep their value for the period that they began. Raises
-    ValueError for times that do not increase.
+    one; inputs that a converter ``held`` keep their value for the period that they began. Where a
+    column begins more than a few rows late, or ends so early, these rows are left out: nothing is
+    known of it there. Raises ValueError for times that do not increase.
     """
     rounded = printed_period(times)
     notes = []
@@ -57,17 +58,37 @@ def on_a_grid(
         how = "outputs by straight lines, inputs as they were held" if held else "by straight lines"
         notes.append(f"jitter of up to {jitter:g} s was taken off, {how}")
     new = {"time": grid}
-    sparse = bool(outputs) and rows_apart(np.column_stack([columns[n] for n in outputs])) > 1
+    apart = rows_apart(np.column_stack([columns[n] for n in outputs])) if outputs else 1
     # rows that are lost would have others stand for their outputs
-    slow = set(outputs) if sparse and not wide else set()
+    slow = set(outputs) if apart > 1 and not wide else set()
+    first, last = 0, len(grid) - 1
     for name, x in columns.items():
         there = np.isfinite(x)
         if not there.any():
             raise InputError(f"column {name!r} has no samples at all; leave it out")
-        missing = len(x) - int(there.sum())
+        if name not in slow:
+            begun, ended = (int(n) for n in clock.number[np.flatnonzero(there)[[0, -1]]])
+            first = max(first, begun) if begun > _FEW else first
+            # what was commanded last stays, where it is held
+            cut = len(grid) - 1 - ended > _FEW and name not in held
+            last = min(last, ended) if cut else last
+    if slow:
+        # such outputs stay at the first row
+        first = -(-first // apart) * apart
+    inside = (clock.number >= first) & (clock.number <= last)
+    if inside.sum() < 3:
+        raise InputError(
+            f"resample=True needs three rows or more in which all of {list(columns)} have begun "
+            "and none has ended"
+        )
+    for name, x in columns.items():
+        there = np.isfinite(x)
+        missing = int((inside & ~there).sum())
         if missing and name not in slow:
             how = "by the one before" if name in held else "by straight lines"
-            notes.append(f"{missing} missing samples of {name!r} were filled {how}")
+            known = there[inside][[0, -1]]
+            ends = "" if known.all() or name in held else ", its ends by the nearest"
+            notes.append(f"{missing} missing samples of {name!r} were filled {how}{ends}")
         if name in slow:
             # across so many rows a line is no sample, and stamps jitter more often than samplers do
             new[name] = x
@@ -76,6 +97,12 @@ def on_a_grid(
             new[name] = x[there][np.maximum(at, 0)]
         else:
             new[name] = np.interp(grid, times[there], x[there])
+    if first or last < len(grid) - 1:
+        new = {name: x[first : last + 1] for name, x in new.items()}
+        notes.append(
+            f"{first} rows before all columns have begun and {len(grid) - 1 - last} after one has "
+            "ended are left out"
+        )
     return new, notes
 
 

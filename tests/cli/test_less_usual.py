@@ -43,6 +43,11 @@ def run(*arguments):
     return end.value.code
 
 
+def test_keeping_the_input_is_of_decimation(folder, capsys):
+    assert run("fit", "log.csv", "--model", "mine.py:plant", "--keep-input") == 2
+    assert "--keep-input says what --decimate keeps" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -298,3 +298,35 @@ def test_columns_whose_names_do_not_tell_are_input_and_output_in_their_order(tmp
     columns = np.array((TIMES, U, LEVELS), str)
     path = table(tmp_path / "a.csv", "time,force,x_out", *columns, sep=",")
     assert fq.read(path).input_names == ("force",)
+
+
+def test_a_grid_has_no_rows_in_which_a_column_has_not_begun(tmp_path):
+    levels, u = LEVELS.copy(), U.copy()
+    levels[:7], levels[-6:], levels[20], u[-8:] = np.nan, np.nan, np.nan, np.nan
+    frame = pd.DataFrame({"time": TIMES, "u": u, "y": levels})
+    record = fq.Record.from_frame(frame, resample=True)
+    line = np.mean(LEVELS[[19, 21]])
+    assert np.allclose(record.y, [*LEVELS[7:20], line, *LEVELS[21:-6]])
+    # a held input stays where it was, until another is told
+    assert np.array_equal(record.u, np.r_[U[7:-8], U[[-9, -9]]])
+    assert any("7 rows before all columns" in n and "and 6 after" in n for n in record.notes)
+    assert any("1 missing samples of 'y'" in n for n in record.notes)
+    few = fq.Record.from_frame(frame[4:-3].reset_index(drop=True), resample=True)
+    assert len(few.y) == N - 7
+    assert any("its ends by the nearest" in n for n in few.notes)
+
+
+def test_a_grid_keeps_slow_outputs_at_its_first_row():
+    slow = np.where(np.arange(N) % 4, np.nan, LEVELS)
+    frame = pd.DataFrame({"time": TIMES, "u": np.where(np.arange(N) < 7, np.nan, U), "y": slow})
+    record = fq.Record.from_frame(frame, resample=True)
+    assert np.array_equal(record.y, LEVELS[8::4])
+    assert np.array_equal(record.u, U[8:])
+
+
+def test_columns_that_are_never_there_together_make_no_grid():
+    y, u = LEVELS.copy(), U.copy()
+    y[:40], u[30:] = np.nan, np.nan
+    frame = pd.DataFrame({"time": TIMES, "u": u, "y": y})
+    with pytest.raises(ValueError, match="have begun and none has ended"):
+        fq.Record.from_frame(frame, hold="foh", resample=True)
