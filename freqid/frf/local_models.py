@@ -9,9 +9,9 @@ transient is taken off, and what is left tells the noise, from one record.
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,8 +27,9 @@ from freqid.data import (
     references_of,
     that_estimates,
 )
-from freqid.frf.local_lines import dense, reached, referred
-from freqid.frf.local_windows import Form, Lines, inflation, local_models
+from freqid.frf.local_equations import Form, Lines
+from freqid.frf.local_lines import among_driven, dense, reached, referred, some
+from freqid.frf.local_windows import inflation, local_models
 from freqid.frf.measured import aliased_of, measured
 from freqid.frf.spectra import spectra
 from freqid.lti import tuned
@@ -121,12 +122,18 @@ def _estimate(
     _told_apart(lines, sets[0])
     if not poles:
         dense(lines, form.width)
-    if width is None:
+    fractions, asked = poles > 0 and signals is None, lines.wanted
+    told = reached(lines, form, sets) if fractions else lines
+    if told.lone is not None:
+        lines, form = told, form if width else among_driven(told, form)
+    elif width is None:
         lines, form = _widened(sets, signals, band, lines, form)
-    if poles and signals is None:
-        lines = dataclasses.replace(
-            lines, wanted=lines.wanted & reached(lines, form, [r.inputs for r in sets])
-        )
+        asked = lines.wanted
+        # what is lone in a wide window only is the end of what a sweep drives
+        lines = replace(reached(lines, form, sets), lone=None) if fractions else lines
+    else:
+        lines = told
+    lines = some(lines, asked)
     local = local_models(lines, form, 0 if signals is None else sets[0].n_inputs)
     spectrum = None
     if signals is None:
@@ -170,7 +177,7 @@ def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> 
         raise InputError(
             f"width={width} gives {width * E} equations for {unknown} unknowns; widen it"
         )
-    return Form(order, poles, width)
+    return Form(order, poles, width, width)
 
 
 def _unknown(order: int, poles: int, experiments: int, inputs: int) -> int:

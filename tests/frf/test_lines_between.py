@@ -88,3 +88,49 @@ def test_few_lines_do_not_tell_two_inputs_apart():
         assert (np.abs(frf.response - true) ** 2 / frf.variance).max() < 30
     rough = np.random.default_rng(1).standard_normal((N, 2))
     assert len(fq.local_rational(fq.simulate(plant, rough, DT)).frequency) == N // 2 - 1
+
+
+@pytest.mark.parametrize(("samples", "count"), [(1000, 3), (1000, 15), (4000, 7), (5000, 30)])
+def test_lines_far_from_others_are_told_by_themselves(samples, count):
+    """A pole of the transient had taken a line's place: 0.0004 ± 0.0003 for 0.42, lines 1e9 times
+    off, and grey boxes 32 to 100 % off with noise weights trusted in 9 of 12.
+    """
+    plant = fq.GreyBox(
+        lambda g, w, z: ([[0, 1], [-w * w, -2 * z * w]], [[0], [g]], [[1, 0]], None),
+        [fq.Parameter("g", 5e3), fq.Parameter("w", 40 * np.pi), fq.Parameter("z", 0.02)],
+    )
+    lines = np.linspace(0.02 * samples, 0.4 * samples, count).astype(int)
+    z = []
+    for seed in range(max(6, 60 // count)):
+        phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, count)
+        u = np.cos(2 * np.pi * np.outer(np.arange(samples), lines) / samples + phase).sum(axis=1)
+        clean = fq.simulate(plant, u, 2e-3)
+        frf = fq.local_rational(clean.with_noise(0.02 * clean.y.std(), seed=seed))
+        assert np.array_equal(np.round(frf.frequency * samples * 2e-3), lines)
+        true = plant.frequency_response(frf.omega, fq.ZeroOrderHold(2e-3)).response
+        z += list(np.abs(frf.response - true)[0, 0] / np.sqrt(frf.variance[0, 0]))
+        if count > 3 and seed < 2:
+            est = fq.fit(plant.with_values(g=4e3, w=115.0, z=0.05), frf, weights="noise")
+            assert est.verdict.grade == "trust"
+            off = np.abs(est.values - np.array([5e3, 40 * np.pi, 0.02]))
+            assert (off < 3.5 * est.parameters["std"]).all()
+    # of complex numbers with told variances: one is expected, and one of 20,000 beyond 3.2
+    assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.35
+    assert max(z) < 4
+
+
+def test_each_line_is_told_where_as_many_experiments_as_inputs_drive_it():
+    """Three experiments of two inputs at nine lines: up to 5e4 standard errors off."""
+    plant = fq.GreyBox(
+        lambda a, b, c: ([[-a, b], [-b, -a]], [[1, 0], [0, c]], [[1, 0], [0, 1]], None),
+        [fq.Parameter("a", 20.0), fq.Parameter("b", 200.0), fq.Parameter("c", 2.0)],
+    )
+    lines = np.linspace(40, 800, 9).astype(int)
+    for number in (2, 3):
+        phases = np.random.default_rng(number).uniform(0, 2 * np.pi, (2 * number, 9))
+        u = np.cos(2 * np.pi * np.arange(N)[:, None] / N * lines + phases[:, None]).sum(axis=-1)
+        clean = [fq.simulate(plant, u[2 * e : 2 * e + 2].T, DT) for e in range(number)]
+        frf = fq.local_rational([r.with_noise(1e-3, seed=1) for r in clean])
+        true = plant.frequency_response(frf.omega, fq.ZeroOrderHold(DT)).response
+        assert len(frf.frequency) >= 8
+        assert (np.abs(frf.response - true) ** 2 / frf.variance).max() < 20
