@@ -55,6 +55,9 @@ def with_its_time(
     even = index.dtype.kind == "f" and len(index) > 2 and index.is_monotonic_increasing
     if dt is None and index.name is None and even:
         # a time that nobody named
+        if _counts(index.to_series()):
+            frame = frame.rename_axis("time").reset_index()
+            return with_time(frame, "time", dict(units or {}), dt)
         return frame.rename_axis("time"), ["the index was taken for the time, in s"]
     # a first column that runs as a time does, whatever it is called
     looked = dt is None and all(isinstance(c, str) for c in frame.columns)

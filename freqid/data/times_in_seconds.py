@@ -34,11 +34,18 @@ EPOCHS = (
     (1.26e17, 1.58e17, 1e-7, "ticks of 100 ns since 1601"), (1e15, 4.1e15, 1e-6, "µs since 1970"),
     (1e12, 4.1e12, 1e-3, "ms since 1970"),
 )  # fmt: skip
-# days of a spreadsheet since 1900, or of MATLAB since year 0, that mean the same, and the step up
-# to which numbers so large are no seconds: 2 s as days, 43 kHz as seconds since half a day ago
-_DAYS, _DAY_STEP = ((36_892, 73_051, "1900"), (730_852, 767_011, "year 0")), 2.4e-5
+# days of a spreadsheet since 1900, of MATLAB since year 0, of astronomers, or since 1970, that mean
+# the same, and the step up to which numbers so large are no seconds: 2 s as days, 43 kHz as seconds
+# since half a day ago
+_DAYS, _DAY_STEP = (
+    (36_892, 73_051, "1900"), (730_852, 767_011, "year 0"), (2_451_910, 2_488_069, "4713 BC"),
+    (11_323, 36_892, "1970"),
+), 2.4e-5  # fmt: skip
 # seconds between rows of slow logs, whose days are rates of 1.4 kHz and more that no converter has
 _SLOW = (5, 10, 15, 20, 30, 60)
+# minutes of a day, those between rows of logs that are slower still, which as seconds are rates of
+# few clocks, and how far from whole minutes (s) stamps of few digits are
+_MINUTES, _SLOWER, _OFF = 1440, (1, 2, 5, 10, 15, 20, 30, 60, 120, 240), 0.6
 # a name that ends in a unit, and one of the time with a longer unit behind it
 SUFFIX = (
     r"(?:^|[_\s.-])(s|ms|us|µs|ns|sec|msec|usec|nsec|millis|micros|nanos|seconds|milliseconds"
@@ -192,18 +199,37 @@ def in_seconds(name: str, column: Column, unit: str) -> tuple[FloatArray, str]:
         if least < size < most:
             return _scaled(values - values[0], scale), text
     if since := days_since(values):
-        return _scaled(values - values[0], _DAY), f"days since {since}"
+        minutes = np.rint(_MINUTES * values)
+        seconds = 60 * (minutes - minutes[0])
+        if not at_whole_minutes(values):
+            seconds = _scaled(values - values[0], _DAY)
+        return seconds, f"days since {since}"
     return values, "s"
 
 
 def days_since(values: FloatArray) -> str:
     """The year since which a column counts days, as spreadsheets do; empty where it may be s."""
-    with np.errstate(all="ignore"):
-        step = float(np.median(np.diff(values))) if len(values) > 1 else np.nan
-        slow = any(abs(step * _DAY / seconds - 1) < 1e-4 for seconds in _SLOW)
-        finer = 0 < step < _DAY_STEP or slow
     found = (year for least, most, year in _DAYS if least < values.min() <= values.max() < most)
-    return next(found, "") if finer else ""
+    if len(values) < 2 or not (year := next(found, "")):
+        return ""
+    with np.errstate(all="ignore"):
+        step = float(np.median(np.diff(values)))
+        slow = any(abs(step * _DAY / seconds - 1) < 1e-4 for seconds in _SLOW)
+    # some hours since a start are more often as large as days since 1970 are
+    slow = at_whole_minutes(values) or (slow and year != "1970")
+    return year if slow or 0 < step < _DAY_STEP else ""
+
+
+def at_whole_minutes(days: FloatArray) -> bool:
+    """Whether stamps in days lie a whole number of minutes apart, at whole minutes: a clock that
+    counts seconds is there by chance only.
+    """
+    with np.errstate(all="ignore"):
+        minutes = np.rint(_MINUTES * days)
+        near = (np.abs(_MINUTES * days - minutes) * 60 < _OFF).all()
+        steps = np.diff(minutes)
+        usual = np.median(steps) if len(steps) else 0
+    return bool(near and (steps > 0).all() and usual in _SLOWER)
 
 
 def _since_1970(column: Column, scale: float) -> bool:

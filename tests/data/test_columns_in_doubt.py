@@ -330,3 +330,27 @@ def test_columns_that_are_never_there_together_make_no_grid():
     frame = pd.DataFrame({"time": TIMES, "u": u, "y": y})
     with pytest.raises(ValueError, match="have begun and none has ended"):
         fq.Record.from_frame(frame, hold="foh", resample=True)
+
+
+@pytest.mark.parametrize("first", [45000.0, 60000.25, 739000.5, 2_460_000.5, 20500.0])
+@pytest.mark.parametrize("minutes", [1, 10, 60])
+@pytest.mark.parametrize("digits", [5, 9])
+def test_days_of_slow_logs_at_whole_minutes(tmp_path, first, minutes, digits):
+    """Rows of ten minutes had been 144 Hz, rows of an hour 24 Hz, without a word."""
+    days = np.round(first + np.arange(N) * minutes / 1440, digits)
+    frame = pd.DataFrame({"time": days, "u": U, "y": LEVELS})
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    unnamed = frame.set_index("time").rename_axis(None)
+    read = [fq.Record.from_frame(f) for f in (frame, frame.set_index("time"), unnamed)]
+    for record in [*read, fq.read(tmp_path / "a.csv")]:
+        assert record.dt == 60 * minutes
+        assert any("days since" in note for note in record.notes)
+
+
+@pytest.mark.parametrize("rate", [24, 144, 1440])
+@pytest.mark.parametrize("first", [20000.123, 45000.61234, 739000.123])
+def test_seconds_of_a_clock_that_started_long_ago_are_no_days(rate, first):
+    if rate == 1440 and first > 40_000:
+        pytest.skip("a step that few clocks have, and so many logs of days")
+    frame = pd.DataFrame({"time": first + np.arange(N) / rate, "u": U, "y": LEVELS})
+    assert np.isclose(fq.Record.from_frame(frame).dt, 1 / rate)
