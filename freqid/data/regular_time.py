@@ -6,12 +6,14 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from freqid.checks import FloatArray, InputError
+from freqid.checks import FloatArray, InputError, IntArray
 from freqid.data.clocks import Clock, out_of_order
 from freqid.data.printed_times import plain_period, printed_period
 
 # rows of a regular time for each that is there, beyond which a stamp is wrong and no gap
 EMPTY = 1000
+# samples by which times may leave an even grid, and those from which that is said
+MOST_WANDER, SAID_WANDER = 0.5, 0.05
 # missing samples in a row that are no longer filled well by straight lines
 _FEW = 5
 
@@ -93,7 +95,10 @@ def on_a_grid(
             # across so many rows a line is no sample, and stamps jitter more often than samplers do
             new[name] = x
         elif name in held:
-            at = np.searchsorted(clock.number[there], np.arange(len(grid)), side="right") - 1
+            # of a clock that wanders the times tell what was held, not the places
+            wanders = clock.jitter > MOST_WANDER
+            had, asked = (times, grid) if wanders else (clock.number, np.arange(len(grid)))
+            at = np.searchsorted(had[there], asked, side="right") - 1
             new[name] = x[there][np.maximum(at, 0)]
         else:
             new[name] = np.interp(grid, times[there], x[there])
@@ -116,6 +121,21 @@ def rows_apart(y: FloatArray) -> int:
     regular = np.array_equal(rows, np.arange(0, len(y), factor))
     blank = bool(np.isnan(y[~there]).all())
     return factor if regular and blank else 1
+
+
+def wander(times: FloatArray, rows: IntArray) -> float:
+    """By how many samples times of so many ``rows`` leave an even grid, to either side."""
+    step = float(times[-1] - times[0]) / float(rows[-1] - rows[0])
+    return float(np.ptp(times - step * rows)) / (2 * step)
+
+
+def wandering(name: str, samples: float) -> str:
+    """What is said of times whose steps differ by little, but which leave an even grid by more."""
+    return (
+        f"{name} wanders: its steps are even to a hundredth, and its times leave an even "
+        f"grid by up to {samples:.2g} samples; Record.from_logs(time, u, time, y) leaves them "
+        "where they are, resample=True puts them on a grid"
+    )
 
 
 def missing_of(gaps: FloatArray) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from freqid.checks import Array, InputError
 from freqid.data.printed_times import plain_period, printed_period
 from freqid.data.readers.headings import named
+from freqid.data.regular_time import MOST_WANDER, wander, wandering
 from freqid.data.remembered import as_printed
 from freqid.data.time_column import Told, told
 from freqid.data.times_in_seconds import UNITS, in_seconds, unit_in_name_of_time
@@ -111,6 +112,8 @@ def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "
             f"{t[row + 1] - t[row]:.9g} s, at {step:g} s on average; read the file with "
             "resample=True, or give dt in s where the samples are even"
         )
+    if not digit and (astray := wander(t, np.asarray(at))) > MOST_WANDER:
+        raise InputError(f"{origin}: {wandering(f'the time {name!r}', astray)}")
     if digit:
         found = plain_period(step, digit / at[-1])
         note = f"the times are rounded to {digit:g} s: taken as even, every {found:.9g} s"

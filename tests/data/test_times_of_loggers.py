@@ -176,3 +176,37 @@ def test_an_index_of_dates_without_a_name_is_the_time_of_a_stream(tmp_path):
     pd.DataFrame({"u": U, "y": Y}, index=index).to_parquet(tmp_path / "a.parquet")
     assert fq.open(tmp_path / "a.parquet").dt == pytest.approx(0.01)
     assert fq.open(tmp_path / "a.parquet").notes == fq.read(tmp_path / "a.parquet").notes == ()
+
+
+def wandering_rows(most, rows=4000):
+    """Steps that are even to 0.8 %, whose sum leaves an even grid by ``most`` samples."""
+    number = np.arange(rows)
+    time = 4e-3 * (number + most * np.sin(2 * np.pi * 3 * number / rows))
+    u = np.random.default_rng(1).standard_normal(rows)
+    return pd.DataFrame({"time": time, "u": u, "y": np.cumsum(u)})
+
+
+def test_a_clock_that_wanders_is_not_even(tmp_path):
+    """Stamps up to ten samples off a grid had been read as even, and a stiffness was 14 % off."""
+    frame = wandering_rows(1.5)
+    assert np.abs(np.diff(frame["time"]) / 4e-3 - 1).max() < 0.008
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    np.save(tmp_path / "a.npy", frame.to_numpy())
+    with pytest.raises(ValueError, match=r"wanders.* by up to 1\.5 samples.*from_logs"):
+        fq.Record.from_frame(frame)
+    with pytest.raises(ValueError, match=r"column 'time' wanders"):
+        fq.read(tmp_path / "a.csv")
+
+
+def test_what_a_wandering_clock_held_is_found_by_its_times():
+    frame = wandering_rows(9.0, 24_000)
+    steps = np.repeat(frame["u"].to_numpy()[:480], 50)
+    regular = fq.Record.from_frame(frame.assign(u=steps, y=steps), resample=True)
+    # a line from one level to the next takes one row of fifty
+    assert np.mean(np.abs(regular.u - regular.y) > 1e-9) < 0.03
+
+
+def test_a_clock_that_wanders_by_parts_of_a_sample_is_said_to():
+    record = fq.Record.from_frame(wandering_rows(0.2))
+    assert any("leave an even grid by up to 0.2 samples" in n for n in record.notes)
+    assert fq.Record.from_frame(wandering_rows(0.02)).notes == ()
