@@ -97,12 +97,13 @@ def robust_fit(
     robust = with_scatter(
         dataclasses.replace(est, notes=[*est.notes, note, *alike]), minimum, spread
     )
-    return robust, best.seen
+    return robust, best.weighted or best.seen
 
 
 @dataclass(frozen=True)
 class _Settled:
-    """An estimate with the readings that it is of, whose errors are cut where they are far off.
+    """An estimate with the readings that it is of, whose errors are cut where they are far off;
+    ``weighted`` are the same with the noise that was learnt from them.
 
     ``inside`` is the part that is not cut, ``count`` samples are far off, and ``scatter`` is the
     logarithm of the errors' median size, in the mean over outputs.
@@ -113,6 +114,7 @@ class _Settled:
     inside: float = 1.0
     count: int = 0
     scatter: float = -np.inf
+    weighted: Sequence[Reading] = ()
 
     @property
     def noiseless(self) -> bool:
@@ -145,7 +147,7 @@ def _settled(
             break
         cut, inside, count, scatter = _cut(est, readings, cut)
         before, (est, seen) = est, work(cut, est)
-        found = _Settled(est, cut, inside, count, scatter)
+        found = _Settled(est, cut, inside, count, scatter, seen)
         std = np.sqrt(np.maximum(np.diag(est.covariance_matrix), 0))
         if (np.abs(est.values - before.values) <= _STANDS * std).all():
             break

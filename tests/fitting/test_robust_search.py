@@ -101,3 +101,16 @@ def test_weights_of_zero_are_refused_before_the_search() -> None:
         fq.fit(LAG, record, loss="huber", weights=weights)
     weights[400:] = 1e-6
     assert fq.fit(LAG, record, loss="huber", weights=weights)["a"] == pytest.approx(120, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [0, 8])
+def test_a_mode_is_asked_for_in_the_weights_that_were_learnt(seed):
+    """A box in other weights had explained 1e8 times more: "another mode" of a right model."""
+    plant = fq.GreyBox(
+        lambda m, k, d: ([[0, 1], [-k / m, -d / m]], [[0], [1 / m]], [[1, 0]], None),
+        [fq.Parameter("m", 2.0), fq.Parameter("k", 800.0), fq.Parameter("d", 8.0)],
+    )
+    u = np.repeat(np.random.default_rng(5).uniform(-10, 10, 300), 5)
+    record = fq.simulate(plant, u, 4e-3).with_noise(1e-3, seed=seed)
+    est = fq.fit(plant.with_values(m=3.0, k=500.0, d=15.0), record, weights="noise", loss="huber")
+    assert not any("another mode" in str(warning) for warning in est.warnings)
