@@ -30,7 +30,7 @@ from freqid.data.readers.headings import named_with
 from freqid.data.readers.kinds import ResponseFile
 from freqid.data.readers.npz import check_arrays
 from freqid.data.record import Record
-from freqid.data.record_sets import Reference, as_records, references_of
+from freqid.data.record_sets import Reference, as_records, on_a_grid, references_of
 from freqid.data.replacing import check_replacing
 from freqid.data.response_files import picked, read_response
 from freqid.data.running import alone, configured, every_core, in_turn, unordered

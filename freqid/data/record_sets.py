@@ -30,10 +30,8 @@ def as_records(records: Record | Sequence[Record], varying: bool = True) -> list
     sets = [records] if isinstance(records, Record) else listed("records", records)
     if not sets or not all(isinstance(r, Record) for r in sets):
         raise InputError("records must be a Record or a list of Records, at least one")
-    if any(isinstance(r, StampedRecord) for r in sets):
-        raise InputError(
-            "the stamps of a record fit no grid: take record.regular(), which is resampled"
-        )
+    for r in sets:
+        on_a_grid(r)
     first = sets[0]
     for number, r in enumerate(sets):
         if abs(r.dt / first.dt - 1) > 1e-9 or r.factor != first.factor:
@@ -100,3 +98,11 @@ def references_of(sets: Sequence[Record], reference: Reference | None) -> list[F
         if (np.ptp(x, axis=0) == 0).any():
             raise InputError("reference is constant; it excites nothing")
     return signals
+
+
+def on_a_grid(data: object) -> None:
+    """ValueError for a record whose stamps fit no grid."""
+    if isinstance(data, StampedRecord):
+        raise InputError(
+            "the stamps of a record fit no grid: take record.regular(), which is resampled"
+        )

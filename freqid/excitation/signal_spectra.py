@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from freqid.checks import FloatArray, InputError, IntArray, an, finite, positive, whole
-from freqid.data import Band, Record
+from freqid.data import Band, Record, on_a_grid
 from freqid.excitation.input_spectra import InputSpectrum, LineSpectrum
 
 
@@ -92,6 +92,7 @@ class MeasuredSpectrum(LineSpectrum):
             raise InputError(f"record={type(record).__name__} is not a Record")
         if whole("channel", channel, least=0) >= an("record", record, Record).n_inputs:
             raise InputError(f"channel={channel}: the record has {record.n_inputs} inputs, from 0")
+        on_a_grid(record)
         u = record.inputs[:, channel]
         n = len(u)
         power = np.abs(np.fft.rfft(u) / n) ** 2

@@ -20,7 +20,15 @@ from freqid.checks import (
     processes,
     whole,
 )
-from freqid.data import Bar, FrequencyResponse, Record, as_data_sets, channel_counts, in_turn
+from freqid.data import (
+    Bar,
+    FrequencyResponse,
+    Record,
+    as_data_sets,
+    channel_counts,
+    in_turn,
+    on_a_grid,
+)
 from freqid.fitting.black_box.late import in_step
 from freqid.fitting.black_box.output_error import fit_output_error, held_out_cost
 from freqid.fitting.estimate import Estimate
@@ -84,6 +92,7 @@ def select_order(
 
     data = as_data_sets(data)[0] if hasattr(data, "frdata") else data
     an("data", data, Record, FrequencyResponse)
+    on_a_grid(data)
     choice("criterion", criterion, ("aic", "mdl", "cross_validation"))
     choice("initial_state", initial_state, ("estimate", "zero", "steady"))
     if feedthrough is not None:
