@@ -124,7 +124,8 @@ def compare(
         model: an Estimate, a GreyBox, a rational model or a control system.
         hold: what the input does; None is what the fit assumed of its data, and else what the
             record remembers. A discrete model keeps its own where the input is held as long as it
-            lasts; where it is not the continuous plant inside it is simulated.
+            lasts; where it is not, or the record remembers another than the fit's data did, the
+            continuous plant inside it is simulated.
         initial_state: ``"estimate"`` fits the initial state to this record, ``"steady"`` takes the
             input to be periodic, ``"zero"`` begins at rest. Offsets of the outputs are fitted with
             it where the Estimate was (``offset="estimate"``). A plant that integrates is simulated
@@ -238,7 +239,8 @@ def held(
 
     A fit that took what its record remembers says so of another record, too; one that assumed a
     hold at its own sample time assumes it at the other's. A sampled model has its hold inside:
-    where the input is held for another time its continuous plant stands for it.
+    where the input is held for another time, or in another way than that of the fit's data was, its
+    continuous plant stands for it.
     """
     between = _assumed(model, data) if hold is None else hold
     if isinstance(fitted, DiscreteModel):
@@ -252,7 +254,9 @@ def held(
         # nobody asked for a model of another rate beside a record of which its own is no part
         whole = [r for r in (ratio, (data.dt or 0.0) / own.period) if abs(r - round(r)) < 1e-9 * r]
         meant = hold is not None or isinstance(data, FrequencyResponse) or bool(whole)
-        if abs(ratio - 1) > 1e-9:
+        # what the data of a fit remembered is none of the others' that remember another kind
+        unlike = isinstance(model, Estimate) and between is None and type(at) is not type(own)
+        if abs(ratio - 1) > 1e-9 or unlike:
             return (as_model(fitted.to_continuous()), lasts) if meant else (fitted, own)
         return fitted, between or own
     return fitted, between
