@@ -40,7 +40,7 @@ from freqid.fitting.suspects.past import unexplained
 from freqid.fitting.suspects.record_ends import beyond_leakage, leakage, leaked
 from freqid.fitting.suspects.register import Columns
 from freqid.fitting.suspects.rest import begun_in_motion
-from freqid.fitting.suspects.said import finding_of, negligible
+from freqid.fitting.suspects.said import finding_of, in_place_of_modes, negligible
 from freqid.fitting.suspects.scales import instead, instead_of_swapped
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked, Glance, Score, score
@@ -242,6 +242,8 @@ class Inquiry(Lone):
             return held
         if not named:
             return []
+        if not isinstance(self.model, GreyBox):
+            named = in_place_of_modes(named)
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
         least = (most := evidence(scene, named[0])) * (_WORTH if most > 0 else 1)

@@ -18,7 +18,7 @@ _EQUAL, _CHANCE = 0.98, 6.0
 # level at which a change midway explains more than what is simpler
 _CLEAR = 1e-3
 # part of the gain of one more mode, or of a simple explanation, at which another is believed
-_AS_MUCH = 0.8
+AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
 BENT, _HALF = ("friction", "nonlinear"), 0.5
@@ -27,7 +27,7 @@ _JUMPS = (*BENT, "asymmetric", "backlash")
 # part of what jumps explain from which a plant that bends makes them, for at many places they
 # imitate all else; and the same where they explain less than the last part of what is left
 _FIFTH, _TWELFTH, _THIRD = 0.2, 0.08, 0.35
-_SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
+SENSOR = ("offset", "drift", "spikes", "saturation", "tone")
 # part of what a turned channel leaves that a delay has to leave to be said instead
 _LATE = 0.5
 # that a model lacks something, which only what is simpler can say better
@@ -98,17 +98,17 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         equal.sort(key=lambda a: likely.index(a.name))
         ranked = [*equal, *(a for a in ranked if a not in equal)]
     if ranked[0].name in LACKING:
-        enough = _AS_MUCH * ranked[0].test.gain
+        enough = AS_MUCH * ranked[0].test.gain
         simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name not in _NARROW]
         # a wrong hold leaves what no hold explains as well; its evidence tells how sure it is
-        sure = _AS_MUCH * evidence(scene, ranked[0])
+        sure = AS_MUCH * evidence(scene, ranked[0])
         held = [a for a in ranked[1:] if a.name == "hold rejected" and evidence(scene, a) >= sure]
         simple += [a for a in held if a not in simple]
         ranked = [*simple, *(a for a in ranked if a not in simple)]
     if ranked[0].name == "asymmetric":
         # what acts more one way has a mean, and where the plant integrates a slope
-        sure = _AS_MUCH * evidence(scene, ranked[0])
-        added = [a for a in ranked if a.name in _SENSOR and evidence(scene, a) >= sure]
+        sure = AS_MUCH * evidence(scene, ranked[0])
+        added = [a for a in ranked if a.name in SENSOR and evidence(scene, a) >= sure]
         ranked = [*added, *(a for a in ranked if a not in added)]
     if ranked[0].name == "unsteady":
         # to a sweep whatever the model lacks is a change between its halves
@@ -119,12 +119,12 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         ranked = [change, *(a for a in ranked if a is not change)]
     if ranked[0].name not in _BESIDE:
         ranked = [a for a in ranked if a.name != "unsteady"]
-    if ranked[0].name not in _SENSOR:
+    if ranked[0].name not in SENSOR:
         least = _HALF * max(a.test.gain for a in asked)
         # to a sweep the sign of the speed looks like what one unknown of a linear plant explains,
         # and the other way round: of both the better one
         linear = [evidence(scene, a) for a in asked if a.name in LIKELY]
-        surely = _AS_MUCH * max(linear, default=0.0)
+        surely = AS_MUCH * max(linear, default=0.0)
         bent = [a for a in ranked if a.name in BENT and a.test.gain >= least]
         bent = [a for a in bent if evidence(scene, a) >= surely]
         ranked = [*bent, *(a for a in ranked if a not in bent)]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import equally_weighted
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE
-from freqid.fitting.suspects.order import LACKING
+from freqid.fitting.suspects.order import AS_MUCH, LACKING, SENSOR
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import sentence, words
@@ -31,6 +32,25 @@ def negligible(scene: Scene, a: Asked) -> bool:
     return bool(little and not moves and not a.harm >= LITTLE)
 
 
+def in_place_of_modes(named: Sequence[Asked]) -> list[Asked]:
+    """What was named of a black box, where a fault of a sensor explains about as much as one of a
+    larger order does: it is then what harms, in its place.
+
+    To a larger black box a constant is a slow motion, and a hum a light mode.
+    """
+    for lacking in [a for a in named if a.name in LACKING and a.harm >= LITTLE]:
+        as_good = [
+            a for a in named
+            if a.name in SENSOR and a.test.gain >= AS_MUCH * lacking.test.gain
+            and a.test.degrees < lacking.test.degrees
+        ]  # fmt: skip
+        if as_good:
+            first = dataclasses.replace(as_good[0], harm=lacking.harm)
+            rest = [a for a in named if a is not as_good[0] and a is not lacking]
+            return [first, *rest]
+    return [*named]
+
+
 def finding_of(scene: Scene, a: Asked, readings: Sequence[Reading]) -> Finding:
     """What is said of it to who reads the estimate."""
     if a.name == "hold rejected":
@@ -43,6 +63,7 @@ def finding_of(scene: Scene, a: Asked, readings: Sequence[Reading]) -> Finding:
     if a.name in LACKING and all(equally_weighted(r) for r in readings):
         text += "; where errors are a share of the response, fit with error='log'"
     small = a.test.largest_shift < _SMALL or a.test.largest_change < _HARMLESS or a.harm < LITTLE
+    small = small and not (a.name in SENSOR and a.harm >= LITTLE)
     if a.name == "unsteady":
         # halves that differ leave the mean of both where it is
         small = bool(a.unit) and abs(a.test.size) < HOLDS_GOOD

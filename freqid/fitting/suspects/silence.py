@@ -9,6 +9,8 @@ import scipy
 
 from freqid.checks import FloatArray, InputError
 from freqid.data import DataSet, Record
+from freqid.fitting.black_box.reference import Reference
+from freqid.fitting.cost.charts import Chart
 from freqid.fitting.cost.time_experiments import TimeExperiment
 from freqid.fitting.findings import Finding
 from freqid.fitting.fitters import SearchOptions, fitter_of
@@ -16,13 +18,13 @@ from freqid.fitting.offsets import with_offset
 from freqid.fitting.reading import Reading
 from freqid.fitting.search.interrupted import INTERRUPTED
 from freqid.fitting.suspects.asking import Naming
-from freqid.fitting.suspects.order import BENT
+from freqid.fitting.suspects.order import BENT, LACKING
 from freqid.fitting.suspects.plant import responses
 from freqid.fitting.suspects.refits import plain
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.uncertainty.minimum import Minimum
 from freqid.lti import eliminate
-from freqid.models import GreyBox, Model
+from freqid.models import DiscreteModel, GreyBox, Model
 
 # level at which it is, and the part of an output that is but rounding
 _HEARD, _ROUNDING = 1e-3, 1e-16
@@ -107,6 +109,8 @@ def constant_instead(
     """
     minimum, model = inquiry.minimum, inquiry.model
     structure = minimum.structure
+    if isinstance(structure, Chart):
+        return _beside_box(inquiry, found)
     if not plain(structure) or not isinstance(model, GreyBox):
         return []
     if minimum.exact or minimum.prior is not None or minimum.solution.message == INTERRUPTED:
@@ -132,14 +136,42 @@ def constant_instead(
     least = min(_BETTER, _AS_GOOD * (1 - told)) * minimum.cost
     if not best.solution.converged or best.cost > least:
         return []
+    return [_explained(minimum, best.cost)]
+
+
+def _explained(minimum: Minimum, cost: float) -> Finding:
+    """What is said where constants of the outputs leave so little."""
     energy = max(minimum.objective.energy, 1e-300)
-    before, after = (100 * (1 - np.sqrt(c / energy)) for c in (minimum.cost, best.cost))
+    before, after = (100 * (1 - np.sqrt(c / energy)) for c in (minimum.cost, cost))
     text = (
         f"with a constant of each output free {after:.4g} % of the data are explained, not "
         f"{before:.4g} %: a sensor has its zero elsewhere, of an output or an input; fit with "
         "offset='estimate', or take off what each shows at rest"
     )
-    return [Finding("offset", text, number=float(best.cost / energy))]
+    return Finding("offset", text, number=float(cost / energy))
+
+
+def _beside_box(inquiry: Naming, found: Sequence[Finding]) -> list[Finding]:
+    """The finding where a black box of the same order and a constant leave no more than a larger
+    one, to which a constant is a slow motion: from the fit without it there is no way there.
+    """
+    minimum, model, readings = inquiry.minimum, inquiry.model, inquiry.readings
+    lacking = [a for a in inquiry.named if a.name in LACKING]
+    if not lacking or not any(f.kind in LACKING and f.severity == "serious" for f in found):
+        return []
+    if any(r.offset for r in readings) or not any(_has_constant(r.data) for r in readings):
+        return []
+    if not isinstance(model, DiscreteModel) or minimum.prior is not None:
+        return []
+    try:
+        free = [with_offset(r) for r in readings]
+        best = Reference.of(model, free).on(free)
+    except (InputError, np.linalg.LinAlgError, ArithmeticError):
+        return []
+    left = max(minimum.cost - max(a.test.gain for a in lacking), 0.0)
+    if best.cost > min(_BETTER * minimum.cost, _AS_GOOD * left):
+        return []
+    return [_explained(minimum, best.cost)]
 
 
 def _has_constant(data: DataSet) -> bool:
