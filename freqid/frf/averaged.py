@@ -18,7 +18,7 @@ from freqid.data import (
 )
 from freqid.frf.measured import measured
 from freqid.frf.segments import Averaging, Detrend, Window
-from freqid.frf.welch import Spectral, powers, spectral
+from freqid.frf.welch import Spectral, at_driven, powers, spectral
 
 
 @that_estimates
@@ -56,7 +56,8 @@ def h1(
         progress: as in ``fit_many``, over the samples of a stream.
 
     Returns a FrequencyResponse (outputs, inputs, K) with variance, coherence (multiple, for several
-    inputs) and input spectrum. Raises ValueError for records that do not match, too few averages
+    inputs) and input spectrum, of an input that is the same in all segments, as whole periods are,
+    at the lines that it drives. Raises ValueError for records that do not match, too few averages
     for the inputs, a constant channel, or a reference that has nothing to do with the input.
 
     Source: Bendat and Piersol, Random Data, 2010, chapters 6, 7 and 9; for closed loop Pintelon and
@@ -68,7 +69,7 @@ def h1(
     True
     """
     averaging = Averaging(segment, band, window, overlap, detrend)
-    s = spectral(records, averaging, reference, state, progress)
+    s = at_driven(spectral(records, averaging, reference, state, progress))
     if s.reference is not None:
         return _joint(s)
     return _response(s, s.yu @ np.linalg.inv(s.uu))
@@ -93,7 +94,7 @@ def h2(
     ``h1`` and ``hv`` are, S_yr S_ur⁻¹.
     """
     averaging = Averaging(segment, band, window, overlap, detrend)
-    s = spectral(records, averaging, reference, state, progress)
+    s = at_driven(spectral(records, averaging, reference, state, progress))
     if s.reference is not None:
         return _joint(s)
     if s.yu.shape[-1] != s.yu.shape[-2]:
@@ -127,7 +128,7 @@ def hv(
     Source: Rocklin, Crowley and Vold, Proc. 3rd International Modal Analysis Conference, 1985.
     """
     averaging = Averaging(segment, band, window, overlap, detrend)
-    s = spectral(records, averaging, reference, state, progress)
+    s = at_driven(spectral(records, averaging, reference, state, progress))
     if s.reference is not None:
         return _joint(s)
     m, p = s.uu.shape[-1], s.yy.shape[-1]

@@ -24,6 +24,8 @@ _TIED = 0.01
 _PIECE = 1 << 19
 # segments that show where in one the input acts; relative difference of some that are the same
 _SHOWN, _SAME = 16, 1e-6
+# part of the power of the strongest line that is none, but for digits of samples
+_SILENT = 1e-10
 # times what random segments would have, from which a line's power lies in few of them
 _FEW = 1.5
 
@@ -153,9 +155,8 @@ def memory(
     """
     w, acts = taper(window, length), np.ones(length)
     if inputs:
-        each = max(_SHOWN // len(inputs), 2)
-        shown = np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
-        if np.abs(shown - shown[:, :1]).max() <= _SAME * np.abs(shown).max():
+        shown = _shown(inputs, length, step)
+        if _repeats(shown):
             return None
         acts = ((shown - shown.mean(axis=-1, keepdims=True)) ** 2).mean(axis=(0, 1))
     padded = scipy.fft.next_fast_len(2 * length, real=True)
@@ -176,8 +177,7 @@ def swept(
     """
     if not inputs:
         return False
-    each = max(_SHOWN // len(inputs), 2)
-    shown = np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
+    shown = _shown(inputs, length, step)
     shown = shown - shown.mean(axis=-1, keepdims=True)
     # of order one, so that fourth powers are numbers in any unit
     shown /= np.maximum(np.abs(shown).max(axis=(1, 2), keepdims=True), 1e-300)
@@ -186,6 +186,29 @@ def swept(
     even = _concentrated(power.sum(axis=-1))
     alone = _concentrated(power).mean(axis=-1)
     return bool((alone > _FEW * 2 * even / (1 + even)).any())
+
+
+def driven(length: int, step: int, inputs: Sequence[FloatArray]) -> BoolArray:
+    """Lines of a segment, (lines,), without those that inputs (m, N) of records do not drive whose
+    segments are all the same, as whole periods are: there a taper shows what is beside them.
+    """
+    if not inputs or not _repeats(shown := _shown(inputs, length, step)):
+        return np.ones(length // 2 + 1, bool)
+    first = shown[:, 0] - shown[:, 0].mean(axis=-1, keepdims=True)
+    power = np.abs(scipy.fft.rfft(first)) ** 2
+    level = power / np.maximum(power.max(axis=-1, keepdims=True), 1e-300)
+    return np.asarray(level.max(axis=0) > _SILENT)
+
+
+def _shown(inputs: Sequence[FloatArray], length: int, step: int) -> FloatArray:
+    """Some of the segments of inputs (m, N) of records, (m, segments, length)."""
+    each = max(_SHOWN // len(inputs), 2)
+    return np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
+
+
+def _repeats(shown: FloatArray) -> bool:
+    """Whether segments (m, segments, length) are all the same, as periods are."""
+    return bool(np.abs(shown - shown[:, :1]).max() <= _SAME * np.abs(shown).max())
 
 
 def _concentrated(power: FloatArray) -> FloatArray:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from freqid.checks import ComplexArray, FloatArray, InputError, flag, path_of
+from freqid.checks import BoolArray, ComplexArray, FloatArray, InputError, flag, path_of
 from freqid.data import Bar, Record, Reference, Stream, as_band, as_records, chosen, references_of
 from freqid.frf.measured import aliased_at_outputs
 from freqid.frf.running_sums import RunningSums
@@ -17,6 +18,7 @@ from freqid.frf.segments import (
     Averaging,
     Detrend,
     Window,
+    driven,
     independent,
     memory,
     pieces,
@@ -87,7 +89,10 @@ def cross_spectra(
 
 @dataclass(frozen=True)
 class Spectral:
-    """Averaged spectra at K frequencies, matrices last; E[y uᴴ] is ``yu`` (K, outputs, inputs)."""
+    """Averaged spectra at K frequencies, matrices last; E[y uᴴ] is ``yu`` (K, outputs, inputs).
+
+    ``driven`` (K,) are lines of which a signal that is the same in all segments has something.
+    """
 
     frequency: FloatArray
     uu: ComplexArray
@@ -99,6 +104,7 @@ class Spectral:
     memory: FloatArray | None
     aliased: float
     swept: bool
+    driven: BoolArray
     reference: tuple[ComplexArray, ComplexArray, FloatArray] | None = None
 
 
@@ -162,12 +168,15 @@ def spectral(
             f"{count} averages for {m} inputs; their spectra cannot be told apart: use shorter "
             "segments or more experiments"
         )
-    _excited(mean["uu"], f[keep], first)
+    inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
+    acts = driven(length, step, inputs)[keep]
+    # of one that drives none all are shown to be empty
+    acts = acts | (not acts.any())
+    _excited(mean["uu"][acts], f[keep][acts], first)
     joint = None
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
         _related(mean["uu"], mean["ur"], mean["rr"], averages)
-    inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
     told = memory(averaging.window, length, step, inputs)
     return Spectral(
         f[keep],
@@ -180,6 +189,7 @@ def spectral(
         told,
         aliased_at_outputs(sets),
         swept(averaging.window, length, step, inputs, keep),
+        acts,
         joint,
     )
 
@@ -219,3 +229,16 @@ def _excited(uu: ComplexArray, frequency: FloatArray, first: Record | Stream) ->
             f"an input has no power at {idle.sum()} of {len(idle)} lines, the first at "
             f"{frequency[idle.argmax()]:g} Hz; give a band= that it excites"
         )
+
+
+def at_driven(s: Spectral) -> Spectral:
+    """The spectra at the lines that are driven."""
+    if s.driven.all():
+        return s
+    kept, lines = s.driven, np.flatnonzero(s.driven)
+    apart = int(np.diff(lines).min(initial=len(kept))) if len(lines) > 1 else 1
+    own = {name: getattr(s, name)[kept] for name in ("frequency", "uu", "yu", "yy", "driven")}
+    joint = s.reference
+    if joint is not None:
+        joint = joint[0][kept], joint[1][kept], joint[2][kept]
+    return dataclasses.replace(s, **own, reach=s.reach // apart, reference=joint)
