@@ -15,6 +15,7 @@ from freqid.data.frequency_response import FrequencyResponse
 from freqid.data.readers.columns import text_of
 from freqid.data.readers.kinds import damaged, existing, missing
 from freqid.data.readers.mat import loaded
+from freqid.data.readers.mat_forms import structure_of
 from freqid.data.readers.uff import data_sets
 
 if TYPE_CHECKING:
@@ -122,7 +123,14 @@ def of_matlab(
         content = loaded(existing(path))
     except NotImplementedError:
         raise InputError("is a MAT file of version 7.3; save it as version 7") from None
-    arrays = {k: np.asarray(v) for k, v in content.items() if not k.startswith("__")}
+    content = {k: v for k, v in content.items() if not k.startswith("__")}
+    responses = [f for v in content.values() if "ResponseData" in (f := structure_of(v) or {})]
+    if len(responses) == 1:
+        # the properties of frd and idfrd, whose frequencies are in rad/s where they do not say
+        content = responses[0]
+        unit = str(content.get("FrequencyUnit", "rad/s")).replace("TimeUnit", "s")
+        content = {**content, "FrequencyUnit": unit}
+    arrays = {k: np.asarray(v) for k, v in content.items()}
     found = [k for k, v in arrays.items() if np.iscomplexobj(v) and v.ndim >= 1]
     if not found:
         import pandas as pd
@@ -145,4 +153,6 @@ def of_matlab(
     G = arrays[found[0]]
     if G.ndim > 1 and G.shape[0] == len(f) and G.shape[-1] != len(f):
         G = np.moveaxis(G, 0, -1)
-    return FrequencyResponse(f, G if G.ndim != 2 else G[:, None])
+    step = arrays.get("Ts", np.empty(0)) if responses else np.empty(0)
+    dt = float(step) if step.size == 1 and step.dtype.kind in "fiu" and step > 0 else 0.0
+    return FrequencyResponse(f, G if G.ndim != 2 else G[:, None], dt=dt)

@@ -170,3 +170,32 @@ def test_one_structure_keeps_the_names_of_its_fields(tmp_path):
     np.testing.assert_array_equal(record.y, Y)
     path = saved(tmp_path / "b.mat", run={"Time": T, "u": U, "y": Y})
     np.testing.assert_array_equal(fq.read(path, "u", "y", time="Time").u, U)
+
+
+def test_properties_of_iddata_say_what_they_are(tmp_path):
+    """The output stands first: it was taken for the input, and 4 ms for 4 s, without a word."""
+    one = {"OutputData": Y[:, None], "InputData": U[:, None], "Ts": 1.0, "TimeUnit": "milliseconds"}
+    record = fq.read(saved(tmp_path / "a.mat", z=one))
+    np.testing.assert_array_equal(record.u, U)
+    assert (record.input_names, record.output_names, record.dt) == (("u",), ("y",), 1e-3)
+    words = {"InputName": ["F"], "OutputName": ["x"], "InputUnit": ["N"], "OutputUnit": ["mm"]}
+    told = {name: np.array(word, object) for name, word in words.items()}
+    record = fq.read(saved(tmp_path / "b.mat", z={**one, **told}))
+    assert (record.input_names, record.units) == (("F",), {"F": "N", "x": "mm"})
+    several = {**one, "OutputData": np.c_[Y, -Y], "InputData": np.c_[U, 2 * U], "Ts": []}
+    several["SamplingInstants"] = 2.0 * np.arange(N)
+    record = fq.read(saved(tmp_path / "c.mat", z=several), ["u1", "u2"], ["y1", "y2"])
+    np.testing.assert_array_equal(record.y, np.c_[Y, -Y])
+    assert record.dt == 2e-3
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("rad/TimeUnit", 2 * np.pi), ("Hz", 1.0), ("", 0.0)])
+def test_properties_of_frd_are_a_response(tmp_path, unit, scale):
+    f = np.linspace(0.5, 30, 120)
+    G = 1 / (1 + 0.1j * f)
+    told = {"Frequency": (scale or 2 * np.pi) * f, "ResponseData": G.reshape(1, 1, -1), "Ts": 0.002}
+    path = saved(tmp_path / "a.mat", sys={**told, **({"FrequencyUnit": unit} if unit else {})})
+    frf = fq.read_response(path)
+    np.testing.assert_allclose(frf.frequency, f)
+    np.testing.assert_allclose(frf.response[0, 0], G)
+    assert frf.dt == 2e-3

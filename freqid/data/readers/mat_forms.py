@@ -1,7 +1,8 @@
 """Structures that MATLAB's tools log in: blocks of Simulink, recorders of dSPACE, series in time.
 
 Formats: Simulink, "To Workspace", structure with time (time, signals.values, signals.label);
-dSPACE ControlDesk, recordings as MAT files (X and Y, each with Name, Data and Unit).
+dSPACE ControlDesk, recordings as MAT files (X and Y, each with Name, Data and Unit); the System
+Identification Toolbox, the properties of iddata (InputData, OutputData, their names and units).
 """
 
 from __future__ import annotations
@@ -93,6 +94,8 @@ def _tool_of(fields: Fields) -> Callable[[str, Fields], Group] | None:
         return _simulink
     if _entries(fields.get("Y"), "Data") and _entries(fields.get("X"), "Data"):
         return _dspace
+    if all(_is_numeric(fields.get(n, "")) for n in ("InputData", "OutputData")):
+        return _iddata
     return None
 
 
@@ -183,6 +186,35 @@ def _dspace(name: str, fields: Fields) -> Group:
         if unit and unit not in ("-", "[]"):
             group.units[added] = unit
     return group
+
+
+def _iddata(name: str, fields: Fields) -> Group:
+    """Inputs and outputs of measured data by their names, u and y where they have none."""
+    group, samples = Group(), 0
+    for side, plain in (("Input", "u"), ("Output", "y")):
+        data = np.asarray(fields[f"{side}Data"])
+        rows = np.atleast_2d(data if data.ndim == 1 or data.shape[0] <= data.shape[1] else data.T)
+        names, units = (_words(fields.get(f"{side}{what}"), len(rows)) for what in ("Name", "Unit"))
+        for i, (own, unit, row) in enumerate(zip(names, units, rows, strict=True), start=1):
+            added = _add(group, own or (plain if len(rows) == 1 else f"{plain}{i}"), row)
+            samples = len(row)
+            if unit:
+                group.units[added] = unit
+    step, start = (np.ravel(fields.get(n, ())) for n in ("Ts", "Tstart"))
+    if step.size == 1 and _is_numeric(step):
+        begin = float(start[0]) if start.size == 1 and _is_numeric(start) else 0.0
+        group.arrays["time"] = begin + float(step[0]) * np.arange(samples)
+    elif np.size(instants := fields.get("SamplingInstants", ())) == samples:
+        group.arrays["time"] = np.ravel(instants)
+    if unit := _words(fields.get("TimeUnit"), 1)[0]:
+        group.units["time"] = unit
+    return group
+
+
+def _words(told: object, count: int) -> list[str]:
+    """So many texts, empty ones where others are told."""
+    words = [str(word).strip() for word in np.ravel(np.asarray(told))] if told is not None else []
+    return words if len(words) == count else [""] * count
 
 
 def _number(signal: Fields, most: int) -> int:
