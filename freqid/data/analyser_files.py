@@ -124,7 +124,7 @@ def of_matlab(
     except NotImplementedError:
         raise InputError("is a MAT file of version 7.3; save it as version 7") from None
     content = {k: v for k, v in content.items() if not k.startswith("__")}
-    responses = [f for v in content.values() if "ResponseData" in (f := structure_of(v) or {})]
+    responses = [s for v in content.values() if "ResponseData" in (s := structure_of(v) or {})]
     if len(responses) == 1:
         # the properties of frd and idfrd, whose frequencies are in rad/s where they do not say
         content = responses[0]
