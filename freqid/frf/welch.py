@@ -170,9 +170,7 @@ def spectral(
         )
     inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
     acts = driven(length, step, inputs)[keep]
-    # of one that drives none all are shown to be empty
-    acts = acts | (not acts.any())
-    _excited(mean["uu"][acts], f[keep][acts], first)
+    _excited(mean["uu"], f[keep], first)
     joint = None
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
