@@ -76,3 +76,45 @@ def test_messages_of_no_joints_change_no_name(tmp_path):
     messages = [(TIME[0] - 0.01, (), ()), *named]
     log = log_of(bag(tmp_path / "log", messages))
     assert (log["joint_states.velocity[1]"].values == ARM[:, 1]).all()
+
+
+def frames_bag(path):
+    """Wrenches of two frames on one topic, and trajectories whose joints change their order."""
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds = [f"geometry_msgs/msg/{n}" for n in ("WrenchStamped", "Wrench", "Vector3")]
+    kinds += ["std_msgs/msg/Header", "builtin_interfaces/msg/Time"]
+    kinds += ["trajectory_msgs/msg/JointTrajectory", "trajectory_msgs/msg/JointTrajectoryPoint"]
+    Stamped, Wrench, Vector, Header, Time, Trajectory, Point = (store.types[k] for k in kinds)
+    Duration, none = store.types["builtin_interfaces/msg/Duration"], np.array([])
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        force, moves = (
+            writer.add_connection(topic, kind, typestore=store)
+            for topic, kind in (("/force", kinds[0]), ("/moves", kinds[5]))
+        )
+        for i, (t, two) in enumerate(zip(TIME, ARM, strict=True)):
+            ns = nanoseconds(t)
+            stamp = Time(sec=ns // 10**9, nanosec=ns % 10**9)
+            for frame, x in zip(("left", "right"), two, strict=True):
+                wrench = Wrench(force=Vector(x=x, y=0.0, z=0.0), torque=Vector(x=0.0, y=0.0, z=0.0))
+                message = Stamped(header=Header(stamp=stamp, frame_id=frame), wrench=wrench)
+                writer.write(force, ns, store.serialize_cdr(message, kinds[0]))
+            order = [0, 1] if i % 2 else [1, 0]
+            still = Duration(sec=0, nanosec=0)
+            point = Point(two[order].copy(), none, none, none, time_from_start=still)
+            names = [("hip", "knee")[k] for k in order]
+            message = Trajectory(Header(stamp=stamp, frame_id=""), names, [point])
+            writer.write(moves, ns, store.serialize_cdr(message, kinds[5]))
+    return path
+
+
+def test_frames_on_one_topic_and_the_joints_of_commands(tmp_path):
+    """They had been one signal by turns."""
+    log = log_of(frames_bag(tmp_path / "log"))
+    for i, (frame, joint) in enumerate((("left", "hip"), ("right", "knee"))):
+        assert (log[f"force[{frame}].wrench.force.x"].values == ARM[:, i]).all()
+        assert (log[f"moves.points[0].positions[{joint}]"].values == ARM[:, i]).all()
+    assert "force.wrench.force.x" not in log

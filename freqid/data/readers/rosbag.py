@@ -16,9 +16,12 @@ from freqid.data.readers.kinds import Channel, Log, reads_log
 
 # entries of an array that become channels of their own
 _LONGEST = 64
-_ENTRY = re.compile(r"([^\[\]]+)\[(\d+)\]")
-# what a message calls the entries of its arrays
+_ENTRY = re.compile(r"(.*)\[(\d+)\]()")
+_WITHIN = re.compile(r"([^\[\]]+)\[(\d+)\](.*)")
+# what a message calls the entries of its arrays, behind the array of which they are where it is one
+# alone; or the frames that all of it is about, of which so many are no names
 Names: TypeAlias = tuple[str, ...]
+_ABOUT, _MANY = "about", 16
 # ns, and from where on a time is one since 1970
 _SECOND, _CALENDAR = 10**9, 10**17
 
@@ -28,7 +31,8 @@ def read_bag(path: Path) -> Log:
     """Every number of every message by topic and field, ``joint_states.velocity[2]``.
 
     Where the messages of a topic name their entries, and not all the same, as several publishers
-    do, entries are those of a name: ``joint_states.velocity[shoulder]``.
+    do, entries are those of a name: ``joint_states.velocity[shoulder]``, ``tf.transforms[base]``;
+    and messages of several frames are of each: ``force[left].wrench.force.x``.
 
     Times are those of the messages' headers, where they have one, and else those of the log; in s,
     of a clock that counts from 1970 from a whole second before the first, as a float has no digits
@@ -62,31 +66,50 @@ def bag_channels(path: Path) -> Log:
     base = base if base > _CALENDAR else 0
     topics = [topic for (topic, _), (_, fields) in rows.items() if fields]
     for (topic, names), (counts, fields) in rows.items():
+        about = names[1:] if names[:1] == (_ABOUT,) and 1 < topics.count(topic) <= _MANY else ()
         seconds = 1e-9 * np.array([count - base for count in counts], dtype=float)
         for name, values in fields.items():
             # an array that changes its length is no channel
             if len(values) == len(counts):
                 own = name if topics.count(topic) == 1 else _of_its_name(name, names)
-                channel = Channel(seconds, np.array(values))
-                found[f"{topic}.{own}"] = _with(found.get(f"{topic}.{own}"), channel)
+                key = f"{topic}{''.join(f'[{frame}]' for frame in about)}.{own}"
+                found[key] = _with(found.get(key), Channel(seconds, np.array(values)))
     if not found:
         raise InputError("holds no numbers")
     return found
 
 
-def _names(message: Any) -> Names:
-    """What a message calls the entries of its arrays, as those of joints do; else nothing."""
-    names = getattr(message, "name", None)
-    if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
-        return ()
-    return tuple(names) if len(set(names)) == len(names) else ()
+def _names(message: object) -> Names:
+    """What a message calls the entries of its arrays, as those of joints do, or the frames that it
+    is about; else nothing.
+    """
+    for kind in ("name", "joint_names"):
+        names = getattr(message, kind, None)
+        if isinstance(names, list) and names and all(isinstance(n, str) for n in names):
+            return ("", *names)
+    moved = getattr(message, "transforms", None)
+    if isinstance(moved, list) and moved:
+        return ("transforms", *(str(getattr(each, "child_frame_id", "")) for each in moved))
+    frames = getattr(message, "child_frame_id", ""), _frame(message)
+    return (_ABOUT, "/".join(filter(None, frames))) if any(frames) else ()
+
+
+def _frame(message: object) -> str:
+    told = getattr(getattr(message, "header", None), "frame_id", "")
+    return told if isinstance(told, str) else ""
 
 
 def _of_its_name(field: str, names: Names) -> str:
-    """A field ``velocity[2]`` by the name of its entry."""
-    entry = _ENTRY.fullmatch(field)
-    at = int(entry[2]) if entry else len(names)
-    return f"{entry[1]}[{names[at]}]" if entry and at < len(names) else field
+    """A field ``velocity[2]`` by the name of its entry; as it is where that is no name of one."""
+    if not names or names[0] == _ABOUT:
+        return field
+    within, *entries = names
+    found = (_WITHIN if within else _ENTRY).fullmatch(field)
+    if found is None or (within and found[1] != within):
+        return field
+    at = int(found[2])
+    alone = at < len(entries) and entries[at] and entries.count(entries[at]) == 1
+    return f"{found[1]}[{entries[at]}]{found[3]}" if alone else field
 
 
 def _with(first: Channel | None, more: Channel) -> Channel:
