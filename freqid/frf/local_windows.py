@@ -114,6 +114,8 @@ def _windows(lines: Lines, form: Form) -> list[_Windows]:
 
 def _runs(centres: IntArray, served: int) -> IntArray:
     """Where runs of lines begin of which the first and the last lie less than ``served`` apart."""
+    if served == 1:
+        return np.arange(len(centres))
     begin, at = [], 0
     while at < len(centres):
         begin.append(at)
@@ -212,7 +214,7 @@ def _evaluated(
         rows = rows - (above / below)[..., None] * turned[:, :, None]
     G = above / below * gain[:, None]
     rows = rows / below[..., None] * gain[:, None, :, None]
-    freedom = solution.freedom - equations.lost
+    freedom = np.maximum(solution.freedom - equations.lost, 1)
     power = (np.abs(solution.residual) ** 2).sum(axis=1) / freedom
     variance = power[:, None, None] * (np.abs(rows) ** 2).sum(axis=3)
     share = np.broadcast_to(np.clip(1 - power, 0, 1)[:, None, None], G.shape)

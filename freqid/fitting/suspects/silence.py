@@ -34,6 +34,8 @@ _DROWNS, _CONSTANT = 0.4, 0.1
 # part of what is left that a constant may leave, and of what something else leaves; starts of the
 # fit with it, and the part of a value that its standard error is where nothing tells it
 _BETTER, _AS_GOOD, _STARTS, _VAGUE = 0.5, 1.1, 3, 0.5
+# lines from which a black box begins
+_LINES = 3000
 
 
 def silent(scene: Scene, minimum: Minimum, model: Model) -> list[Finding]:
@@ -165,7 +167,7 @@ def _beside_box(inquiry: Naming, found: Sequence[Finding]) -> list[Finding]:
         return []
     try:
         free = [with_offset(r) for r in readings]
-        best = Reference.of(model, free).on(free)
+        best = Reference.of(model, free, _LINES).on(free)
     except (InputError, np.linalg.LinAlgError, ArithmeticError):
         return []
     left = max(minimum.cost - max(a.test.gain for a in lacking), 0.0)
