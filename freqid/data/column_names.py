@@ -28,9 +28,11 @@ def without_units(
     return frame.set_axis([name for name, _ in told], axis=1), {**own, **units}
 
 
-# words of a name that tell which side of the plant a signal is on
-_INPUT = frozenset(("u", "in", "input", "inputs"))
-_OUTPUT = frozenset(("y", "out", "output", "outputs"))
+# words of a name that tell which side of the plant a signal is on: letters beside any others, words
+# beside those of a plant alone, for the output of a converter or a controller is its input
+_LETTERS = "u", "y"
+_WORDS = {"in", "input", "inputs"}, {"out", "output", "outputs"}
+_PLANT = {"plant", "system", "sys", "process", "data", "signal", "signals"}
 
 
 def told_sides(names: Sequence[str]) -> tuple[list[str], list[str]] | None:
@@ -47,11 +49,17 @@ def told_sides(names: Sequence[str]) -> tuple[list[str], list[str]] | None:
         return ["u"], ["y"]
     if len(names) != 2:
         return None
-    inner, outer = (
-        [n for n in names if _words(n) & own and not _words(n) & other]
-        for own, other in ((_INPUT, _OUTPUT), (_OUTPUT, _INPUT))
-    )
-    return (inner, outer) if inner and outer else None
+    sides = [[n for n in names if _is_on(n, side)] for side in (0, 1)]
+    return (sides[0], sides[1]) if all(len(side) == 1 for side in sides) else None
+
+
+def _is_on(name: str, side: int) -> bool:
+    """Whether a name says that its signal is on one side of the plant, and not on the other."""
+    words = _words(name)
+    if words & {*_LETTERS}:
+        return words & {*_LETTERS} == {_LETTERS[side]}
+    told = words & (_WORDS[0] | _WORDS[1])
+    return bool(told) and told <= _WORDS[side] and words - told <= _PLANT
 
 
 def _words(name: str) -> frozenset[str]:

@@ -294,10 +294,18 @@ def test_the_input_is_the_column_that_says_so(tmp_path, y, u):
     assert (stream.input_names, stream.output_names) == ((u,), (y,))
 
 
-def test_columns_whose_names_do_not_tell_are_input_and_output_in_their_order(tmp_path):
+@pytest.mark.parametrize(
+    ("u", "y"),
+    [
+        ("force", "x_out"), ("AnalogOut0", "AnalogIn0"), ("dac_output", "adc_input"),
+        ("pid_output", "sensor_input"), ("cmd_out", "fb_in"), ("y_cmd", "y_meas"),
+    ],
+)  # fmt: skip
+def test_columns_whose_names_do_not_tell_are_input_and_output_in_their_order(tmp_path, u, y):
+    """What a converter or a controller puts out is what goes into the plant."""
     columns = np.array((TIMES, U, LEVELS), str)
-    path = table(tmp_path / "a.csv", "time,force,x_out", *columns, sep=",")
-    assert fq.read(path).input_names == ("force",)
+    path = table(tmp_path / "a.csv", f"time,{u},{y}", *columns, sep=",")
+    assert fq.read(path).input_names == (u,)
 
 
 def test_a_grid_has_no_rows_in_which_a_column_has_not_begun(tmp_path):

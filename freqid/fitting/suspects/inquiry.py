@@ -243,7 +243,7 @@ class Inquiry(Lone):
         if not named:
             return []
         if not isinstance(self.model, GreyBox):
-            named = in_place_of_modes(named)
+            named = in_place_of_modes(scene, named)
         # a change beside a fault of a sensor is another thing, however weak
         apart = [a for a in named if a.certain or a.name == "unsteady"]
         least = (most := evidence(scene, named[0])) * (_WORTH if most > 0 else 1)

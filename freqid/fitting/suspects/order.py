@@ -18,7 +18,7 @@ _EQUAL, _CHANCE = 0.98, 6.0
 # level at which a change midway explains more than what is simpler
 _CLEAR = 1e-3
 # part of the gain of one more mode, or of a simple explanation, at which another is believed
-AS_MUCH = 0.8
+_AS_MUCH = 0.8
 # what no linear plant explains, and the part of the largest gain from which it is believed: what
 # else there may be in a plant tries to explain the same, a fault of a sensor does not
 BENT, _HALF = ("friction", "nonlinear"), 0.5
@@ -98,16 +98,16 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         equal.sort(key=lambda a: likely.index(a.name))
         ranked = [*equal, *(a for a in ranked if a not in equal)]
     if ranked[0].name in LACKING:
-        enough = AS_MUCH * ranked[0].test.gain
+        enough = _AS_MUCH * ranked[0].test.gain
         simple = [a for a in ranked[1:] if a.test.gain >= enough and a.name not in _NARROW]
         # a wrong hold leaves what no hold explains as well; its evidence tells how sure it is
-        sure = AS_MUCH * evidence(scene, ranked[0])
+        sure = _AS_MUCH * evidence(scene, ranked[0])
         held = [a for a in ranked[1:] if a.name == "hold rejected" and evidence(scene, a) >= sure]
         simple += [a for a in held if a not in simple]
         ranked = [*simple, *(a for a in ranked if a not in simple)]
     if ranked[0].name == "asymmetric":
         # what acts more one way has a mean, and where the plant integrates a slope
-        sure = AS_MUCH * evidence(scene, ranked[0])
+        sure = _AS_MUCH * evidence(scene, ranked[0])
         added = [a for a in ranked if a.name in SENSOR and evidence(scene, a) >= sure]
         ranked = [*added, *(a for a in ranked if a not in added)]
     if ranked[0].name == "unsteady":
@@ -124,7 +124,7 @@ def ordered(asked: Sequence[Asked], scene: Scene) -> list[Asked]:
         # to a sweep the sign of the speed looks like what one unknown of a linear plant explains,
         # and the other way round: of both the better one
         linear = [evidence(scene, a) for a in asked if a.name in LIKELY]
-        surely = AS_MUCH * max(linear, default=0.0)
+        surely = _AS_MUCH * max(linear, default=0.0)
         bent = [a for a in ranked if a.name in BENT and a.test.gain >= least]
         bent = [a for a in bent if evidence(scene, a) >= surely]
         ranked = [*bent, *(a for a in ranked if a not in bent)]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
+import numpy as np
+
 from freqid.fitting.findings import Finding, Severity
 from freqid.fitting.reading import Reading
 from freqid.fitting.suspects.asking import equally_weighted
 from freqid.fitting.suspects.halves import HOLDS_GOOD, LITTLE
-from freqid.fitting.suspects.order import AS_MUCH, LACKING, SENSOR
+from freqid.fitting.suspects.order import LACKING, SENSOR
 from freqid.fitting.suspects.scene import Scene
 from freqid.fitting.suspects.scores import Asked
 from freqid.fitting.suspects.sentences import sentence, words
@@ -18,8 +20,8 @@ from freqid.fitting.suspects.sentences import sentence, words
 _SMALL, _HARMLESS = 0.3, 1e-3
 # part of the data's energy that is nothing, and what is left of data without noise to speak of
 _NOTHING, _QUIET = 1e-5, 1e-4
-# part of what is left that is most of it
-_MOST = 0.5
+# part of what is left that is most of it, and the noise that an unknown takes by no chance
+_MOST, _CHANCE = 0.5, 6.0
 
 
 def negligible(scene: Scene, a: Asked) -> bool:
@@ -32,16 +34,20 @@ def negligible(scene: Scene, a: Asked) -> bool:
     return bool(little and not moves and not a.harm >= LITTLE)
 
 
-def in_place_of_modes(named: Sequence[Asked]) -> list[Asked]:
-    """What was named of a black box, where a fault of a sensor explains about as much as one of a
-    larger order does: it is then what harms, in its place.
+def in_place_of_modes(scene: Scene, named: Sequence[Asked]) -> list[Asked]:
+    """What was named of a black box, where a fault of a sensor leaves no more than one of a larger
+    order does: it is then what harms, in its place.
 
-    To a larger black box a constant is a slow motion, and a hum a light mode.
+    To a larger black box a constant is a slow motion, and a hum a light mode; and of a slow motion
+    that is lacking a constant explains the most, but not all.
     """
     for lacking in [a for a in named if a.name in LACKING and a.harm >= LITTLE]:
+        # what as many unknowns more gain by no chance is another cause
+        more = _CHANCE * max(lacking.test.degrees, 1) / max(scene.freedom, 1)
+        least = float(np.exp(more)) * max(scene.cost - lacking.test.gain, 0.0)
         as_good = [
             a for a in named
-            if a.name in SENSOR and a.test.gain >= AS_MUCH * lacking.test.gain
+            if a.name in SENSOR and scene.cost - a.test.gain <= least
             and a.test.degrees < lacking.test.degrees
         ]  # fmt: skip
         if as_good:
