@@ -12,7 +12,7 @@ from freqid.checks import FloatArray, InputError, positive
 from freqid.data.clocks import out_of_order
 from freqid.data.printed_times import printed_period
 from freqid.data.readers.headings import named
-from freqid.data.regular_time import MOST_WANDER, SAID_WANDER, uneven, wander, wandering
+from freqid.data.regular_time import MOST_WANDER, SAID_WANDER, SET_WANDER, uneven, wander, wandering
 from freqid.data.remembered import as_printed, kept_step
 from freqid.data.same_clock import same_clock
 from freqid.data.time_column import LOOKED_AT, no_time, with_time
@@ -119,8 +119,8 @@ def sample_time(frame: pd.DataFrame, dt: float | None, notes: list[str]) -> floa
         raise out_of_order("column 'time'", times, int(np.argmax(~(gaps > 0))) + 1)
     if np.abs(gaps - step).max() > 0.01 * step:
         raise InputError(uneven(times))
-    off = 0.0 if printed else wander(times, np.arange(len(times)))
-    if off > MOST_WANDER:
+    off, rate = (0.0, 0.0) if printed else wander(times, np.arange(len(times)))
+    if off > MOST_WANDER and rate > SET_WANDER:
         raise InputError(wandering("column 'time'", off))
     if off > SAID_WANDER:
         notes.append(

@@ -12,8 +12,11 @@ from freqid.data.printed_times import plain_period, printed_period
 
 # rows of a regular time for each that is there, beyond which a stamp is wrong and no gap
 EMPTY = 1000
-# samples by which times may leave an even grid, and those from which that is said
-MOST_WANDER, SAID_WANDER = 0.5, 0.05
+# samples by which times may leave an even grid, those from which that is said, and the part of a
+# rate up to which a clock is set by another one while the samples stay even
+MOST_WANDER, SAID_WANDER, SET_WANDER = 0.5, 0.05, 1e-3
+# stretches of a time whose rates are compared
+_STRETCHES = 20
 # missing samples in a row that are no longer filled well by straight lines
 _FEW = 5
 
@@ -60,7 +63,9 @@ def on_a_grid(
         how = "outputs by straight lines, inputs as they were held" if held else "by straight lines"
         notes.append(f"jitter of up to {jitter:g} s was taken off, {how}")
     new = {"time": grid}
-    apart = rows_apart(np.column_stack([columns[n] for n in outputs])) if outputs else 1
+    both = np.column_stack([columns[n] for n in outputs]) if outputs else np.ones((1, 1))
+    begins = int(np.argmax(np.isfinite(both).all(axis=1)))
+    apart = rows_apart(both[begins:])
     # rows that are lost would have others stand for their outputs
     slow = set(outputs) if apart > 1 and not wide else set()
     first, last = 0, len(grid) - 1
@@ -76,7 +81,7 @@ def on_a_grid(
             last = min(last, ended) if cut else last
     if slow:
         # such outputs stay at the first row
-        first = -(-first // apart) * apart
+        first = begins + -(-max(first - begins, 0) // apart) * apart
     inside = (clock.number >= first) & (clock.number <= last)
     if inside.sum() < 3:
         raise InputError(
@@ -123,10 +128,15 @@ def rows_apart(y: FloatArray) -> int:
     return factor if regular and blank else 1
 
 
-def wander(times: FloatArray, rows: IntArray) -> float:
-    """By how many samples times of so many ``rows`` leave an even grid, to either side."""
+def wander(times: FloatArray, rows: IntArray) -> tuple[float, float]:
+    """By how many samples times of so many ``rows`` leave an even grid, to either side, and by
+    which part of its rate a clock does that at the most.
+    """
     step = float(times[-1] - times[0]) / float(rows[-1] - rows[0])
-    return float(np.ptp(times - step * rows)) / (2 * step)
+    off = (times - times[0]) / step - (rows - rows[0])
+    ends = np.unique(np.searchsorted(rows, np.linspace(rows[0], rows[-1], _STRETCHES + 1)))
+    rate = float(np.abs(np.diff(off[ends]) / np.diff(rows[ends])).max())
+    return float(np.ptp(off)) / 2, rate
 
 
 def wandering(name: str, samples: float) -> str:

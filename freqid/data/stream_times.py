@@ -11,7 +11,7 @@ import numpy as np
 from freqid.checks import Array, InputError
 from freqid.data.printed_times import plain_period, printed_period
 from freqid.data.readers.headings import named
-from freqid.data.regular_time import MOST_WANDER, wander, wandering
+from freqid.data.regular_time import MOST_WANDER, SET_WANDER, wander, wandering
 from freqid.data.remembered import as_printed
 from freqid.data.time_column import Told, told
 from freqid.data.times_in_seconds import UNITS, in_seconds, unit_in_name_of_time
@@ -112,7 +112,8 @@ def even(origin: str, name: str, at: Sequence[int], stamps: Array, unit: str = "
             f"{t[row + 1] - t[row]:.9g} s, at {step:g} s on average; read the file with "
             "resample=True, or give dt in s where the samples are even"
         )
-    if not digit and (astray := wander(t, np.asarray(at))) > MOST_WANDER:
+    astray, rate = wander(t, np.asarray(at))
+    if not digit and astray > MOST_WANDER and rate > SET_WANDER:
         raise InputError(f"{origin}: {wandering(f'the time {name!r}', astray)}")
     if digit:
         found = plain_period(step, digit / at[-1])

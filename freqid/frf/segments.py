@@ -156,7 +156,7 @@ def memory(
     w, acts = taper(window, length), np.ones(length)
     if inputs:
         shown = _shown(inputs, length, step)
-        if _repeats(shown):
+        if all(_repeats(u, length) for u in inputs) and _of_whole_periods(_levels(shown)):
             return None
         acts = ((shown - shown.mean(axis=-1, keepdims=True)) ** 2).mean(axis=(0, 1))
     padded = scipy.fft.next_fast_len(2 * length, real=True)
@@ -190,25 +190,42 @@ def swept(
 
 def driven(length: int, step: int, inputs: Sequence[FloatArray]) -> BoolArray:
     """Lines of a segment, (lines,), without those that inputs (m, N) of records do not drive whose
-    segments are all the same, as whole periods are: there a taper shows what is beside them.
+    segments all hold whole periods, wherever they begin: there a taper shows what is beside them.
     """
-    if not inputs or not _repeats(shown := _shown(inputs, length, step)):
-        return np.ones(length // 2 + 1, bool)
-    first = shown[:, 0] - shown[:, 0].mean(axis=-1, keepdims=True)
-    power = np.abs(scipy.fft.rfft(first)) ** 2
-    level = power / np.maximum(power.max(axis=-1, keepdims=True), 1e-300)
-    return np.asarray(level.max(axis=0) > _SILENT)
+    every = np.ones(length // 2 + 1, bool)
+    if not inputs:
+        return every
+    level = _levels(_shown(inputs, length, step))
+    if not _of_whole_periods(level):
+        return every
+    most = level.max(axis=(1, 2), keepdims=True)
+    share = (level / np.maximum(most, 1e-300)) ** 2
+    return np.asarray(share.max(axis=(0, 1)) > _SILENT)
+
+
+def _levels(shown: FloatArray) -> FloatArray:
+    """|U| of segments (m, segments, length) without their mean, (m, segments, lines)."""
+    return np.abs(scipy.fft.rfft(shown - shown.mean(axis=-1, keepdims=True)))
+
+
+def _of_whole_periods(level: FloatArray) -> bool:
+    """Whether segments are the same but for where in a period they begin."""
+    return bool(np.abs(level - level[:, :1]).max() <= _SAME * level.max())
+
+
+def _repeats(u: FloatArray, length: int) -> bool:
+    """Whether a record's inputs (m, N) are the same after each segment; one segment alone may be.
+
+    Other phases of the same lines, as experiments may have, are other signals.
+    """
+    apart = np.abs(u[:, length:] - u[:, :-length]).max(initial=0.0)
+    return bool(apart <= _SAME * np.abs(u).max())
 
 
 def _shown(inputs: Sequence[FloatArray], length: int, step: int) -> FloatArray:
     """Some of the segments of inputs (m, N) of records, (m, segments, length)."""
     each = max(_SHOWN // len(inputs), 2)
     return np.concatenate([_some(u, length, step, each) for u in inputs], axis=1)
-
-
-def _repeats(shown: FloatArray) -> bool:
-    """Whether segments (m, segments, length) are all the same, as periods are."""
-    return bool(np.abs(shown - shown[:, :1]).max() <= _SAME * np.abs(shown).max())
 
 
 def _concentrated(power: FloatArray) -> FloatArray:

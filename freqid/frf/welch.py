@@ -87,6 +87,10 @@ def cross_spectra(
     )
 
 
+# lines that are driven, of which no response is told
+_FEW = 2
+
+
 @dataclass(frozen=True)
 class Spectral:
     """Averaged spectra at K frequencies, matrices last; E[y uᴴ] is ``yu`` (K, outputs, inputs).
@@ -169,12 +173,15 @@ def spectral(
             "segments or more experiments"
         )
     inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
-    acts = driven(length, step, inputs)[keep]
-    _excited(mean["uu"], f[keep], first)
+    # through a loop noise drives the input everywhere, and tells of the loop
+    acts = driven(length, step, inputs if signals is None else [x.T for x in signals])[keep]
+    # of few lines that are driven nothing is told
+    lines = acts if np.count_nonzero(acts) > _FEW else np.ones_like(acts)
+    _excited(mean["uu"][lines], f[keep][lines], first)
     joint = None
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
-        _related(mean["uu"], mean["ur"], mean["rr"], averages)
+        _related(mean["uu"][acts], mean["ur"][acts], mean["rr"][acts], averages)
     told = memory(averaging.window, length, step, inputs)
     return Spectral(
         f[keep],

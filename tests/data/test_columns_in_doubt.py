@@ -362,3 +362,13 @@ def test_seconds_of_a_clock_that_started_long_ago_are_no_days(rate, first):
         pytest.skip("a step that few clocks have, and so many logs of days")
     frame = pd.DataFrame({"time": first + np.arange(N) / rate, "u": U, "y": LEVELS})
     assert np.isclose(fq.Record.from_frame(frame).dt, 1 / rate)
+
+
+@pytest.mark.parametrize("begin", [2, 10])
+def test_slow_outputs_may_begin_late(begin):
+    slow = np.where((np.arange(N) - begin) % 4, np.nan, LEVELS)
+    slow[:begin] = np.nan
+    frame = pd.DataFrame({"time": TIMES, "u": U, "y": slow})
+    record = fq.Record.from_frame(frame, resample=True)
+    assert np.array_equal(record.y, LEVELS[begin::4])
+    assert np.array_equal(record.u, U[begin:][: record.factor * record.n_samples])

@@ -210,3 +210,6 @@ def test_a_clock_that_wanders_by_parts_of_a_sample_is_said_to():
     record = fq.Record.from_frame(wandering_rows(0.2))
     assert any("leave an even grid by up to 0.2 samples" in n for n in record.notes)
     assert fq.Record.from_frame(wandering_rows(0.02)).notes == ()
+    # a clock that is set by another one, by parts in ten thousand of its rate
+    long = fq.Record.from_frame(wandering_rows(2.0, 200_000))
+    assert any("leave an even grid by up to 2 samples" in n for n in long.notes)

@@ -54,3 +54,24 @@ def test_what_differs_between_segments_is_shown_at_all_lines():
     assert len(fq.h1(record, 2500).frequency) == 1250
     noise = fq.simulate(PLANT, fq.white_noise(8000, seed=1), DT)
     assert len(fq.h1(noise, 1000).frequency) == 500
+
+
+@pytest.mark.parametrize("options", [{}, {"overlap": 0.75}, {"window": "flattop"}])
+def test_segments_may_begin_anywhere_in_a_period(options):
+    """Up to 1e14 times the peak had been shown between the lines."""
+    lines = np.array([5, 12, 20, 33, 47, 60, 71, 88])
+    phase = np.random.default_rng(1).uniform(0, 2 * np.pi, len(lines))
+    one = np.cos(2 * np.pi * np.outer(np.arange(500), lines) / 500 + phase).sum(axis=1)
+    clean = fq.simulate(PLANT, np.tile(one, 12), DT).slice(2.0, None)
+    frf = fq.h1(clean.with_noise(0.01 * clean.y.std(), seed=1), 500, **options)
+    assert np.array_equal(np.round(frf.frequency * 500 * DT), lines)
+    true = PLANT.frequency_response(frf.omega, fq.ZeroOrderHold(DT)).response
+    assert np.abs(frf.response / true - 1).max() < 0.2
+    assert fq.fit(PLANT, frf).verdict.grade == "trust"
+
+
+def test_a_multisine_need_not_name_its_band():
+    """Lines of exactly no power had it refused in 74 of 76."""
+    u = fq.multisine((2, 90), 1.0, DT, 12, "random", seed=3)
+    frf = fq.h1(fq.simulate(PLANT, u, DT).with_noise(1e-3, seed=1), 1000)
+    assert np.array_equal(np.round(frf.frequency), np.arange(2, 91))
