@@ -31,14 +31,11 @@ class Lines:
 
 
 class Form(NamedTuple):
-    """Degrees of numerator and transient, and of the common denominator; lines of a window, and of
-    one around a lone line.
-    """
+    """Degrees of numerator and transient, and of the common denominator; lines of a window."""
 
     order: int
     poles: int
     width: int
-    narrow: int = 0
 
 
 class Equations(NamedTuple):
@@ -79,19 +76,48 @@ def of_lone_lines(lines: Lines, centres: IntArray, first: IntArray, form: Form) 
     Each has a response of its own, one number for an input, and the transient, with the common
     denominator, is told by the lines around that are not driven: where a numerator, too, is free a
     pole of the transient beside the line takes its place. A pole that follows noise takes as much
-    as two unknowns.
+    as two unknowns. Windows go on below zero, where signals are the conjugates of those above.
     """
     assert lines.driven is not None
-    at = first[:, None] + np.arange(form.width)
-    own = at == centres[:, None]
-    start = centred(centres, form._replace(width=form.narrow), len(lines.frequency))[:, None]
-    within = own | (~lines.driven[at] & (at >= start) & (at < start + form.narrow))
-    offsets = (at - centres[:, None]) / (form.narrow / 2)
+    f = lines.frequency
+    lowest = round(f[0] / (f[1] - f[0]))
+    own_line = centres[:, None] + lowest
+    line = (first - _below(centres, lowest, form))[:, None] + lowest + np.arange(form.width)
+    at, own = np.maximum(np.abs(line) - lowest, 0), line == own_line
+    within = own | (~lines.driven[at] & (line != 0))
+    offsets = (line - own_line) / (form.width / 2)
     powers = np.where(within[..., None], offsets[..., None] ** np.arange(form.order + 1), 0)
-    U, Y = (np.where(within, x[..., at], 0) for x in (lines.U, lines.Y))
+    U, Y = (np.where(line < 0, x[..., at].conj(), x[..., at]) for x in (lines.U, lines.Y))
+    U, Y = np.where(within, U, 0), np.where(within, Y, 0)
     equations = _in_columns(U, Y, within[..., None].astype(float), powers, form, within)
     spent = len(lines.U) * (~within).sum(axis=1) + form.poles
     return equations._replace(lost=spent.astype(float))
+
+
+def above_zero(rows: ComplexArray, lines: Lines, centres: IntArray, form: Form) -> ComplexArray:
+    """What lines of such windows add, rows (W, p, m, E·w), at those above zero alone, with the
+    variance of all: noise and its conjugate have nothing to do with one another.
+    """
+    f = lines.frequency
+    below = _below(centres, round(f[0] / (f[1] - f[0])), form)
+    each = rows.reshape(*rows.shape[:3], -1, form.width)
+    at = below[:, None] + np.arange(form.width)
+    kept = np.take_along_axis(
+        each, np.minimum(at, form.width - 1)[:, None, None, None], axis=-1
+    ) * (at < form.width)[:, None, None, None]  # fmt: skip
+    whole, part = (
+        np.sqrt((np.abs(x) ** 2).sum(axis=(-2, -1), keepdims=True)) for x in (each, kept)
+    )
+    scaled: ComplexArray = kept * (whole / np.where(part > 0, part, 1))
+    return scaled.reshape(rows.shape)
+
+
+def _below(centres: IntArray, lowest: int, form: Form) -> IntArray:
+    """By how many lines windows around centres begin before the first of the data, where that is
+    the line next to zero.
+    """
+    before = np.maximum(form.width // 2 - centres, 0)
+    return before if lowest == 1 else 0 * before
 
 
 def _in_columns(

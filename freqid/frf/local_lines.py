@@ -90,7 +90,7 @@ def among_driven(lines: Lines, form: Form) -> Form:
     near = scipy.ndimage.uniform_filter1d(lines.driven.astype(float), form.width, mode="reflect")
     width = int(form.width / (1 - near[lines.lone].max())) | 1
     width = min(width, (len(lines.frequency) - 1) | 1)
-    return form._replace(width=max(width, form.width), narrow=max(width, form.width))
+    return form._replace(width=max(width, form.width))
 
 
 def _apart(U: ComplexArray, width: int) -> BoolArray:

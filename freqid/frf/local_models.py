@@ -94,8 +94,7 @@ def local_rational(
     ``order`` is that of numerator, transient and common denominator. Arguments, result and errors
     as in ``local_polynomial``. In strong noise the local polynomial is the safer one: the
     denominator is fitted to noisy outputs. Of an input of few lines, as a multisine may be, it
-    gives these alone, each by itself, and others where enough are driven around them; below the
-    eighth line such bars are too small, by three times and more in the first.
+    gives these alone, each by itself, and others where enough are driven around them.
 
     >>> import freqid as fq
     >>> u = fq.chirp(10, 80, duration=10, dt=0.5e-3)
@@ -178,7 +177,7 @@ def _form(sets: Sequence[Record], order: int, poles: int, width: int | None) -> 
         raise InputError(
             f"width={width} gives {width * E} equations for {unknown} unknowns; widen it"
         )
-    return Form(order, poles, width, width)
+    return Form(order, poles, width)
 
 
 def _unknown(order: int, poles: int, experiments: int, inputs: int) -> int:

@@ -14,6 +14,7 @@ from freqid.frf.local_equations import (
     Equations,
     Form,
     Lines,
+    above_zero,
     centred as _centred,
     laid_out,
     of_lone_lines,
@@ -135,6 +136,8 @@ def _solved(
         outputs = range(lines.Y.shape[1])
         each = [_evaluated(equations, output, near[run], form) for output in outputs]
         G, variance, share, rows, left = (np.stack(x, axis=1) for x in zip(*each, strict=True))
+        if windows.lone:
+            rows = above_zero(rows, lines, windows.own[run], form)
         block = Values(G, variance, share, rows, left @ left.conj().swapaxes(1, 2))
         if behind:
             block = between(block, behind)

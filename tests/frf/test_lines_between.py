@@ -134,3 +134,21 @@ def test_each_line_is_told_where_as_many_experiments_as_inputs_drive_it():
         true = plant.frequency_response(frf.omega, fq.ZeroOrderHold(DT)).response
         assert len(frf.frequency) >= 8
         assert (np.abs(frf.response - true) ** 2 / frf.variance).max() < 20
+
+
+@pytest.mark.parametrize("gain", [30.0, 3.0])
+def test_the_lowest_lines_are_told_from_both_sides_of_zero(gain):
+    """With lines on one side alone bars had been 3.7 times too small (rms)."""
+    plant, samples, lines = fq.first_order(gain, 30.0), 1000, np.array([1, 3, 9, 27, 81])
+    z, apart = [], []
+    for seed in range(40):
+        phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
+        u = np.cos(2 * np.pi * np.outer(np.arange(samples), lines) / samples + phase).sum(axis=1)
+        clean = fq.simulate(plant, u, 2e-3)
+        frf = fq.local_rational(clean.with_noise(0.05 * clean.y.std(), seed=seed))
+        true = plant.frequency_response(frf.omega, fq.ZeroOrderHold(2e-3)).response
+        z.append(np.abs(frf.response - true)[0, 0] / np.sqrt(frf.variance[0, 0]))
+        est = fq.fit(plant, frf, weights="noise")
+        apart.append((est.values - [gain, 30.0]) / est.parameters["std"])
+    assert (np.sqrt(np.mean(np.square(z), axis=0)) < 1.4).all()
+    assert (np.sqrt(np.mean(np.square(apart), axis=0)) < 1.4).all()
