@@ -175,9 +175,10 @@ def spectral(
     inputs = [r.inputs[:: r.factor].T[:, : r.n_samples] for r in sets if isinstance(r, Record)]
     # through a loop noise drives the input everywhere, and tells of the loop
     acts = driven(length, step, inputs if signals is None else [x.T for x in signals])[keep]
-    # of few lines that are driven nothing is told
-    lines = acts if np.count_nonzero(acts) > _FEW else np.ones_like(acts)
-    _excited(mean["uu"][lines], f[keep][lines], first)
+    if np.count_nonzero(acts) <= _FEW:
+        # of so few nothing is told
+        acts = np.ones_like(acts)
+    _excited(mean["uu"][acts], f[keep][acts], first)
     joint = None
     if signals is not None:
         joint = mean["yr"], mean["ur"], mean["rr"]
