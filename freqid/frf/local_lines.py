@@ -51,8 +51,7 @@ def reached(lines: Lines, form: Form, sets: Sequence[Record]) -> Lines:
     Where one line in a window is driven there is a fraction with any pole next to it, and what it
     is worth elsewhere no noise says; nor does it tell more inputs than there are experiments.
     """
-    every = np.abs(lines.U) ** 2
-    power = every.sum(axis=(0, 1))
+    power = (np.abs(lines.U) ** 2).sum(axis=(0, 1))
     around = scipy.ndimage.maximum_filter1d(power, form.width, mode="reflect")
     driven = (power > _UNDRIVEN * around) & (around > _rounding([r.inputs for r in sets]))
     E, m = lines.U.shape[:2]

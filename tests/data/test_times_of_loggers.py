@@ -191,11 +191,13 @@ def test_a_clock_that_wanders_is_not_even(tmp_path):
     frame = wandering_rows(1.5)
     assert np.abs(np.diff(frame["time"]) / 4e-3 - 1).max() < 0.008
     frame.to_csv(tmp_path / "a.csv", index=False)
-    np.save(tmp_path / "a.npy", frame.to_numpy())
+    frame.to_parquet(tmp_path / "a.parquet")
     with pytest.raises(ValueError, match=r"wanders.* by up to 1\.5 samples.*from_logs"):
         fq.Record.from_frame(frame)
     with pytest.raises(ValueError, match=r"column 'time' wanders"):
         fq.read(tmp_path / "a.csv")
+    with pytest.raises(ValueError, match="the time 'time' wanders"):
+        fq.open(tmp_path / "a.parquet", "u", "y")
 
 
 def test_what_a_wandering_clock_held_is_found_by_its_times():

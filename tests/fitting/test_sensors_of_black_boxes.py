@@ -43,3 +43,16 @@ def test_a_mode_that_is_lacking_is_said_beside_a_small_constant():
     u, y, size = measured(4, False)
     est = fq.fit(fq.OutputError(2), fq.Record(u, y + 0.02 * size, DT))
     assert str(est.verdict.reasons[0]).startswith("another mode")
+
+
+@pytest.mark.parametrize("seed", [4, 8, 10])
+def test_a_slow_lag_that_is_lacking_is_no_constant(seed):
+    """Of an input that has a mean a constant explains most of what the lag does, and not all."""
+    u = measured(seed, False)[0] + 1.0
+    wanted = [(g * w * w, [1, 2 * z * w, w * w])
+              for g, z, w in ((1.0, *MODES[0]), (0.6, *MODES[1]), (1.0, 1.5, 15.0))]  # fmt: skip
+    parts = [ss.cont2discrete(([b], a), DT)[:2] for b, a in wanted]
+    clean = sum(ss.lfilter(np.ravel(b), a, u) for b, a in parts)
+    noise = 0.03 * clean.std() * np.random.default_rng(seed).standard_normal(N)
+    est = fq.fit(fq.OutputError(4), fq.Record(u, clean + noise, DT))
+    assert str(est.verdict.reasons[0]).startswith("another mode")

@@ -92,7 +92,7 @@ def test_few_lines_do_not_tell_two_inputs_apart():
 
 @pytest.mark.parametrize(("samples", "count"), [(1000, 3), (1000, 15), (4000, 7), (5000, 30)])
 def test_lines_far_from_others_are_told_by_themselves(samples, count):
-    """A pole of the transient had taken a line's place: 0.0004 ± 0.0003 for 0.42, lines 1e9 times
+    """A pole of the transient had taken a line's place: 0.00005 ± 0.0003 for 0.42, lines 1e9 times
     off, and grey boxes 32 to 100 % off with noise weights trusted in 9 of 12.
     """
     plant = fq.GreyBox(
